@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SETTINGS = "Settings that differ"
+LONGEST_NAME = 40
+"""Characters of a name that is made of settings."""
 AnyRun = Results | Path | str
 
 
@@ -105,6 +107,3 @@ def _by_settings(runs: list[Results]) -> list[str]:
     ]
     fit = all(name and len(name) <= LONGEST_NAME for name in names) and len({*names}) == len(names)
     return names if fit else [f"run {i}" for i in range(1, len(runs) + 1)]
-
-
-LONGEST_NAME = 40

@@ -8,7 +8,7 @@ from time import thread_time
 from benchmarks.peers import bare_scene
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.run import event_loop
+from hapticlink.orchestrator.run import execute_plan
 
 SCENE, RATE = "closed-loop", 512
 DURATIONS = (3, 15)
@@ -23,11 +23,11 @@ def alone(options: list[str], folder: Path, seconds: int) -> float:
 
 def recorded(options: list[str], folder: Path, seconds: int) -> float:
     """Processor time (s) of our loop."""
-    event_loop.perf_counter, before = thread_time, event_loop.perf_counter
+    execute_plan.perf_counter, before = thread_time, execute_plan.perf_counter
     try:
         ended = simulate(SCENE, folder / "out", [*options, f"duration={seconds}"]).outcome
     finally:
-        event_loop.perf_counter = before
+        execute_plan.perf_counter = before
     assert ended.fault is None
     return ended.wall_time
 

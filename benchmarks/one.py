@@ -20,7 +20,7 @@ from benchmarks.rows import Rows
 from hapticlink.fmus.check import initialize, session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.run import event_loop
+from hapticlink.orchestrator.run import execute_plan
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.programs.build import build_program
 
@@ -62,7 +62,7 @@ def _measured(scene: str, options: tuple[str, ...], rounds: int) -> list[tuple[o
             path = build_program(open_scene.load(scene, options), scene, out=room)
         build = sum(os.times()[:4]) - begin
         for _ in range(rounds):
-            with patch.object(event_loop, "perf_counter", process_time):
+            with patch.object(execute_plan, "perf_counter", process_time):
                 experiment = simulate(scene, room / "run", given, csv=False)
             for form, ticks in FORMS.items():
                 run = experiment.outcome.wall_time

@@ -24,10 +24,10 @@ from unittest.mock import patch
 
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.run import event_loop
+from hapticlink.orchestrator.run import execute_plan
 from hapticlink.orchestrator.run.compiled.library import load
-from hapticlink.visualization.live.viewed_scene import viewed
-from hapticlink.visualization.replay import one_file
+from hapticlink.visualization.interactive.viewed_scene import viewed
+from hapticlink.visualization.page import one_file
 from hapticlink.visualization.standalone import page
 
 SCENES = (
@@ -127,7 +127,7 @@ def _measured(
         opened.click("#pause")
         runs, nodes, wall = list[float](), list[float](), list[float]()
         for _ in range(rounds):
-            with patch.object(event_loop, "perf_counter", process_time):
+            with patch.object(execute_plan, "perf_counter", process_time):
                 runs.append(simulate(shown, room / "run", csv=False).outcome.wall_time)
             nodes.append(_node(text))
             wall.append(opened.evaluate(IN_CHROMIUM, [TIMED + IN_WORKER, DURATION, 5]))

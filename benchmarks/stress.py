@@ -26,6 +26,7 @@ from typing import Any, Literal
 import numpy as np
 
 import hapticlink as hl
+from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 
 CATALOGUE = Path(__file__).parent / "stress.toml"
@@ -85,7 +86,7 @@ def cases() -> list[Case]:
 
 def make(case: Case) -> Made:
     """Runs a case."""
-    verdict = hl.equilibrium_stability(case.scene, case.set).verdict if case.map else ""
+    verdict = _own_hand_verdict(case) if case.map else ""
     try:
         run = hl.run(case.scene, case.set, figures=False)
     except InputFault as fault:
@@ -102,6 +103,11 @@ def make(case: Case) -> Made:
     end = "; ".join([f"{record.end.reason} at {record.end.time:.4g} s", *messages])
     status = Fault.exit_status if run.fault else 0
     return Made(outcome=outcome, status=status, end=end, rise=rise, map=verdict)
+
+
+def _own_hand_verdict(case: Case) -> str:
+    with SceneVariants(hl.scene(case.scene, case.set)) as variants:
+        return variants.judge(()).verdict
 
 
 def risen(run: hl.Run) -> float:

@@ -30,12 +30,12 @@ import hapticlink as hl
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.visualization.live.server_pipe import Link
-from hapticlink.visualization.live.session import Session
-from hapticlink.visualization.live.viewed_scene import viewed
+from hapticlink.visualization.interactive.viewed_scene import viewed
+from hapticlink.visualization.served.server_pipe import Link
+from hapticlink.visualization.served.session import Session
 
 SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5
-SERVER = "hapticlink.visualization.live.server"
+SERVER = "hapticlink.visualization.served.server"
 
 
 class Done(Exception):

@@ -8,15 +8,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands.options import (
+    UNCHANGED,
+    Changes,
     Json,
     Out,
     Quiet,
     Scene,
-    Set,
-    Swap,
     default_folder,
-    options,
-    tell,
+    print_result,
 )
 from hapticlink.commands.progress import counted
 from hapticlink.commands.sweep import Jobs
@@ -30,8 +29,7 @@ def advise(
     /,
     *,
     out: Out = None,
-    set: Set = None,
-    swap: Swap = None,
+    changes: Changes = UNCHANGED,
     draws: Draws = 8,
     seed: Seed = 0,
     jobs: Jobs = None,
@@ -53,19 +51,19 @@ def advise(
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 
-    folder = folders.ensure(out or default_folder("advice", scene, (*(set or ()), *(swap or ()))))
+    folder = folders.ensure(out or changes.folder("advice", scene))
     name, processes = default_folder("advice", scene).name, jobs or os.cpu_count() or 1
     with counted(name, quiet) as show:
-        found = find(
+        advice = find(
             scene,
-            options(set, swap),
+            changes.options,
             folder,
             processes=processes,
             count=draws,
             seed=seed,
             tell=show,
         )
-    write_json(folder / "advice.json", found.record())
-    lines = (f"{name}:", *(f"  {line}" for line in found.lines()), f"  {folder}/")
-    tell(lines, found.record(), quiet, json)
+    write_json(folder / "advice.json", advice.record())
+    lines = (f"{name}:", *(f"  {line}" for line in advice.lines()), f"  {folder}/")
+    print_result(lines, advice.record(), quiet, json)
     return 0

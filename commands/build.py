@@ -43,8 +43,8 @@ def build(
     import hapticlink as hl
 
     folder = out or default_folder("fmus", scene)
-    made = hl.build(
+    paths = hl.build(
         scene, set or (), out=folder, all_platforms=all_platforms, as_one=as_one, without=without
     )
-    say(*made.values(), sep="\n")
+    say(*paths.values(), sep="\n")
     return 0

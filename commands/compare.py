@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import Json, Out, tell
+from hapticlink.commands.options import Json, Out, print_result
 from hapticlink.orchestrator.base.faults import InputFault
 
 Runs = Annotated[list[Path], Parameter(help="Folders of two or more runs.", negative="")]
@@ -29,10 +29,10 @@ def compare(runs: Runs, /, *, out: Out = None, json: Json = False) -> int:
 
     if len(runs) < 2:
         raise InputFault("compare takes two runs or more: `hapticlink report` is for one")
-    found = hl.compare(runs)
-    lines = [str(found)]
+    comparison = hl.compare(runs)
+    lines = [str(comparison)]
     if out:
-        names = figure_axes.save(found.figures(), folders.ensure(out))
+        names = figure_axes.save(comparison.figures(), folders.ensure(out))
         lines.append(f"{out}/: {', '.join(names)}")
-    tell(lines, {"note": found.note, "runs": found.values()}, False, json)
+    print_result(lines, {"note": comparison.note, "runs": comparison.values()}, False, json)
     return 0

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib import metadata
 from typing import Any
 
-from hapticlink.commands.options import Json, tell
+from hapticlink.commands.options import Json, print_result
 from hapticlink.fmus.versions import install_command
 
 HIDDEN = ("test",)
@@ -21,7 +21,7 @@ def doctor(*, json: Json = False) -> int:
     build a small FMU of each packaging that is available, and run it. The exit status is 1 if that
     fails."""
     environment = _found()
-    tell(_lines(environment), environment, quiet=False, as_json=json)
+    print_result(_lines(environment), environment, quiet=False, as_json=json)
     return 0 if all(state == "works" for state in environment["runs"].values()) else 1
 
 
@@ -122,8 +122,9 @@ def _lines(environment: dict[str, Any]) -> Iterator[str]:
             f"missing {', '.join(missing)}: {install_command(extra)}" if missing else "installed"
         )
         yield f"extra {extra}: {state}"
-    kept = environment["cache"]
-    if kept["folder"] is None:
+    cache = environment["cache"]
+    if cache["folder"] is None:
         yield "cache of FMUs: off (HAPTICLINK_CACHE)"
     else:
-        yield f"cache of FMUs: {kept['folder']}, {kept['fmus']} FMUs, {kept['bytes'] / 1e6:.0f} MB"
+        size = f"{cache['fmus']} FMUs, {cache['bytes'] / 1e6:.0f} MB"
+        yield f"cache of FMUs: {cache['folder']}, {size}"

@@ -6,13 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
-from hapticlink.analysis.findings.summary import MECHANISM
-from hapticlink.commands.options import Map, Out, Scene, Set, Swap, default_folder, options
+from hapticlink.analysis.findings.start_values import coordinates, mechanism_outputs
+from hapticlink.commands.options import UNCHANGED, Changes, Out, Scene, default_folder
 from hapticlink.orchestrator.base.terminal_output import say
-from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.system.system import System
 
 if TYPE_CHECKING:
@@ -33,9 +31,7 @@ def info(
     scene: Scene | None = None,
     /,
     *,
-    set: Set = None,
-    swap: Swap = None,
-    map: Map = None,
+    changes: Changes = UNCHANGED,
     draw: Draw = False,
     out: Out = None,
 ) -> int:
@@ -58,23 +54,23 @@ def info(
         for name, title in hl.shipped().items():
             say(f"{name}: {title}")
         return 0
-    read = hl.scene(scene, options(set, swap, map))
-    with built(read) as made:
-        time = made.timeline
-        start = at_start(made) if read.linkage else {}
-        fetched = with_fetched(made).fmu
+    read = hl.scene(scene, changes.options)
+    with built(read) as system:
+        time = system.timeline
+        start = mechanism_outputs(system) if read.linkage else {}
+        fetched = with_fetched(system).fmu
     say(f"{read.title}\n{read.description.strip()}".strip())
     say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
     if read.linkage and start:
         for line in summary.moved(asdict(read.linkage), coordinates(start)):
             say(f"  {line}")
-    for fmu in made.fmus:
+    for fmu in system.fmus:
         timing = fmu.description.timing
         every, some = (len(of.description.outputs) for of in (fmu, fetched[fmu.name]))
         say(f"  {fmu.name}: {timing}, at {fmu.clock}, {every} outputs, {some} fetched")
     say("\nconnections (age of the newest sample when it is used, ms)")
-    ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(made)).items()}
-    for connection in made.connections:
+    ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(system)).items()}
+    for connection in system.connections:
         if connection.initial:
             note = "once, at the start"
         elif age := ages.get(connection.name):
@@ -82,7 +78,7 @@ def info(
         else:
             note = "at the start only"
         say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
-    for line in summary.replaced(made.replacements):
+    for line in summary.replaced(system.replacements):
         say(f"  {line}")
     if read.device:
         from hapticlink.analysis.findings import workspace
@@ -92,7 +88,7 @@ def info(
             say(f"  {line}")
     _needs(read, time)
     if draw or out:
-        _draw(read, made, start, out or default_folder("info", scene))
+        _draw(read, system, start, out or default_folder("info", scene))
     return 0
 
 
@@ -103,6 +99,7 @@ def _pose(start: dict[str, float]) -> list[float]:
 
 def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
     from hapticlink.orchestrator.results import folders
+    from hapticlink.visualization import figure_axes
     from hapticlink.visualization.figures import block_diagram
     from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
@@ -112,10 +109,11 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
     if scene.device:
         title = f"Device and its workspace: {scene.title}"
         figures["workspace"] = workspace_drawing.draw(scene.device, _pose(start), title)
-    for name, figure in figures.items():
-        path = folders.ensure(out) / f"{name}.png"
-        figure.savefig(path, dpi=150, metadata={"Software": None})  # the same bytes every time
-        say(f"  {path}")
+    for name in figure_axes.save(figures, folders.ensure(out)):
+        say(f"  {out / name}")
+
+
+_PER_TICK = ("operations", "signals")
 
 
 def _needs(scene: Any, time: Timeline) -> None:
@@ -140,22 +138,3 @@ def _needs(scene: Any, time: Timeline) -> None:
 
 
 _PER_TICK = ("operations", "signals")
-
-
-def at_start(system: System) -> dict[str, float]:
-    """Start values of the mechanism's outputs, as its FMU assembles it in initialisation mode; {}
-    without a mechanism, and with another FMU in its place, which `info` does not run."""
-    fmu = system.fmu.get(MECHANISM)
-    if fmu is None or fmu.description.block != MECHANISM:
-        return {}
-    outputs = np.zeros(len(fmu.description.outputs))
-    made = IN_PROCESS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)
-    with made as instance:
-        instance.enter_initialization(1.0)
-        instance.read()
-    return dict(zip((s.name for s in fmu.description.outputs), outputs.tolist(), strict=True))
-
-
-def coordinates(values: dict[str, float]) -> list[float]:
-    """The joint coordinates q[1], q[2], ... among named values."""
-    return [float(value) for name, value in values.items() if name.startswith("q[")]

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -64,20 +65,31 @@ Json = Annotated[
 ]
 
 
-def options(
-    set: Iterable[str] | None, swap: Iterable[str] | None, map: Iterable[str] | None = None
-) -> tuple[str, ...]:
-    """The options of a scene: an [[fmu]] with `replaces` for each --swap, what --map says of them,
-    then those of --set, which may change them.
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Changes:
+    """The changes of a scene that a command is given."""
 
-    Raises InputFault for a swap that is not block=file, and a map that is not port=names.
-    """
-    swaps = tuple(swap or ())
-    return (
-        *(_swap(each) for each in swaps),
-        *(_map(each, swaps) for each in map or ()),
-        *(set or ()),
-    )
+    set: Set = None
+    swap: Swap = None
+    map: Map = None
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The options of the scene: an [[fmu]] with `replaces` for each --swap, what --map says of
+        them, then those of --set, which may change them. Raises InputFault for a swap that is not
+        block=file, and a map that is not port=names."""
+        swaps = tuple(self.swap or ())
+        maps = (_map(each, swaps) for each in self.map or ())
+        return (*map(_swap, swaps), *maps, *(self.set or ()))
+
+    def folder(self, root: str, scene: str) -> Path:
+        """The default output folder for these changes of a scene."""
+        given = (*(self.set or ()), *(self.swap or ()), *(self.map or ()))
+        return default_folder(root, scene, given)
+
+
+UNCHANGED = Changes()
 
 
 def _swap(given: str) -> str:
@@ -107,6 +119,10 @@ def _map(given: str, swaps: Sequence[str]) -> str:
     return f'fmu.{block}.map."{port.removeprefix(f"{block}.")}"={variables}'
 
 
+LONGEST = 100
+"""Characters of options in the name of a folder."""
+
+
 def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
     """The default output folder for a scene's name or path: `<root>/<scene>`, and with options
     `<root>/<scene>,key=value,...`, so that a run does not replace one of other options.
@@ -124,11 +140,9 @@ def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
     return Path(root) / name
 
 
-LONGEST = 100
-"""Characters of options in the name of a folder."""
-
-
-def tell(lines: Iterable[str], record: Mapping[str, Any], quiet: bool, as_json: bool) -> None:
+def print_result(
+    lines: Iterable[str], record: Mapping[str, Any], quiet: bool, as_json: bool
+) -> None:
     """Print the lines of a result; or with `as_json` its record alone; or with `quiet` nothing."""
     if as_json:
         print(json.dumps(record, indent=2))

@@ -21,10 +21,10 @@ def recover(folder: Folder, /) -> int:
     """
     from hapticlink.orchestrator.results.recover import recover
 
-    found = recover(folder)
-    for name, table in found.items():
+    tables = recover(folder)
+    for name, table in tables.items():
         lost = f"{table.lost or 'none'} lost"
         say(f"{folder / name}.csv: {table.rows} rows to {table.time:.6g} s, {lost}")
-    if not found:
+    if not tables:
         say(f"{folder}: there is nothing to recover")
     return 0

@@ -28,12 +28,12 @@ def report(runs: Runs, /, *, out: Out = None) -> int:
     from hapticlink.orchestrator.results.named_runs import named
     from hapticlink.visualization.compare import page
 
-    found = named(runs)
-    path = out or Path("reports") / f"{'+'.join(name.replace('/', '-') for name in found)}.html"
+    results = named(runs)
+    path = out or Path("reports") / f"{'+'.join(name.replace('/', '-') for name in results)}.html"
     if path.is_dir():
         raise InputFault(f"--out {path}: is a folder; name a file, such as {path / 'report.html'}")
     folders.ensure(path.parent)
-    text = page.page(found)
+    text = page.page(results)
     with atomic_file(path) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
     say(f"{path}: {path.stat().st_size / 1e3:.0f} kB")

@@ -8,16 +8,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands.options import (
+    UNCHANGED,
+    Changes,
     Json,
-    Map,
     Out,
     Quiet,
     Scene,
-    Set,
-    Swap,
     default_folder,
-    options,
-    tell,
+    print_result,
 )
 from hapticlink.commands.progress import progress
 from hapticlink.orchestrator.base.faults import Fault
@@ -41,9 +39,7 @@ def run(
     /,
     *,
     out: Out = None,
-    set: Set = None,
-    swap: Swap = None,
-    map: Map = None,
+    changes: Changes = UNCHANGED,
     figures: Figures = True,
     explain: Explain = False,
     real_time: RealTime = False,
@@ -65,13 +61,12 @@ def run(
     import hapticlink as hl
     from hapticlink.analysis.findings import summary
 
-    overrides = options(set, swap, map)
     if explain:
-        say(*hl.explain(scene, overrides), sep="\n")
+        say(*hl.explain(scene, changes.options), sep="\n")
         return 0
-    folder = out or default_folder("runs", scene, (*(set or ()), *(swap or ()), *(map or ())))
+    folder = out or changes.folder("runs", scene)
     try:
-        read = hl.scene(scene, overrides)
+        read = hl.scene(scene, changes.options)
         with progress(read.title, read.duration, hidden=quiet) as report:
             result = hl.run(read, out=folder, figures=figures, progress=report, real_time=real_time)
     except hl.RunInterrupted as ended:
@@ -84,5 +79,5 @@ def run(
             say(f"hapticlink: {line}", file=sys.stderr)
     if not result.folder:
         lines.append(f"  {folder}/: nothing written, the run failed before the first sample")
-    tell(lines, result.run, quiet, json)
+    print_result(lines, result.run, quiet, json)
     return Fault.exit_status if result.fault else 0

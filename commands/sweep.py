@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import Json, Out, Quiet, Scene, Set, default_folder, tell
+from hapticlink.commands.options import Json, Out, Quiet, Scene, Set, default_folder, print_result
 from hapticlink.commands.progress import counted
 from hapticlink.orchestrator.base.terminal_output import say
 
@@ -68,19 +68,19 @@ def sweep(
 
     folder = out or default_folder("sweeps", scene)
     with counted(scene, hidden=quiet) as count:
-        made = hl.sweep(
+        result = hl.sweep(
             scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
             scheduler=scheduler, metric=metric, progress=count,
         )  # fmt: skip
-    for each in made.failed[:10]:
-        what = ", ".join(f"{k}={v}" for k, v in each.items() if k in made.keys)
-        say(f"hapticlink: {what}: {each['end']}: {each['message']}", file=sys.stderr)
-    runs_made, failed = len(made.rows), len(made.failed)
+    for row in result.failed[:10]:
+        what = ", ".join(f"{k}={v}" for k, v in row.items() if k in result.keys)
+        say(f"hapticlink: {what}: {row['end']}: {row['message']}", file=sys.stderr)
+    runs_done, failed = len(result.rows), len(result.failed)
     lines = (
-        f"{default_folder('sweeps', scene).name}: {runs_made} runs, {failed} of them failed",
-        f"  {folder}/: {', '.join(made.files)}",
+        f"{default_folder('sweeps', scene).name}: {runs_done} runs, {failed} of them failed",
+        f"  {folder}/: {', '.join(result.files)}",
     )
-    tell(lines, {"folder": str(folder), "rows": made.rows}, quiet, json)
-    if failed < runs_made:
+    print_result(lines, {"folder": str(folder), "rows": result.rows}, quiet, json)
+    if failed < runs_done:
         return 0
-    return InputFault.exit_status if all(r["end"] == REFUSED for r in made.rows) else 1
+    return InputFault.exit_status if all(r["end"] == REFUSED for r in result.rows) else 1

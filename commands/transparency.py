@@ -7,15 +7,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands.options import (
+    UNCHANGED,
+    Changes,
     Json,
     Out,
     Quiet,
     Scene,
-    Set,
-    Swap,
     default_folder,
-    options,
-    tell,
+    print_result,
 )
 from hapticlink.commands.progress import waiting
 from hapticlink.orchestrator.base.terminal_output import say
@@ -31,8 +30,7 @@ def transparency(
     /,
     *,
     out: Out = None,
-    set: Set = None,
-    swap: Swap = None,
+    changes: Changes = UNCHANGED,
     poses: Poses = 2,
     costs: Costs = False,
     quiet: Quiet = False,
@@ -52,22 +50,24 @@ def transparency(
     from hapticlink.analysis import transparency as analysis
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
-    from hapticlink.visualization.figure_axes import png, write
+    from hapticlink.visualization import figure_axes
     from hapticlink.visualization.figures import transparency_figure
 
-    given, name = options(set, swap), default_folder("runs", scene).name
+    given, name = changes.options, default_folder("runs", scene).name
     with waiting(f"{name}: equilibria and linearisations, which can take a minute", quiet):
-        found = analysis.transparency(scene, given, count=poses)
+        in_poses = analysis.transparency(scene, given, count=poses)
         beside = dict(analysis.costs(scene, given, say)) if costs else {}
-    folder = folders.ensure(out or default_folder("runs", scene, (*(set or ()), *(swap or ()))))
+    folder = folders.ensure(out or changes.folder("runs", scene))
     record = {
-        "title": found[0].title,
-        "poses": [pose.record() for pose in found],
+        "title": in_poses[0].title,
+        "poses": [pose.record() for pose in in_poses],
         "changes": {change: pose.record() for change, pose in beside.items()},
     }
     write_json(folder / "transparency.json", record)
-    write([("transparency", png(transparency_figure.draw(found)))], folder)
-    lines = [line for pose in found for line in pose.lines()]
+    figure_axes.save({"transparency": transparency_figure.draw(in_poses)}, folder)
+    lines = [line for pose in in_poses for line in pose.lines()]
     lines += [line for pose in beside.values() for line in pose.lines()]
-    tell((f"{name}:", *(f"  {line}" for line in lines), f"  {folder}/"), record, quiet, json)
+    print_result(
+        (f"{name}:", *(f"  {line}" for line in lines), f"  {folder}/"), record, quiet, json
+    )
     return 0

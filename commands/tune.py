@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import Out, Scene, Set, default_folder, options
+from hapticlink.commands.options import Out, Scene, Set, default_folder
 from hapticlink.orchestrator.base.terminal_output import say
 
 Margin = Annotated[
@@ -39,10 +39,9 @@ def tune(
     from hapticlink.orchestrator.base.faults import Interrupted
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
-    from hapticlink.visualization.figure_axes import png, write
+    from hapticlink.visualization import figure_axes
     from hapticlink.visualization.figures import tuning_figure
 
-    given = options(set, None)
     folder = out or default_folder("tuned", scene)
 
     kept = False
@@ -52,11 +51,11 @@ def tune(
         folders.ensure(folder)
         write_json(folder / "tune.json", tuned.record())
         (folder / "tuned.toml").write_text(tuned.scene(), encoding="utf-8")
-        write([("tune", png(tuning_figure.draw(tuned)))], folder)
+        figure_axes.save({"tune": tuning_figure.draw(tuned)}, folder)
         kept = True
 
     try:
-        result = find(scene, given, margin=margin, tell=say, keep=keep)
+        result = find(scene, set or (), margin=margin, tell=say, keep=keep)
     except Interrupted:
         say(f"interrupted: {f'{folder}/ has' if kept else 'no'} gains found so far")
         return 1

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import hapticlink as hl
-from hapticlink.commands.info import at_start, coordinates
+from hapticlink.analysis.findings.start_values import coordinates, mechanism_outputs
 from hapticlink.orchestrator.system.build_system import built
 from hapticlink.visualization.figures import block_diagram
 from hapticlink.visualization.mechanism import drawing, workspace_drawing
@@ -36,7 +36,7 @@ def draw(scene: str | Path) -> Path:
     """Draws a scene, given by its name or path, and returns the picture's path."""
     read = hl.scene(scene)
     with built(read) as system:
-        q = coordinates(at_start(system))
+        q = coordinates(mechanism_outputs(system))
     path = PICTURES / f"{Path(scene).stem}.png"
     drawing.figure(read, q).savefig(path, dpi=DPI, **SAME)
     return path
@@ -54,7 +54,7 @@ def device(scene: str) -> Path:
     """Draws the device of a scene in its workspace, and returns the picture's path."""
     read = hl.scene(scene)
     with built(read) as system:
-        start = at_start(system)
+        start = mechanism_outputs(system)
     pose = [start[f"x[{i}]"] for i in (1, 2, 3)]
     figure = workspace_drawing.draw(read.device, pose, f"Device and its workspace: {read.title}")
     figure.savefig(FIGURES / "device.png", dpi=90, **SAME)

@@ -42,12 +42,12 @@ def build_engine(
     stop_time: float = 1.0,
     step_size: float = 1 / 512,
 ) -> Path:
-    """As `build`, with the component's ports by a physics engine (`hapticlink.fmus.engine`);
-    `settings` are those of its block."""
-    from hapticlink.fmus import engine
+    """As `build`, with the component's ports by a physics engine (`engine.mujoco_fmu`); `settings`
+    are those of its block."""
+    from hapticlink.fmus.engine import mujoco_fmu
 
     require_platform()
-    files = engine.entries(component, settings, stop_time=stop_time, step_size=step_size)
+    files = mujoco_fmu.entries(component, settings, stop_time=stop_time, step_size=step_size)
     return _publish(component, files, folder)
 
 

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.windows import opened
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, beside
-from hapticlink.orchestrator.run.event_loop import Outcome, Progress, run
+from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
 from hapticlink.orchestrator.run.real_time import RealTimeRun
@@ -117,8 +117,8 @@ def simulate(
         before = setup(read, plan, tables, _left_out(every, system))
         for fmu in system.fmus:
             if offered := capabilities.unused(fmu.description):
-                said = "%s offers %s, which is not used: its events act at ends of steps"
-                logging.getLogger(__name__).warning(said, fmu.name, offered)
+                warning = "%s offers %s, which is not used: its events act at ends of steps"
+                logging.getLogger(__name__).warning(warning, fmu.name, offered)
         alone = isolated(system.fmus)
         csv = csv and read.record.format == "csv"
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]

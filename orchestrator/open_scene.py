@@ -11,8 +11,8 @@ from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find_scene import find, folder_of
-from hapticlink.orchestrator.scene.load_scene import from_source
 from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.read_and_check import from_source
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
 

@@ -138,14 +138,14 @@ class LiveRun:
         if delay is not None:
             delay = require(f"delay of {name}", delay, Elapsed)
         system = self._simulation.system
-        found = [c for c in system.connections if name in names(c) and c.hold]
-        if not found:
+        connections = [c for c in system.connections if name in names(c) and c.hold]
+        if not connections:
             every = [key for c in system.connections if c.hold for key in names(c)]
             raise InputFault(unknown("connection with a hold", name, every))
-        new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in found]
+        new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in connections]
         for connection in new:
-            made = make_hold(connection, system, self._simulation.signals, {})
-            self._loop.change_hold(connection.name, made)
+            held = make_hold(connection, system, self._simulation.signals, {})
+            self._loop.change_hold(connection.name, held)
             self._connections[connection.name] = connection
             sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]
             stamp = self._loop.events.previous(system.fmu[connection.source].clock)
@@ -186,14 +186,14 @@ class LiveRun:
             raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
 
         @lru_cache(maxsize=8)  # several events ask for the same point
-        def at(i: int) -> int:
+        def point(i: int) -> int:
             if i < 2:
                 return (first, begun)[i]
             drawn = np.random.default_rng((seed, i)).uniform(-0.5, 0.5) if jitter else 0.0
             return math.ceil((begun + (i - 1 + Fraction(jitter * drawn)) * period) / tick) * tick
 
         count = max(math.ceil((timeline.end - begun) / period), 0) + 4
-        events.change_rate(clock, Frames(at, count, 1))
+        events.change_rate(clock, Frames(point, count, 1))
         drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
         self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
 
@@ -252,8 +252,8 @@ class LiveRun:
         fmus = self._simulation.system.fmu
         if fmu not in fmus:
             raise InputFault(unknown("FMU", fmu, fmus))
-        if found := fmus[fmu].description.port(port, *causalities):
-            return found
+        if scalars := fmus[fmu].description.port(port, *causalities):
+            return scalars
         every = [s.port for s in fmus[fmu].description.scalars if s.causality in causalities]
         raise InputFault(f"{fmu}: {unknown(' or '.join(causalities), port, dict.fromkeys(every))}")
 

@@ -6,7 +6,7 @@
     r["virtual_mechanism.x"], r.time("virtual_mechanism.x")
 
 Scenes: `shipped`, `scene`, `explain`. Runs: `run`, `RealTime`, `sweep`, `load`, `compare`, `view`.
-Files: `build`, `export`. Before a hand is on the device: `stability`, `tune`.
+Files: `build`, `export`. Before a hand is on the device: `fit`, `stability`, `tune`.
 Raised: `InputFault` for bad input, with all findings of a scene `SceneFault`; each is a `Fault`.
 """
 

@@ -1,20 +1,16 @@
 # The public names of hapticlink and the modules that define them: the one list of them.
 
+from hapticlink.analysis.fit.fit import Fitted as Fitted
+from hapticlink.analysis.fit.fit import fit as fit
 from hapticlink.analysis.maps import Map as Map
-from hapticlink.analysis.stability.finite_time_growth import (
-    finite_time_growth as finite_time_growth,
-)
 from hapticlink.analysis.stability.passivity import Passivity as Passivity
 from hapticlink.analysis.stability.passivity import passivity as passivity
-from hapticlink.analysis.stability.scene_stability import Stability as Stability
 from hapticlink.analysis.stability.scene_stability import (
     equilibrium_stability as equilibrium_stability,
 )
+from hapticlink.analysis.stability.scene_stability import stability as stability
+from hapticlink.analysis.stability.stability_verdict import Stability as Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability as VaryingStability
-from hapticlink.analysis.stability.workspace_stability import stability as stability
-from hapticlink.analysis.stability.workspace_verdict import (
-    WorkspaceStability as WorkspaceStability,
-)
 from hapticlink.analysis.transparency import Transparency as Transparency
 from hapticlink.analysis.transparency import transparency as transparency
 from hapticlink.analysis.tune import Tuned as Tuned

@@ -93,9 +93,9 @@ def _identifier(name: str | Path) -> str:
 def program_files(scene: Scene, identifier: str, without: str | None = None) -> dict[str, bytes]:
     """All files of the FMU but its binaries. Raises InputFault as `build_program`."""
     with resolved(scene, without) as program:
-        made = components(program)
-        variables = ports(program, made)
-        texts = sources(program, made, variables)
+        blocks_of_members = components(program)
+        variables = ports(program, blocks_of_members)
+        texts = sources(program, blocks_of_members, variables)
         haptic = program.system.timeline.clocks[0]
         step_size = program.system.timeline.seconds(haptic.longest)
     page = documentation(scene, variables)
@@ -121,14 +121,14 @@ def program_files(scene: Scene, identifier: str, without: str | None = None) -> 
 def components(program: Resolved) -> dict[str, Component]:
     """The component of each member, with the step sizes of the scene."""
     timeline, plans = program.system.timeline, {b.name: b for b in blocks(program.scene).built}
-    made = {}
+    by_member = {}
     for name in program.members:
         plan = plans[name]
         known = component(plan.block, plan.settings)
         steps = sizes(timeline.of[name], timeline)
         given = {v.name: (steps[v.name],) for v in known.parameters if v.name in steps}
-        made[name] = component(plan.block, plan.settings, given) if given else known
-    return made
+        by_member[name] = component(plan.block, plan.settings, given) if given else known
+    return by_member
 
 
 def _built(

@@ -85,27 +85,27 @@ def changes(
     machine: Machine, simulation: Simulation, plan: Plan, binder: Binder, kinds: Iterable[Event]
 ) -> Changes:
     """The changes that are possible in a scene. kinds: of its events."""
-    made = [*_holds(machine, simulation)]
-    pointers = (ctypes.c_void_p * max(len(made), 1))(*(hold.address for _, hold in made))
-    found = Changes([choice for choice, _ in made], ctypes.addressof(pointers), kept=pointers)
+    held = [*_holds(machine, simulation)]
+    pointers = (ctypes.c_void_p * max(len(held), 1))(*(hold.address for _, hold in held))
+    possible = Changes([choice for choice, _ in held], ctypes.addressof(pointers), kept=pointers)
     names = [clock.name for clock in simulation.system.timeline.clocks]
     if CLOCK not in names[1:]:
-        return found
+        return possible
     try:
         require_other_rate(simulation.system, CLOCK)
     except InputFault:
-        return found
+        return possible
     timeline, index = simulation.system.timeline, names.index(CLOCK)
     families = []
     for event in _with_clock(kinds, timeline, index):
         family = _family(machine, plan, binder, event, timeline)
         if family is None:
-            return found
+            return possible
         families.append(family)
     most = max(family.n for family in families)
     nothing: Bound = [(Record(CLOCK), lambda tick: None)] * (SPARE_KINDS * most)
     first, _ = machine.block(nothing)
-    return replace(found, clock=index, families=tuple(families), spare=first, most=most)
+    return replace(possible, clock=index, families=tuple(families), spare=first, most=most)
 
 
 def _holds(machine: Machine, simulation: Simulation) -> Iterator[tuple[Choice, CompiledHold]]:
@@ -119,11 +119,11 @@ def _holds(machine: Machine, simulation: Simulation) -> Iterator[tuple[Choice, C
         for hold in holds:
             other = replace(held_by(connection, hold, None), latency=latency)
             with suppress(InputFault):  # a hold of a plugin
-                made = machine.other_hold(name, make_hold(other, system, simulation.signals, {}))
-                longest = MOST_DELAY + (1 / LEAST_RATE if isinstance(made.own, Account) else 0.0)
-                while made.room < math.ceil(longest / haptic) + 8:
-                    made.grow()
-                yield Choice(name, hold), made
+                new = machine.other_hold(name, make_hold(other, system, simulation.signals, {}))
+                longest = MOST_DELAY + (1 / LEAST_RATE if isinstance(new.own, Account) else 0.0)
+                while new.room < math.ceil(longest / haptic) + 8:
+                    new.grow()
+                yield Choice(name, hold), new
 
 
 def _with_clock(kinds: Iterable[Event], timeline: Timeline, index: int) -> Iterator[Event]:

@@ -121,11 +121,11 @@ def _outputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterato
 def _bases(component: Component) -> dict[str, str]:
     """By name of an output, that of which it is the time derivative."""
     outputs: dict[str, Variable] = {v.name: v for v in component.outputs}
-    found: dict[str, str] = {}
+    by_output: dict[str, str] = {}
     for v in component.outputs:
         if v.derivative_of:
-            found |= dict(zip(v.names, outputs[v.derivative_of].names, strict=True))
-    return found
+            by_output |= dict(zip(v.names, outputs[v.derivative_of].names, strict=True))
+    return by_output
 
 
 def _energies(resolved: Resolved) -> Iterator[Port]:

@@ -412,19 +412,10 @@ void fmi2FreeInstance(fmi2Component c) {
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
                               fmi2Boolean logging) {
-    if (!callbacks || !callbacks->logger || !name || !guid) return NULL;
-    Model *m = calloc(1, sizeof(Model) + strlen(name) + 1);
+    Model *m = allocated(name, type, guid, callbacks);
     if (!m) return NULL;
-    strcpy(m->name, name);
-    m->callbacks = *callbacks;
     const fmi2CallbackFunctions own = {member_logger, calloc, free, NULL, m};
     memcpy(&m->member_callbacks, &own, sizeof own);
-    if (type != fmi2CoSimulation || strcmp(guid, GUID)) {
-        if (type != fmi2CoSimulation) fail(m, fmi2Error, "this FMU is for co-simulation only");
-        else fail(m, fmi2Error, "the guid %s is not that of this binary, %s", guid, GUID);
-        free(m);
-        return NULL;
-    }
     for (int i = 0; i < N_MEMBERS; i++) {
         m->members[i] = members[i].instantiate(members[i].name, fmi2CoSimulation, members[i].guid, "",
                                                &m->member_callbacks, fmi2False, fmi2False);
@@ -490,12 +481,6 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 /* --- values --------------------------------------------------------------------------------- */
 
-static int is_unknown(const Model *m, fmi2ValueReference reference) {
-    if (reference < N_VARIABLES) return 0;
-    fail(m, fmi2Error, "unknown value reference %u; %d are known", reference, N_VARIABLES);
-    return 1;
-}
-
 static fmi2Status value_of(Model *m, const Variable *v, double *value) {
     const Loop *l = &m->now.scene.loop;
     switch (v->kind) {
@@ -517,7 +502,7 @@ fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[
     Model *m = c;
     if (is_null(m, __func__, n, vr, value)) return fmi2Error;
     for (size_t i = 0; i < n; i++)
-        if (is_unknown(m, vr[i]) || value_of(m, variables + vr[i], value + i) > fmi2Warning)
+        if (is_unknown(m, vr[i], N_VARIABLES) || value_of(m, variables + vr[i], value + i) > fmi2Warning)
             return fmi2Error;
     return fmi2OK;
 }
@@ -527,7 +512,7 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
     if (out_of_order(m, __func__, INSTANTIATED | INITIALIZATION | STEP_MODE)) return fmi2Error;
     if (is_null(m, __func__, n, vr, value)) return fmi2Error;
     for (size_t i = 0; i < n; i++) { /* all are looked at before any is set */
-        if (is_unknown(m, vr[i])) return fmi2Error;
+        if (is_unknown(m, vr[i], N_VARIABLES)) return fmi2Error;
         const Variable *v = variables + vr[i];
         if (vr[i] >= N_SETTABLE) return fail(m, fmi2Error, "%s is no input or parameter", v->name);
         if (v->fixed && m->now.mode == STEP_MODE)

@@ -5,16 +5,6 @@
 
 #include "loop.h"
 
-/* Energy (J) that the connection of a meter has generated so far: orchestrator/run/energy/meter.py. */
-double meter_energy(const Meter *m);
-
-/* The work (J) of the held effort of a meter, and that of the ideal one; the first less the second is
- * what sampling and holding have generated. */
-void meter_work(const Meter *m, double work[2]);
-
-/* Adds rows of a meter to its sums and drops them; whether that made room. */
-int meter_fold(Meter *m);
-
 /* PCG64 as NumPy has it, with a state and an increment of 128 bits each, the high words first. */
 typedef struct {
     uint64_t state[2], increment[2];

@@ -79,7 +79,7 @@ class Regions:
         self._sorted = sorted(self.all, key=lambda region: region.address)
         self._starts = [region.address for region in self._sorted]
 
-    def at(self, type_: str, address: int) -> tuple[Region, int] | None:
+    def entry_at(self, type_: str, address: int) -> tuple[Region, int] | None:
         """The region of an address with entries of a type, and the index of the entry there; None
         where there is no such region, as for arrays without entries."""
         first = bisect_right(self._starts, address) - 1

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.ticks import Timeline, exact
-from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.plan.operations import Event, Push
@@ -193,9 +193,9 @@ def _resolved(
     for event in _kinds(system.timeline):
         bound = binder.instructions(plan.block(event))
         kinds[event] = machine.block([b for b in bound if getattr(b[0], "fmu", "") != outside])
-    found = changes(machine, simulation, plan, binder, kinds) if changing else NONE
+    possible = changes(machine, simulation, plan, binder, kinds) if changing else NONE
     refusals.of_machine(machine.in_python, scene.title)
-    events = Events(system.timeline, kinds, found)
+    events = Events(system.timeline, kinds, possible)
     fmus, memory = machine.names("fmu"), Memory()
     into = [n for n in fmus if any(c.target == n for c in system.connections)]
     setters = (structures.Setter * len(into))()
@@ -216,7 +216,7 @@ def _resolved(
             ("loop", "Loop", ctypes.addressof(machine.loop), 1),
             ("events", "Events", ctypes.addressof(events.c), 1),
             ("start_setters", "Setter", ctypes.addressof(setters), len(into)),
-            ("alternatives", "Hold *", found.address, len(found.choices)),
+            ("alternatives", "Hold *", possible.address, len(possible.choices)),
         ],
         counts=machine.counts() | {"n_values": len(simulation.signals.values)},
         start=start,
@@ -227,7 +227,7 @@ def _resolved(
         patterns=events.patterns,
         recorded=recorded,
         start_values=start_values,
-        changes=found,
+        changes=possible,
         tables=machine.names("table"),
         kept=(machine, events, setters, memory, rows),
     )
@@ -272,7 +272,7 @@ def _steps_apart(system: System, connection: str, changing: bool) -> int:
 def _newest_rows(machine: Machine, simulation: Simulation) -> list[object]:
     """Gives each table room for one row: all outputs of its clock at the newest event. What is
     returned has to be kept."""
-    kept: list[object] = []
+    arrays: list[object] = []
     n = len(machine.names("table"))
     tables = (structures.Table * n).from_address(machine.loop.tables)
     for c, clock in zip(tables, machine.names("table"), strict=True):
@@ -280,8 +280,8 @@ def _newest_rows(machine: Machine, simulation: Simulation) -> list[object]:
         row, numbers = np.zeros(1 + len(outputs)), np.array([0, 1], np.int64)
         c.block, c.view, c.where, c.n = row.ctypes.data, outputs.ctypes.data, None, len(outputs)
         c.rows, c.room = numbers[:1].ctypes.data, numbers[1:].ctypes.data
-        kept += [row, numbers]
-    return kept
+        arrays += [row, numbers]
+    return arrays
 
 
 def _start_setter(simulation: Simulation, fmu: str, c: structures.Setter, memory: Memory) -> None:
@@ -301,13 +301,13 @@ def _kinds(timeline: Timeline) -> Iterator[Event]:
     clocks = tuple(replace(clock, starts=_endless(clock.starts)) for clock in timeline.clocks)
     repeats = math.lcm(*(_repeats(clock.starts) for clock in clocks))
     until = min(ends) if ends else max(clock.first for clock in clocks) + repeats
-    found: dict[Event, None] = {}
+    kinds: dict[Event, None] = {}
     endless = replace(timeline, clocks=clocks, end=NO_END)
     for tick, event in islice(moments(endless), MAX_EVENTS):
         if tick >= until:
             break
-        found.setdefault(event)
-    yield from found
+        kinds.setdefault(event)
+    yield from kinds
 
 
 def _endless(starts: Sequence[int]) -> Sequence[int]:
@@ -328,9 +328,9 @@ class Events:
     and the first communication points of each clock with their patterns."""
 
     def __init__(
-        self, timeline: Timeline, kinds: Mapping[Event, tuple[int, int]], found: Changes
+        self, timeline: Timeline, kinds: Mapping[Event, tuple[int, int]], possible: Changes
     ) -> None:
-        n, n_kinds = len(timeline.clocks), len(kinds) + found.n_kinds
+        n, n_kinds = len(timeline.clocks), len(kinds) + possible.n_kinds
         self.patterns: list[Pattern] = []
         self._windows: list[object] = []
         self._clocks = (structures.Clock * n)()
@@ -346,7 +346,7 @@ class Events:
             key[:] = [event.first, *(fired.get(clock.name, 0) for clock in timeline.clocks)]
             block.first, block.last = span
         for i, block in enumerate(self._blocks[len(kinds) :]):
-            block.first = block.last = found.spare + i * found.most
+            block.first = block.last = possible.spare + i * possible.most
         self.c = c = structures.Events()
         c.clocks, c.n_clocks, c.end = ctypes.addressof(self._clocks), n, NO_END
         c.keys, c.key = self._keys.ctypes.data, self._key.ctypes.data

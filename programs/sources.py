@@ -18,7 +18,7 @@ from hapticlink.components.component import Component
 from hapticlink.fmus.native.archive import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.run.compiled import build as loop
 from hapticlink.programs.ports import Port
 from hapticlink.programs.regions import Regions
@@ -26,7 +26,7 @@ from hapticlink.programs.resolved import Resolved
 from hapticlink.programs.typed_data import TypedData
 
 HERE = Path(__file__).parent
-OWN = ("program.h", "program.c", "changes.h", "platform.c", "latencies.c", "energies.c")
+OWN = ("program.h", "program.c", "changes.h", "platform.c", "latencies.c")
 REPLACED = ("platform.c", "process_state.c", "python_errors.c")
 """Files of the loop in whose place a program has its own platform.c."""
 HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
@@ -178,10 +178,10 @@ def _changes(resolved: Resolved, regions: Regions) -> Iterator[str]:
     clocks = [clock.name for clock in system.timeline.clocks]
     for i, choice in enumerate(changes.choices):
         own = re.compile(rf"alternative_{i}(_|$)")
-        found = [region.name for region in regions.all if own.match(region.name)]
+        names = [region.name for region in regions.all if own.match(region.name)]
         hold = resolved.holds.index(choice.connection)
-        choices.append(f"{{{hold}, {len(places)}, {len(found)}}}")
-        places += [f"{{{_at(name)}, sizeof(((Scene *)0)->{name})}}" for name in found]
+        choices.append(f"{{{hold}, {len(places)}, {len(names)}}}")
+        places += [f"{{{_at(name)}, sizeof(((Scene *)0)->{name})}}" for name in names]
     yield table("struct { int hold, first, n; } choices", choices)
     yield table("struct { size_t at, size; } choice_regions", places)
     held = [system.connection[name] for name in resolved.holds]

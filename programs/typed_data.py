@@ -65,7 +65,7 @@ class TypedData:
         addresses = (ctypes.c_void_p * region.count).from_address(region.address)
         for i, address in enumerate(addresses):
             if address:
-                target = self._regions.at(region.type[:-1].strip(), address)
+                target = self._regions.entry_at(region.type[:-1].strip(), address)
                 assert target
                 self.pointers.append((_place(region, i, True), _place(*target)))
 
@@ -99,7 +99,7 @@ class TypedData:
             pointer = POINTERS[type_][field]
             kind = "double" if pointer.type == "void" else pointer.type
             target_type = kind + " *" * (pointer.stars - 1)
-            target = self._regions.at(target_type, address)
+            target = self._regions.entry_at(target_type, address)
             if target is None:
                 return
             if pointer.type == "Check":

@@ -9,10 +9,21 @@ from functools import cache as once
 from pathlib import Path
 
 SERVER = """
-import json, os, shlex, sys
-# Once for all commands of the tests.
-import hapticlink.orchestrator.experiment, hapticlink.visualization.figures.run_figures
+import gc, json, os, shlex, sys
+# Once for all commands of the tests: imports, the reader of scenes, the fonts of a figure.
+import hapticlink.commands.run, hapticlink.orchestrator.experiment
+import hapticlink.visualization.figures.run_figures
+from matplotlib.figure import Figure
 from hapticlink.commands import main
+from hapticlink.orchestrator.scene.scene import adapter
+from hapticlink.visualization.figure_axes import png
+adapter()
+figure = Figure()
+figure.subplots().set_title("warm")
+figure.legend(figure.axes[0].plot([0.0, 1.0]), ["one"])
+png(figure)
+gc.set_threshold(200_000)  # as __main__ has it
+gc.freeze()
 for request in map(json.loads, sys.stdin):
     said = os.open(os.path.join(request["folder"], "said"), os.O_RDWR | os.O_CREAT | os.O_TRUNC)
     child = os.fork()
@@ -46,18 +57,18 @@ def hapticlink(
     if cache:
         environment["HAPTICLINK_CACHE"] = str(cache)
     request = {"folder": str(folder), "environment": environment, "path": [str(path)] * bool(path)}
-    server = _server()
-    assert server.stdin
-    assert server.stdout
+    process = server()
+    assert process.stdin
+    assert process.stdout
     ended = []
     for line in lines:
-        print(json.dumps(request | {"line": line}), file=server.stdin, flush=True)
-        ended.append(Ended(*json.loads(server.stdout.readline())))
+        print(json.dumps(request | {"line": line}), file=process.stdin, flush=True)
+        ended.append(Ended(*json.loads(process.stdout.readline())))
     return ended
 
 
 @once
-def _server() -> subprocess.Popen[str]:
+def server() -> subprocess.Popen[str]:
     """A process that has imported the package, forked for each command; it ends with this one."""
     return subprocess.Popen(
         [sys.executable, "-P", "-c", SERVER], env=os.environ | {"MPLBACKEND": "agg"},

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from scipy.optimize import brentq
 
-from hapticlink.analysis.stability.loaded_variants import LoadedVariants
+from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep.grid import Axis, Point
 from hapticlink.analysis.sweep.job import Job, job
 from hapticlink.analysis.sweep.row import REFUSED, Row
@@ -98,7 +98,7 @@ def refined(key: str) -> bool:
 COLUMNS = ("at", "along", "verdict", "spectral_radius", "uncertainty", "growth_rate", "message")
 
 
-def judged(session: LoadedVariants, at: str, options: Sequence[str]) -> Row:
+def judged(session: SceneVariants, at: str, options: Sequence[str]) -> Row:
     """The columns of a point of the kind `at`. A variant without a verdict, such as one that
     diverges at its start, is "refused", with the reason."""
     try:
@@ -118,7 +118,7 @@ def work(each: Line) -> Row:
     assert each.scene is not None
     plugins.load(each.plugins)
     rows: list[Row] = []
-    with LoadedVariants(each.scene) as session:
+    with SceneVariants(each.scene) as session:
 
         def at(value: str, where: str) -> Row:
             found = judged(session, where, [f"{each.along}={value}"])

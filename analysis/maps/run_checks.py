@@ -11,7 +11,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.analysis.maps.boundary_lines import COLUMNS, DONE, Line, judged
-from hapticlink.analysis.stability.loaded_variants import LoadedVariants
+from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep.grid import Point
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import Row
@@ -71,7 +71,7 @@ def work(each: Line) -> Row:
     """The row of a check: the map's verdict, and that of a run of the scene."""
     assert each.scene is not None
     plugins.load(each.plugins)
-    with LoadedVariants(each.scene) as session:
+    with SceneVariants(each.scene) as session:
         row = judged(session, "check", [])
     if "growth_rate" not in row:
         return {"end": DONE, "rows": [row]}

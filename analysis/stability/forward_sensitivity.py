@@ -6,8 +6,9 @@ column each, and their errors D follow
 
     M <- J M,   D <- J D + E M
 
-J is found by central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
-difference of its slopes to both sides. For a doStep and a get of an FMU with a graph, J
+J is that of central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
+difference of its slopes to both sides; copies and holds without a regime have one side and E = 0.
+For a doStep and a get of an FMU with a graph, J
 is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
 have a slope in one way only, or another one to each side, keep those by differences. Slopes at the
 same numbers, with the same age of samples, are the same, so that around a state of rest each
@@ -121,20 +122,20 @@ class ForwardSensitivity:
                 del self._known[key]
 
     def begin(self) -> None:
-        """A period begins, of which `ways` tells."""
+        """A period begins, of which `slopes_by` tells."""
         self._apart.clear()
         self._applied.clear()
 
-    def ways(self) -> dict[str, str]:
-        """By FMU, how its slopes were found since `begin`."""
-        found = {}
+    def slopes_by(self) -> dict[str, str]:
+        """By FMU, where its slopes since `begin` are from."""
+        sources = {}
         for fmu in self._simulation.system.fmus:
             if (apart := self._apart.get(fmu.name)) is None:
-                found[fmu.name] = "differences"
+                sources[fmu.name] = "differences"
             else:
                 others = ", ".join(sorted(apart))
-                found[fmu.name] = f"graph; by differences: {others}" if others else "graph"
-        return found
+                sources[fmu.name] = f"graph; by differences: {others}" if others else "graph"
+        return sources
 
     def applied(self, tick: int, operation: Instruction, call: Call) -> Applied | None:
         """Carries out an operation of a co-simulation at rest, in which its slopes depend on the
@@ -161,6 +162,13 @@ class ForwardSensitivity:
             operation, owners, counts, tuple(after), reach.reads, reach.writes, found.J, found.E
         )
         return made
+
+    def _linear(self, operation: Instruction) -> bool:
+        """Whether it copies numbers, or is one of a hold without a regime."""
+        if not isinstance(operation, Push | Evaluate | Blend):
+            return isinstance(operation, Set)
+        hold = self._simulation.system.connection[operation.connection].hold
+        return HOLDS[hold or ""].needs not in ("power", "spring")
 
     def _alone(self, operation: Instruction, call: Call) -> Call:
         """The call of an operation that can be repeated from a state that was restored."""
@@ -247,7 +255,7 @@ class ForwardSensitivity:
         for slopes in known:
             if isinstance(operation, Set) or (np.abs(z[read] - slopes.at) <= wide).all():
                 return slopes, sizes
-        exact = self._exact(operation, template, after)
+        exact, linear = self._exact(operation, template), self._linear(operation)
         apart = np.zeros(len(written), bool)
         J, E = np.zeros((2, len(written), len(read)))
         inert = [False] * len(read)
@@ -259,15 +267,15 @@ class ForwardSensitivity:
         for places, weights in self._directions(key, state, template, read[~np.array(inert)], z):
             d = STEP * max(1.0, float(np.abs(z[places]).max()))
             sides = []
-            for way in (d, -d):
+            for way in (d,) if linear else (d, -d):
                 shifted = z.copy()
                 shifted[places] += way * weights
-                state.restore(state.put(template, shifted))
+                state.put(template, shifted)
                 call(tick)
                 width = weights @ (shifted[places] - z[places])
-                sides.append((state.numbers(state.save())[written] - image[written]) / width)
+                sides.append((state.now()[written] - image[written]) / width)
             columns = [inverse[int(place)] for place in places]
-            slope, error = (sides[0] + sides[1]) / 2, (sides[0] - sides[1]) / 2
+            slope, error = (sides[0] + sides[-1]) / 2, (sides[0] - sides[-1]) / 2
             if exact is not None:
                 along = exact[:, columns] @ weights
                 slope, error, differ = decided(along, slope, error)
@@ -280,7 +288,7 @@ class ForwardSensitivity:
         known.insert(0, Slopes(z[read], J, E, None if exact is None else names))
         return known[0], sizes
 
-    def _exact(self, operation: Instruction, before: Template, after: Template) -> Matrix | None:
+    def _exact(self, operation: Instruction, before: Template) -> Matrix | None:
         """J of a doStep or a get of an FMU with a graph."""
         if not isinstance(operation, Step | Get):
             return None
@@ -293,7 +301,9 @@ class ForwardSensitivity:
         if graph is None:
             return None
         if isinstance(operation, Step):
-            return graph.step(doubles(before.fmus[fmu]), doubles(after.fmus[fmu]))
+            # Not the difference of the FMU's times: at rest most of its steps are left out.
+            seconds = self._simulation.system.timeline.seconds(operation.dticks) / operation.parts
+            return graph.step(doubles(before.fmus[fmu]), seconds)
         J, outputs = graph.get(doubles(before.fmus[fmu])), description.outputs
         ranks = np.argsort(np.argsort([s.reference for s in outputs]))
         return np.vstack([J, J[graph.n_u + ranks]])

@@ -59,7 +59,7 @@ def _read(path: Path, guid: str) -> GraphSlopes | None:
 
 class GraphSlopes:
     """The slopes of an FMU with these `functions`, of what it keeps: inputs u, outputs y, states x.
-    `before` and `after` are its serialised states, which end with (time, u, p, y, x)."""
+    `before` is its serialised state, which ends with (time, u, p, y, x)."""
 
     def __init__(self, functions: dict[str, ca.Function], sampled: bool, substeps: int) -> None:
         advance, output = functions["advance"], functions["output"]
@@ -77,12 +77,11 @@ class GraphSlopes:
     def n_u(self) -> int:
         return self._n[1]
 
-    def step(self, before: Vector, after: Vector) -> Matrix:
-        """d(u, y, x after)/d(u, y, x before) of the doStep from one to the other."""
+    def step(self, before: Vector, seconds: float) -> Matrix:
+        """d(u, y, x after)/d(u, y, x before) of a doStep over so many seconds."""
         (time,), u, p, y, x = self._parts(before)
-        end = float(self._parts(after)[0][0])
-        n = self._others + 1
-        size, J = (end - time) / n, np.eye(len(x), len(x) + len(u))  # dx/d(x, u)
+        end, n = float(time) + seconds, self._others + 1
+        size, J = seconds / n, np.eye(len(x), len(x) + len(u))  # dx/d(x, u)
         of_u = np.eye(len(u), len(x) + len(u), len(x))
         dy = np.zeros((len(y), len(x) + len(u)))
         for k in range(n):

@@ -46,10 +46,10 @@ def hand_slopes(spec: Hand, T: float) -> HandSlopes:
     places = [*own, *range(6, PORTS + n_x)]
     p = np.concatenate([np.ravel(v.start).astype(float) for v in made.parameters])
     rest = np.concatenate([np.zeros(len(own)), p, np.zeros(n_y + n_x)])
-    before, after = (np.concatenate([[t], rest]) for t in (0.0, T))
+    state = np.concatenate([[0.0], rest])
     size = PORTS + n_x
     step, got = np.eye(size), np.eye(size)
     step[6:] = got[6:] = 0.0
-    for J, slopes in ((step, graph.step(before, after)), (got, graph.get(after))):
+    for J, slopes in ((step, graph.step(state, T)), (got, graph.get(state))):
         J[np.ix_(places, places)] = slopes
     return HandSlopes(step, np.vstack([got, got[6:PORTS]]))

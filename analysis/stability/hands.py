@@ -28,6 +28,8 @@ STILL = ((0.0, 0.0, 0.0, 0.0),)
 OWN = "the scene's own hand"
 FREE = "free"
 OWN_FREE = "the scene's own damper"
+UNHELD = "as it is"
+"""Of a scene that no hand of the package holds."""
 
 
 def spring_hand(stiffness: float) -> SpringHand:

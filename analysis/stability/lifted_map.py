@@ -66,22 +66,19 @@ def _repetition(clock: Clock) -> int:
 
 
 class LiftedMap:
-    """F of a system, from the first multiple of the hyperperiod on that is behind its start and not
-    before the time `at` (s).
+    """F of a system, from the first multiple of the hyperperiod on that is behind its start.
 
-    initial: the numbers of the FMUs at the start of the scene. begin: that time (s). period: the
-    hyperperiod (s), of a number of `events`. coordinates: of the state, in order. start: the state
-    at `begin`.
+    period: the hyperperiod (s), of a number of `events`. coordinates: of the state, in order.
+    start: the state at its begin. Until then the FMUs are put back to where they start, again and
+    again, so that `start` is near a rest however unstable the system is; not in a `window`.
     """
 
     def __init__(
         self,
         plan: Plan,
         simulation: Simulation,
-        at: float,
         sensitivity: ForwardSensitivity,
         window: tuple[int, int] | None = None,
-        pinned: bool = False,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
         self._bound: dict[Event, Bound] = {}
@@ -90,18 +87,15 @@ class LiftedMap:
         self._sensitivity = sensitivity
         self._state = StateVector(simulation)
         length = window[1] if window else hyperperiod(time)
-        self.period, self.seconds = time.seconds(length), time.seconds
-        first = window[0] if window else length * math.ceil(behind_start(plan.system, at) / length)
-        self._begin, self.begin = self._state.save(), time.seconds(first)
-        self.initial = np.concatenate(self._state.parts(self._begin)[: len(simulation.instances)])
-        moments = list(takewhile(lambda moment: moment.tick < first + 2 * length, plan))
+        self.period, self._begin = time.seconds(length), self._state.save()
+        first = window[0] if window else length * math.ceil(behind_start(plan.system) / length)
+        moments = list(takewhile(lambda moment: moment.tick < first + length, plan))
         rest = None
         for k, (tick, event) in enumerate(moment for moment in moments if moment.tick < first):
             self._run(tick, event)
-            if pinned and k % PINNED == 0:
+            if not window and k % PINNED == 0:
                 rest = self._pin(rest)
         self._moments = [m for m in moments if first <= m.tick < first + length]
-        self._later = [m for m in moments if m.tick >= first + length]
         self.events = len(self._moments)
         self._template = self._state.save()
         self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
@@ -113,16 +107,16 @@ class LiftedMap:
         """The map of the same FMUs on the timeline of another `system`, from the first tick of a
         `window` on and over its length."""
         self._state.restore(self._begin)
-        return LiftedMap(Plan(system), self._simulation, 0.0, self._sensitivity, window)
+        return LiftedMap(Plan(system), self._simulation, self._sensitivity, window)
 
     def image(self, state: Vector, watch: Watch | None = None) -> Vector:
         """F(state). watch: called after each event with the numbers of the FMUs and signals, and
         behind them those of holds, of which a latency can leave more or fewer than at the end."""
-        self._state.restore(self._state.put(self._template, state))
+        self._state.put(self._template, state)
         for tick, event in self._moments:
             self._run(tick, event)
             if watch:
-                watch(self._state.numbers(self._state.save()))
+                watch(self._state.now())
         interrupt.check()
         return self._numbers()
 
@@ -137,7 +131,7 @@ class LiftedMap:
         are shared by numbers that differ by up to `same`, relative. `after` each operation is
         called with the perturbations, which it may change."""
         state = self._state
-        state.restore(state.put(self._template, point))
+        state.put(self._template, point)
         ends = np.cumsum([len(part) for part in state.parts(self._template)])[:-1]
         M = dict(zip(state.owners, np.split(V, ends), strict=True))
         D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
@@ -164,7 +158,7 @@ class LiftedMap:
         """What each event of the period does to perturbations of a state at rest, and the largest
         change of a state or input of an FMU within PINNED events, relative to max(1, |z|). The FMUs
         are put back to rest after these, so that nothing grows meanwhile."""
-        self._state.restore(self._state.put(self._template, point))
+        self._state.put(self._template, point)
         self._sensitivity.begin()
         moving, moved = self.moving, 0.0
         events = []
@@ -172,7 +166,7 @@ class LiftedMap:
             each = (self._sensitivity.applied(tick, *both) for both in self._instructions(event))
             events.append([applied for applied in each if applied])
             if k % PINNED == PINNED - 1 or k == self.events - 1:
-                numbers = self._state.numbers(self._state.save())
+                numbers = self._state.now()
                 change = np.abs(numbers[moving] - point[moving])
                 moved = max(moved, (change / np.maximum(1.0, np.abs(point[moving]))).max(initial=0))
                 self._pin(point)
@@ -189,7 +183,7 @@ class LiftedMap:
         fmus = len(self._state.parts(template)) - len(template.holds)
         fixed = sum(map(len, self._state.parts(template)[:fmus]))
         numbers[:fixed] = rest[:fixed]
-        self._state.restore(self._state.put(template, numbers))
+        self._state.put(template, numbers)
         return rest
 
     @cached_property
@@ -203,9 +197,10 @@ class LiftedMap:
         parts = self._state.parts(self._template)
         return dict(zip(self._state.owners, map(len, parts), strict=True))
 
-    def ways(self) -> dict[str, str]:
-        """By FMU, how the slopes of the last linearisation were found."""
-        return self._sensitivity.ways()
+    def slopes_by(self) -> dict[str, str]:
+        """By FMU, where the slopes of the last linearisation are from: its graph, or
+        differences."""
+        return self._sensitivity.slopes_by()
 
     def count(self, kind: type[Operation], fmu: str) -> int:
         """The number of operations of a kind on an FMU within a period."""
@@ -227,10 +222,6 @@ class LiftedMap:
         self._template = self._state.save()
         self._sensitivity.forget({fmu for fmu, _, _ in values})
 
-    def forget(self) -> None:
-        """Slopes of FMUs that were found so far are not taken again."""
-        self._sensitivity.forget(self.system.fmu)
-
     def directions(self, point: Vector) -> Iterator[Vector]:
         """Orthonormal directions in which the state can be moved from `point`, that of the
         coordinates that are no switches."""
@@ -239,16 +230,8 @@ class LiftedMap:
         else:
             yield from np.eye(len(point))[self._free]
 
-    def second(self, state: Vector) -> Vector:
-        """The state after two periods, of which the second one is run at its own time: F(F(state))
-        if nothing in the system changes with time."""
-        self._state.restore(self._state.put(self._template, state))
-        for tick, event in (*self._moments, *self._later):
-            self._run(tick, event)
-        return self._numbers()
-
     def _numbers(self) -> Vector:
-        found = self._state.numbers(self._state.save())
+        found = self._state.now()
         if len(found) != len(self.start):
             raise InputFault(
                 "the number of samples that holds keep changes from period to period: the map "
@@ -273,29 +256,25 @@ class LiftedMap:
         return self._bound[kind]
 
 
-def behind_start(system: System, at: float = 0.0) -> int:
-    """Ticks, at least up to the time `at` (s), after which holds have all the samples that they
-    keep: four steps of the slowest clock, and the longest latency."""
+def behind_start(system: System) -> int:
+    """Ticks after which holds have all the samples that they keep: four steps of the slowest
+    clock, and the longest latency."""
     time = system.timeline
     late = max((c.latency.max or c.latency.min for c in system.connections if c.latency), default=0)
-    kept = 4 * max(clock.longest for clock in time.clocks) + math.ceil(late / time.base)
-    return max(kept, math.ceil(at / time.base))
+    return 4 * max(clock.longest for clock in time.clocks) + math.ceil(late / time.base)
 
 
-def long_enough(scene: Scene, system: System, at: float = 0.0) -> System:
-    """`system` with the timeline of a scene that lasts as long as its map from `at` (s) needs."""
-    needed = (behind_start(system, at) + 4 * hyperperiod(system.timeline)) * system.timeline.base
+def long_enough(scene: Scene, system: System) -> System:
+    """`system` with the timeline of a scene that lasts as long as its map needs."""
+    needed = (behind_start(system) + 4 * hyperperiod(system.timeline)) * system.timeline.base
     duration = float(max(scene.duration, math.ceil(needed)))
     return replace(system, timeline=timeline(replace(scene, duration=duration)))
 
 
 @contextmanager
-def lifted_map(
-    system: System, at: float = 0.0, scene: Scene | None = None, pinned: bool = False
-) -> Iterator[LiftedMap]:
-    """The lifted map of `system` from the time `at` (s) on, with its FMUs loaded; the state is
-    perturbed within the loop closures of `scene`. pinned: until then the FMUs are put back to where
-    they start, again and again, so that `start` is near a rest however unstable the system is.
+def lifted_map(system: System, scene: Scene | None = None) -> Iterator[LiftedMap]:
+    """The lifted map of `system`, with its FMUs loaded; the state is perturbed within the loop
+    closures of `scene`.
 
     Raises InputFault where there is none: rates and latencies that vary, an
     FMU whose state cannot be read.
@@ -321,4 +300,4 @@ def lifted_map(
         without_friction(simulation.holds.values())
         closures = Closures(scene) if scene else None
         sensitivity = ForwardSensitivity(simulation, closures)
-        yield LiftedMap(Plan(system), simulation, at, sensitivity, pinned=pinned)
+        yield LiftedMap(Plan(system), simulation, sensitivity)

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
-from hapticlink.analysis.stability.forward_sensitivity import SAME, SMALL
-from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.analysis.stability.forward_sensitivity import SMALL
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 
 ONE = 1e-7
@@ -60,20 +59,6 @@ class Linearisation:
     def scales(self) -> Vector:
         """Scales d of the coordinates that balance A: rows of D^-1 A D as large as its columns."""
         return matrix_balance(self.A, permute=False, separate=True)[1][0]
-
-
-def linearised(map_: LiftedMap, point: Vector, same: float = SAME) -> Linearisation:
-    """The Jacobian of the map at `point`, along the directions that act on it; `same` as in
-    forward_sensitivity.py."""
-    V = np.stack(list(map_.directions(point)), axis=1)
-    image, M, D = map_.slopes(point, V, same)
-    taken = M.any(axis=0) | D.any(axis=0)
-    if not taken.any():
-        raise AssertionError("a map without a state")
-    V, M, D = V[:, taken], M[:, taken], D[:, taken]
-    A, E = V.T @ M, V.T @ D
-    kept = ~constant(A, V.T @ (image - point) == 0.0)
-    return Linearisation(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
 
 
 def constant(A: Matrix, same: NDArray[np.bool_]) -> NDArray[np.bool_]:

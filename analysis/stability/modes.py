@@ -50,6 +50,13 @@ class Mode:
         return abs(self.z - 1.0) <= min(self.uncertainty, NEAR)
 
 
+def verdict(radius: float, uncertainty: float) -> str:
+    """stable, unstable, or marginal where a spectral radius is 1 within its uncertainty."""
+    if abs(radius - 1.0) <= uncertainty:
+        return "marginal"
+    return "unstable" if radius > 1.0 else "stable"
+
+
 def counted(modes: Sequence[Mode]) -> Sequence[Mode]:
     """The modes by which a scene is judged: neutral ones only where there are no others."""
     return [mode for mode in modes if not mode.neutral] or modes

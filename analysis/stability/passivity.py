@@ -35,10 +35,8 @@ import numpy as np
 
 from hapticlink.analysis.stability import two_port
 from hapticlink.analysis.stability.absolute_stability import damping_shortage, least
-from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
-from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.port_response import (
     HandPort,
@@ -49,10 +47,12 @@ from hapticlink.analysis.stability.port_response import (
     require_size,
     response,
 )
-from hapticlink.analysis.stability.trajectory import trajectory
+from hapticlink.analysis.stability.poses import in_own_hand
+from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -110,23 +110,22 @@ class Passivity:
             yield from self.two_port.lines()
 
 
-def passivity(scene: str | Path | Scene, options: Options = (), *, at: float = 0.0) -> Passivity:
+def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     """The passivity of the user's port of a scene, around its equilibrium, and the absolute
-    stability of the rendering between the hand and the virtual mechanism behind a device. The
-    scene is run up to the time `at` (s) before, as for `stability`. Of several users it is the
-    first one's port, with the others in the hands of the scene.
+    stability of the rendering between the hand and the virtual mechanism behind a device. Of
+    several users it is the first one's port, with the others in the hands of the scene.
 
-    Raises InputFault as `stability` does, and for a scene whose hand pushes no device, or with a
-    hyperperiod of more than 600 forces.
+    Raises InputFault for a scene without equilibrium in its own hand, one whose hand pushes no
+    device, or with a hyperperiod of more than 600 forces.
     """
-    with linearisable(scene, options) as (read, system, _):
+    given = overrides.written(options)
+    with linearisable(scene, given) as (read, system, _):
         hand = hand_port(system)
-        with lifted_map(long_enough(read, system, at), at, read) as map_:
-            mechanism = mechanism_port(system, hand)
+        mechanism = mechanism_port(system, hand)
+        with lifted_map(long_enough(read, system), read) as map_:
             require_size(map_, hand, mechanism)
-            linear = equilibrium(map_, trajectory(map_, read.duration))
-            T = 1 / float(read.haptics.rate)
-            return of(read.title, map_, linear, hand, mechanism, T)
+    with in_own_hand(scene, given) as (place, _):
+        return of(read.title, place.map, place.period({}).in_map, hand, mechanism, place.T)
 
 
 def of(

@@ -1,34 +1,55 @@
-"""The poses in which gains are judged: moments of the scene's own run, evenly spaced, and one in
-contact with the median force of all that are."""
+"""The poses in which a scene is judged: moments of its own run, evenly spaced, and one in contact
+with the median force of all that are; where its run comes to rest; and where a wrench leads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.stability.hands import FIRM, spring
-from hapticlink.analysis.stability.held_equilibria import Held, held
+from hapticlink.analysis.stability.hands import FIRM, own_hand, spring
+from hapticlink.analysis.stability.lifted_map import hyperperiod
+from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.components.linkage.parameters import COORDINATES
+from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import (
     ENVIRONMENT_WRENCH,
+    HAND,
+    HAND_WRENCH,
     JOINT_COORDINATES,
+    JOINT_RATES,
     POINT_POSE,
     signal_of_user,
 )
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import Results, Table
+from hapticlink.orchestrator.results.tables import Results, Table, load
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.timeline import timeline
 
+SETTLING, CALM = 10.0, 0.2
+"""Time (s) in which a wrench takes a damped handle near rest, and its last part, over which the
+pose is averaged."""
+SETTLED_BY = [5.0, 5.0, 0.005]
+"""Damping of the handle meanwhile (N.s/m, N.m.s/rad)."""
+LONGEST, LATE = 60.0, 0.1
+"""Time (s) after which a run that has not come to rest does not, and its last part."""
+AT_REST = 1e-3
+"""Rate (rad/s, m/s) of the fastest joint in that part, up to which a run rests."""
+LEAVING, OFF = 20.0, (2e-4, 0.0, 2e-3)
+"""Duration (s) of a run that shows where a divergence leads, and how far off the hand is at first
+(m, m, rad)."""
+NEAR = (5e-3, 5e-3, 0.05)
+"""Motions (m, m, rad) up to which it leads nowhere, as to an equilibrium beside a singular pose."""
 LIGHT = 0.25
 """The force (N) with which a hand presses where that of the run slides off, as from a corner or a
 disc along the spring that the coupling is."""
@@ -63,13 +84,28 @@ class Pose:
     def name(self) -> str:
         return self.title or f"{self.time:.3g} s" + (" (in contact)" if self.touches else "")
 
-    def options(self, given: Sequence[str]) -> tuple[str, ...]:
-        """The options of the scene at rest in this pose, in a spring hand."""
-        start = {
-            "hand": spring(self.point, self.press, FIRM),
+    def leaves(self, scene: str | Path | Scene, given: Sequence[str], hand: Hand | None) -> bool:
+        """Whether the run of a scene from this pose on, in a hand that stands still next to it,
+        comes further away than NEAR; one that fails does."""
+        if not isinstance(hand, ArmHand | SpringHand):
+            return True
+        table = {k: v for k, v in asdict(hand).items() if v is not None and k != "interpolation"}
+        target = [float(x + off) for x, off in zip(self.point, OFF, strict=True)]
+        table["target"] = [[0.0, *target]]
+        changes = {"hand": table, "duration": LEAVING, "stop_when": ""}
+        run = simulated(scene, self.options(given, held=False), changes)
+        moved = np.abs(_recorded(run)[POINT_POSE] - self.point).max(axis=0)
+        return bool(run.record.fault) or bool((moved > NEAR).any())
+
+    def options(self, given: Sequence[str], held: bool = True) -> tuple[str, ...]:
+        """The options of the scene at rest in this pose, in a spring hand if it is `held`."""
+        start: dict[str, object] = {
             "linkage.start": self.joints,
             "linkage.start_velocity": {},
         }
+        if not held:
+            return (*given, *overrides.written(start))
+        start["hand"] = spring(self.point, self.press, FIRM)
         no_force = (0.0, 0.0, 0.0)
         start |= {f"hands.{u}": spring(x, no_force, FIRM) for u, x in self.others.items()}
         return (*given, *overrides.written(start))
@@ -78,14 +114,14 @@ class Pose:
 def simulated(
     scene: str | Path | Scene,
     given: Sequence[str],
-    changes: Mapping[str, float | list[float]] = {},
+    changes: Mapping[str, object] = {},
 ) -> Results:
     """A run of the scene with changes as options. Raises InputFault where it has no row."""
     with temporary_folders.room() as room:
-        made = simulate(scene, room, (*given, *overrides.written(changes)), csv=False)
-        if not made.outcome.published:
-            raise InputFault(f"the scene's own run fails: {made.outcome.fault}")
-        return made.results
+        experiment = simulate(scene, room, (*given, *overrides.written(changes)), csv=False)
+        if not experiment.outcome.published:
+            raise InputFault(f"the scene's own run fails: {experiment.outcome.fault}")
+        return load(room, binary=True)
 
 
 def evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
@@ -100,7 +136,88 @@ def evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     return [_pose(run, linkage, i) for i in moments]
 
 
-def average(run: Results, linkage: Linkage, since: float) -> Pose:
+def settled(scene: str | Path | Scene, given: Sequence[str], linkage: Linkage) -> list[Pose]:
+    """Where the constant wrench of a scene would come to rest, if it does, with a damped handle: at
+    the end of a run, and about its mean if there is no equilibrium nearby. Raises InputFault where
+    that fails."""
+    hand = open_scene.load(scene, given).hand
+    assert isinstance(hand, ConstantHand)
+    wrench = hand.wrench
+    damped = {"type": "constant", "wrench": list(wrench), "damping": SETTLED_BY}
+    run = simulated(scene, given, {"hand": damped, "duration": SETTLING, "stop_when": ""})
+    if run.record.fault:
+        raise InputFault(f"its run with a damped handle fails: {run.record.fault.message}")
+    near = (_average(run, linkage, since) for since in (1.0, 1.0 - CALM))
+    return [replace(pose, press=wrench, title="where its wrench leads") for pose in near]
+
+
+def rest(scene: str | Path | Scene, given: Sequence[str], linkage: Linkage) -> Pose:
+    """Where the run of a scene comes to rest within LONGEST, with what its hand presses there.
+    Raises InputFault where it fails, or keeps moving."""
+    hyperperiod(timeline(open_scene.load(scene, given)))  # refuses rates without one
+    run = simulated(scene, given, {"duration": LONGEST, "stop_when": ""})
+    if run.record.fault:
+        raise InputFault(f"the run does not come to rest: {run.record.fault.message}")
+    table = _recorded(run)
+    rates = table[JOINT_RATES][int((1.0 - LATE) * len(table["time"])) :]
+    fastest = np.abs(rates).max(axis=0)
+    if (speed := float(fastest.max())) > AT_REST:
+        joint = rates[:, int(np.argmax(fastest))]
+        hertz = np.count_nonzero(np.diff(np.sign(joint))) / 2 / (LATE * LONGEST)
+        raise InputFault(
+            f"the run does not come to rest in {LONGEST:g} s: its joints still move at up to "
+            f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz; an equilibrium takes damping, or a hand "
+            "that holds it"
+        )
+    pose = _average(run, linkage, 1.0)
+    with_hand = table_of(run, HAND_WRENCH)
+    press = (0.0, 0.0, 0.0) if with_hand is None else tuple(with_hand[HAND_WRENCH][-1].tolist())
+    return replace(pose, press=press, title="where its run rests")
+
+
+@contextmanager
+def in_own_hand(
+    scene: str | Path | Scene, given: Sequence[str]
+) -> Iterator[tuple[RestingScene, Hand | None]]:
+    """A scene at rest in its own hand, next to its start, or else where its run comes to rest; one
+    with a constant wrench where that leads. In these it is held by a spring in whose place the hand
+    that is given, too, is to be put. Raises InputFault or FmuFault where there is no
+    equilibrium."""
+    read = open_scene.load(scene, given)
+    hand, linkage = read.hand, read.linkage
+    with ExitStack() as stack:
+        if linkage is None or hand is None or replaced(read):
+            yield stack.enter_context(resting(scene, given)), None
+            return
+        poses = []
+        if presses(read):
+            poses = settled(scene, given, linkage)
+        else:
+            try:
+                place = stack.enter_context(resting(scene, given))
+            except (InputFault, FmuFault):
+                poses = [rest(scene, given, linkage)]
+            else:
+                yield place, None
+                return
+        try:
+            place = stack.enter_context(resting(scene, poses[0].options(given)))
+        except (InputFault, FmuFault):
+            place = stack.enter_context(resting(scene, poses[-1].options(given)))
+        yield place, own_hand(hand)
+
+
+def presses(read: Scene) -> bool:
+    """Whether the hand of a scene is a constant wrench, but none of 0."""
+    return isinstance(read.hand, ConstantHand) and any(read.hand.wrench) and not replaced(read)
+
+
+def replaced(read: Scene) -> bool:
+    """Whether an FMU of others is in place of the hand."""
+    return any(f.replaces == HAND for f in read.fmu)
+
+
+def _average(run: Results, linkage: Linkage, since: float) -> Pose:
     """The mean pose over the part of a run from `since` (0 to 1) of it on. Raises InputFault as
     `evenly_spaced`."""
     table = _recorded(run)
@@ -124,8 +241,8 @@ def _recorded(run: Results) -> Table:
 
 
 def _force(table: Table) -> Matrix:
-    found: Matrix = table[ENVIRONMENT_WRENCH] if ENVIRONMENT_WRENCH in table else np.zeros((1, 3))
-    return np.broadcast_to(found, (len(table["time"]), 3))
+    force: Matrix = table[ENVIRONMENT_WRENCH] if ENVIRONMENT_WRENCH in table else np.zeros((1, 3))
+    return np.broadcast_to(force, (len(table["time"]), 3))
 
 
 def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
@@ -147,18 +264,18 @@ def at_equilibrium(
     candidates: Sequence[Pose],
     tell: Callable[[str], object],
     starts: Mapping[str, Vector] = {},
-) -> Iterator[tuple[list[Pose], dict[str, Held]]]:
+) -> Iterator[tuple[list[Pose], dict[str, RestingScene]]]:
     """The poses in which the scene has an equilibrium, and the scene there by the pose's name,
     searched from `starts`. A hand that slides off what it touches presses lightly; poses without
     equilibrium are reported and skipped. Raises InputFault where no pose has one."""
     with ExitStack() as stack:
-        resting: list[Pose] = []
-        held_at: dict[str, Held] = {}
+        at_rest: list[Pose] = []
+        held_at: dict[str, RestingScene] = {}
         for pose in candidates:
             for pressed in (pose, pose.lighter) if pose.touches else (pose,):
                 try:
                     start = starts.get(pose.name)
-                    place = stack.enter_context(held(scene, pressed.options(given), start))
+                    place = stack.enter_context(resting(scene, pressed.options(given), start))
                     if pose.touches and not place.touches:
                         raise InputFault("it comes off what it touches")
                 except (InputFault, FmuFault) as fault:
@@ -166,7 +283,7 @@ def at_equilibrium(
                 else:
                     if pressed is not pose:
                         tell(f"  pose at {pose.name}: the force slides off; {LIGHT:g} N are taken")
-                    resting.append(pressed)
+                    at_rest.append(pressed)
                     held_at[pose.name] = place
                     break
             else:
@@ -174,7 +291,7 @@ def at_equilibrium(
         tell(f"  {len(held_at)} poses with an equilibrium")
         if not held_at:
             raise InputFault("the scene has no equilibrium in any pose of its run, in a firm grip")
-        yield resting, held_at
+        yield at_rest, held_at
 
 
 def _point(user: str) -> str:
@@ -182,11 +299,11 @@ def _point(user: str) -> str:
 
 
 def _by_joint(linkage: Linkage, q: Vector) -> dict[str, float | list[float]]:
-    found: dict[str, float | list[float]] = {}
-    at = 0
+    by_joint: dict[str, float | list[float]] = {}
+    first = 0
     for joint in linkage.joint:
         size = COORDINATES[joint.type]
-        values = [float(v) for v in q[at : at + size]]
-        found[joint.name] = values if size > 1 else values[0]
-        at += size
-    return found
+        values = [float(v) for v in q[first : first + size]]
+        by_joint[joint.name] = values if size > 1 else values[0]
+        first += size
+    return by_joint

@@ -1,188 +1,206 @@
-"""The stability of a scene: equilibrium, map, modes and verdict."""
+"""The stability of a scene over its workspace and in hands: the one answer of `stability`.
+
+The linearised sampled-data map is judged in poses that the scene's own run visits within SPAN,
+held by a family of hands, the scene's own among them, and free where that has no stiffness; it
+depends on neither the duration of the scene nor on an equilibrium that a search finds.
+A constant wrench is judged where it would come to rest, too. What no hand of the package holds is
+judged as it is, where its run comes to rest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.equilibrium_location import EquilibriumLocation, location
-from hapticlink.analysis.stability.forward_sensitivity import KINK
-from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
-from hapticlink.analysis.stability.linearisation import Linearisation
-from hapticlink.analysis.stability.mode_frequency import traced
-from hapticlink.analysis.stability.modes import NEAR, Mode, counted, leading, modes
-from hapticlink.analysis.stability.radius_verdict import verdict
-from hapticlink.analysis.stability.trajectory import trajectory
+from hapticlink.analysis.stability.hand_cases import in_poses
+from hapticlink.analysis.stability.hands import FREE, HANDS, OWN, OWN_FREE, UNHELD, holds, own_hand
+from hapticlink.analysis.stability.lifted_map import hyperperiod
+from hapticlink.analysis.stability.margin_and_remedy import improvements
+from hapticlink.analysis.stability.mode_kinds import DRIFT, Bounds
+from hapticlink.analysis.stability.poses import (
+    Pose,
+    evenly_spaced,
+    presses,
+    replaced,
+    rest,
+    settled,
+    simulated,
+)
+from hapticlink.analysis.stability.rates import frame_length, whole_frames
+from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
+from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.timeline import timeline
 
-SHOWN = 6
-"""Modes that are reported."""
-LOST = 1e-6
-"""Modes with a smaller |z| have vanished within a period."""
+POSES, SPAN = 3, 3.0
+"""Poses, evenly spaced in the first seconds of the scene's run."""
+EVENTS = 600
+"""Haptic periods after which all has to repeat in a scene that is judged at its own rates."""
+Progress = Callable[[str, int, int], object]
+Hands = Mapping[str, Hand | None]
 
 
-@dataclass(frozen=True)
-class Stability:
-    """The stability of a scene around its equilibrium."""
+def stability(
+    scene: str | Path | Scene,
+    options: Options = (),
+    *,
+    poses: int = POSES,
+    bounds: Bounds = DRIFT,
+    progress: Progress | None = None,
+) -> Stability:
+    """The stability of a scene, changed by `options` (see `scene`), in a number of `poses` of its
+    run and in hands from soft to firm.
 
-    title: str
-    period: float
-    """The hyperperiod (s)."""
-    radius: float
-    """The spectral radius over the hyperperiod, without neutral modes."""
-    uncertainty: float
-    """Of the spectral radius."""
-    modes: tuple[Mode, ...]
-    """The leading modes."""
-    neutral: tuple[Mode, ...]
-    """Modes with z = 1."""
-    names: tuple[str, ...]
-    """The coordinates that the modes move."""
-    equilibrium: dict[str, float]
-    """By coordinate."""
-    frozen: tuple[str, ...]
-    """Lines of text on what is removed or stays as at the equilibrium."""
-    kinks: tuple[str, ...]
-    """The coordinates in which the lifted map has no slope."""
-    linearised: dict[str, str]
-    """By FMU, whether its slopes are those of its graph or differences."""
-    where: EquilibriumLocation
-    """The pose of the equilibrium, and whether the run from the start rests there."""
-
-    @property
-    def growth(self) -> float:
-        """The growth rate (1/s), ln(radius)/period."""
-        return float(np.log(self.radius)) / self.period if self.radius else -np.inf
-
-    @property
-    def verdict(self) -> str:
-        """stable, unstable, or marginal where the radius is 1 within its uncertainty."""
-        return verdict(self.radius, self.uncertainty)
-
-    def record(self) -> dict[str, Any]:
-        """The content of stability.json."""
-        return {
-            "title": self.title,
-            "verdict": self.verdict,
-            "spectral_radius": self.radius,
-            "uncertainty": self.uncertainty,
-            "growth_rate": self.growth,
-            "margin": -self.growth,
-            "hyperperiod": self.period,
-            "modes": [self._mode(mode) for mode in self.modes],
-            "neutral_modes": [self._mode(mode) for mode in self.neutral],
-            "frozen": list(self.frozen),
-            "not_differentiable": list(self.kinks),
-            "linearised": self.linearised,
-            "where": self.where.record(),
-            "equilibrium": self.equilibrium,
-        }
-
-    def _mode(self, mode: Mode) -> dict[str, Any]:
-        return {
-            "eigenvalue": [mode.z.real, mode.z.imag],
-            "uncertainty": mode.uncertainty,
-            "growth_rate": mode.growth,
-            "frequency": mode.omega / (2 * np.pi),
-            "damping_ratio": mode.damping,
-            "participation": dict(leading(mode, self.names, 6)),
-        }
-
-    def lines(self) -> Iterator[str]:
-        """The result as text."""
-        yield (
-            f"spectral radius {self.radius:.8g} +- {self.uncertainty:.1g} over "
-            f"{self.period:.6g} s, growth rate {self.growth:.5g} 1/s"
+    `progress` is called with what is judged, and the numbers of finished and of all steps. `bounds`
+    are those of a drift. Raises InputFault for a scene without linkage, one whose run or map has no
+    period (rates and latencies that vary), and one without equilibrium in any pose.
+    """
+    if poses < 1:
+        raise InputFault(f"poses = {poses}: give 1 or more")
+    if not (bounds.hertz >= 0.0 and bounds.growth >= 0.0):
+        raise InputFault(
+            f"drift up to {bounds.hertz:g} Hz and {bounds.growth:g} 1/s: give 0 or more"
         )
-        yield from self.where.lines()
-        if self.verdict == "unstable" and self.where.run == "rests there":
-            yield "and leaves it at the slightest push: that it rests shows no stability"
-        neutral = "neutral modes"
-        if self.neutral:
-            most = max(min(mode.uncertainty, NEAR) for mode in self.neutral) / self.period
-            neutral += f", of which growth up to {most:.2g} 1/s cannot be distinguished from none"
-        for title, found in (("modes", self.modes), (neutral, self.neutral)):
-            if found:
-                yield f"{title}: growth rate (1/s), frequency (Hz), damping ratio, participation"
-            for mode in found:
-                who = ", ".join(f"{n} {share:.2f}" for n, share in leading(mode, self.names))
-                hertz = mode.omega / (2 * np.pi)
-                yield f"  {mode.growth:10.4g} {hertz:9.4g} {mode.damping:7.3f}  {who}"
-        if self.frozen:
-            yield "frozen:"
-            yield from (f"  {line}" for line in self.frozen)
-        if self.kinks:
-            yield "the lifted map has two slopes at the equilibrium, so that the verdict is only of"
-            yield f"their mean, in: {', '.join(self.kinks)}"
+    given = overrides.written(options)
+    read = open_scene.load(scene, given)
+    if varies(read):
+        raise InputFault(
+            "a rate that varies is judged in mean square, at the equilibrium of the scene: "
+            "--equilibrium, with a hand that holds it"
+        )
+    given, rounded = _short(read, given)
+    if read.hand is None or replaced(read):
+        poses_at_rest = [_rest(scene, given, read)]
+        return _judged(scene, given, poses_at_rest, {UNHELD: None}, bounds, progress, rounded)
+    if read.linkage is None:
+        raise InputFault("no linkage: nothing that a hand could hold")
+    with interrupt.held():
+        (progress or _silent)("the scene's own run", 0, poses + 2)
+        run = simulated(scene, given, {"duration": SPAN, "stop_when": ""})
+        visited = evenly_spaced(run, read.linkage, poses)
+        if presses(read):
+            with suppress(InputFault):
+                visited += settled(scene, given, read.linkage)
+        return _judged(scene, given, visited, hands_of(read.hand), bounds, progress, rounded)
 
 
 def equilibrium_stability(
-    scene: str | Path | Scene, options: Options = (), *, at: float = 0.0
+    scene: str | Path | Scene,
+    options: Options = (),
+    *,
+    bounds: Bounds = DRIFT,
+    progress: Progress | None = None,
 ) -> Stability | VaryingStability:
-    """The stability of a scene, changed by `options` (see `scene`), around its equilibrium.
+    """The stability of a scene in its own hand alone, where its run comes to rest within a minute;
+    for a rate that is drawn at random that of all its periods, next to the scene's start.
 
-    The scene is run up to the time `at` (s) before, from which on no target, drive or wrench may
-    change with time. For a rate that is drawn at random the result is that of all its periods.
-
-    Raises InputFault for a scene without an equilibrium, and for one whose co-simulation has no map
-    of a period: latencies or steps that vary, an FMU that does not declare its state.
+    `bounds` and `progress` as in `stability`. Raises InputFault as that does, and where the run
+    keeps moving.
     """
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-        read = open_scene.load(scene, options)
-        if varies(read):
-            if at:
-                raise InputFault(f"at = {at:g}: a rate that varies is judged from the start on")
+    given = overrides.written(options)
+    read = open_scene.load(scene, given)
+    if varies(read):
+        with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
             return varying_stability(read)
-        with built(read) as whole:
-            return at_rest(read, whole, at, read.duration)
+    hands: Hands = {UNHELD: None}
+    if read.hand is not None and not replaced(read):
+        hands = {OWN: own_hand(read.hand)}
+    given, rounded = _short(read, given)
+    return _judged(scene, given, [_rest(scene, given, read)], hands, bounds, progress, rounded)
 
 
-def at_rest(scene: Scene, whole: System, at: float, seconds: float) -> Stability:
-    """The stability of a scene's system around the equilibrium that is found within `seconds` of
-    simulated time, as in `stability`."""
-    system, removed = frozen_nonlinearities.without(whole)
-    with lifted_map(long_enough(scene, system, at), at, scene) as map_:
-        run = trajectory(map_, seconds)
-        linear = equilibrium(map_, run)
-        where = location(scene, map_, linear, run)
-        frozen = [*removed, *frozen_nonlinearities.kept(system)]
-        return _result(scene.title, map_, linear, frozen, where)
+def _short(read: Scene, given: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
+    """The options with which a scene is judged, and which rate is rounded in them: where its events
+    repeat only after more than EVENTS, as of 29.97 and 512 Hz after 100 s, frames are whole haptic
+    periods. Raises InputFault for a rate that varies."""
+    time = timeline(read)
+    period = time.seconds(hyperperiod(time))
+    if read.graphics is None or period * float(read.haptics.rate) <= EVENTS:
+        return given, ""
+    whole = float(exact(read.haptics.rate)) / frame_length(read)
+    why = f"with its own rates all repeats only after {period:.4g} s"
+    return whole_frames(read, given), f"judged with graphics at {whole:.5g} Hz: {why}"
 
 
-def _result(
-    title: str, map_: LiftedMap, linear: Linearisation, lines: list[str], where: EquilibriumLocation
+def _silent(what: str, done: int, of: int) -> None:
+    """Tells nobody."""
+
+
+def hands_of(hand: Hand) -> dict[str, Hand]:
+    """The family, with the hand of a scene, and no hand where that has no stiffness."""
+    if holds(hand):
+        return {OWN: own_hand(hand), **HANDS}
+    damped = any(getattr(hand, "damping", None) or ())
+    return {**HANDS, (OWN_FREE if damped else FREE): own_hand(hand)}
+
+
+def _rest(scene: str | Path | Scene, given: Sequence[str], read: Scene) -> Pose:
+    if read.linkage is None:
+        raise InputFault("no linkage: nothing that comes to rest in a pose")
+    with interrupt.held():
+        return rest(scene, given, read.linkage)
+
+
+def _judged(
+    scene: str | Path | Scene,
+    given: tuple[str, ...],
+    visited: Sequence[Pose],
+    hands: Hands,
+    bounds: Bounds,
+    progress: Progress | None,
+    rounded: str,
 ) -> Stability:
-    all_modes = [mode for mode in modes(linear, map_.period) if abs(mode.z) > LOST]
-    neutral = [mode for mode in all_modes if mode.neutral]
-    others = [mode for mode in all_modes if not mode.neutral]
-    names = tuple(str(map_.coordinates[i]) for i in linear.taken)
-    kinked = np.abs(linear.V[:, linear.kink > KINK]).max(axis=1, initial=0.0)
-    kinks = tuple(str(c) for c, share in zip(map_.coordinates, kinked, strict=True) if share)
-    first = next(iter(counted(all_modes)), None)
+    step = progress or _silent
+    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+        cases, without = in_poses(
+            scene,
+            given,
+            visited,
+            hands,
+            bounds,
+            lambda done, of: step("poses", done + 1, of + 2),
+        )
+        if not cases:
+            name, why = next(iter(without.items()))
+            raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
+        worst = max(cases, key=lambda case: case.severity)
+        while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
+            pose = next(pose for pose in visited if pose.name == worst.pose)
+            if pose.leaves(scene, given, hands[worst.hand]):
+                break
+            cases[cases.index(worst)] = replace(worst, verdict="marginal")
+            worst = max(cases, key=lambda case: case.severity)
+        there = [case for case in cases if case.pose == worst.pose]
+        near = {c.hand for c in there if c.kind == "divergence" and c.verdict == "marginal"}
+        held = {name: hand for name, hand in hands.items() if name not in near} or hands
+        step("margins", len(visited) + 1, len(visited) + 2)
+        judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
+        margin, remedy = improvements(scene, given, judged, held, bounds, worst)
+        with linearisable(scene, given) as (read, system, removed):
+            frozen = (*removed, *frozen_nonlinearities.kept(system))
     return Stability(
-        title=title,
-        period=map_.period,
-        radius=abs(first.z) if first else 0.0,
-        uncertainty=first.uncertainty if first else 0.0,
-        modes=tuple(traced(map_, linear, mode) for mode in others[:SHOWN]),
-        neutral=tuple(neutral),
-        names=names,
-        equilibrium={n: float(linear.point[i]) for n, i in zip(names, linear.taken, strict=True)},
-        frozen=tuple(lines),
-        kinks=kinks,
-        linearised=map_.ways(),
-        where=where,
+        title=read.title,
+        bounds=bounds,
+        poses=tuple(visited),
+        hands=hands,
+        cases=tuple(cases),
+        without=without,
+        worst=worst,
+        margin=margin,
+        remedy=remedy,
+        frozen=frozen,
+        rounded=rounded,
     )

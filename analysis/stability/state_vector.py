@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Container, Iterator
-from copy import copy, deepcopy
+from copy import deepcopy
 from dataclasses import dataclass
-from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.latency import Link
 from hapticlink.orchestrator.system.system import Fmu, System
 
-Visit = Callable[[str, Vector], Vector]
+Take = Callable[[Vector], Vector]
 SIGNALS = "signals"
 
 
@@ -94,16 +93,47 @@ class StateVector:
         return Template(
             {name: simulation.instances[name].serialized() for name in self._taken},
             simulation.signals.values.copy(),
-            [_mapped(vars(hold), name, _copied) for name, hold in self._holds.items()],
+            [_copied(vars(hold), _same) for hold in self._holds.values()],
         )
 
     def restore(self, template: Template) -> None:
-        simulation = self._simulation
         for name in self._taken:
-            simulation.instances[name].deserialize(template.fmus[name])
-        simulation.signals.values[:] = template.signals
-        for (name, hold), kept in zip(self._holds.items(), template.holds, strict=True):
-            vars(hold).update(_mapped(kept, name, _copied))
+            self._simulation.instances[name].deserialize(template.fmus[name])
+        self._simulation.signals.values[:] = template.signals
+        for hold, kept in zip(self._holds.values(), template.holds, strict=True):
+            vars(hold).update(_copied(kept, _same))
+
+    def put(self, template: Template, numbers: Vector) -> None:
+        """Restores `template` with other numbers."""
+        first = 0
+        for name, taken in self._taken.items():
+            head, values = template.fmus[name], doubles(template.fmus[name]).copy()
+            values[taken] = numbers[first : first + len(taken)]
+            state = head[: len(head) - values.nbytes] + values.tobytes()
+            self._simulation.instances[name].deserialize(state)
+            first += len(taken)
+        signals = self._simulation.signals.values
+        signals[:] = numbers[first : first + len(signals)]
+        first += len(signals)
+
+        def take(value: Vector) -> Vector:
+            nonlocal first
+            first += value.size
+            return numbers[first - value.size : first].reshape(value.shape).copy()
+
+        for hold, kept in zip(self._holds.values(), template.holds, strict=True):
+            vars(hold).update(_copied(kept, take))
+
+    def now(self) -> Vector:
+        """The numbers of the simulation as it is."""
+        instances = self._simulation.instances
+        parts = [
+            doubles(instances[name].serialized())[taken] for name, taken in self._taken.items()
+        ]
+        parts.append(self._simulation.signals.values)
+        for hold in self._holds.values():
+            parts += _floats(vars(hold))
+        return np.concatenate(parts)
 
     def ages(self, of: Callable[[dict[str, Any]], Any]) -> tuple[Any, ...]:
         """What `of` tells of each hold as it is."""
@@ -122,41 +152,14 @@ class StateVector:
         """The numbers of a saved state, by owner."""
         parts = [doubles(template.fmus[name])[taken] for name, taken in self._taken.items()]
         parts.append(template.signals)
-        for name, kept in zip(self._holds, template.holds, strict=True):
-            found: list[Vector] = [np.zeros(0)]
-
-            def visit(path: str, value: Vector, found: list[Vector] = found) -> Vector:
-                found.append(value.ravel())
-                return value
-
-            _mapped(kept, name, visit)
-            parts.append(np.concatenate(found))
+        for kept in template.holds:
+            parts.append(np.concatenate([np.zeros(0), *_floats(kept)]))
         return parts
-
-    def put(self, template: Template, numbers: Vector) -> Template:
-        """`template` with other numbers."""
-        at = 0
-        fmus = {}
-        for name, taken in self._taken.items():
-            head, values = template.fmus[name], doubles(template.fmus[name]).copy()
-            values[taken] = numbers[at : at + len(taken)]
-            fmus[name] = head[: len(head) - values.nbytes] + values.tobytes()
-            at += len(taken)
-        signals = numbers[at : at + len(template.signals)].copy()
-        at += len(signals)
-
-        def visit(path: str, value: Vector) -> Vector:
-            nonlocal at
-            at += value.size
-            return numbers[at - value.size : at].reshape(value.shape).copy()
-
-        pairs = zip(self._holds, template.holds, strict=True)
-        return Template(fmus, signals, [_mapped(kept, name, visit) for name, kept in pairs])
 
     def coordinates(self, template: Template) -> list[Coordinate]:
         simulation = self._simulation
         system, signals = simulation.system, simulation.signals
-        found = [
+        coordinates = [
             Coordinate(u.name, name, "fmu", inert)
             for u in self._fmus
             for _, name, inert in _entries(u)
@@ -166,17 +169,12 @@ class StateVector:
         ]
         outputs = [_signal(name) for name in columns]
         further = range(len(outputs), len(template.signals))
-        found += outputs + [Coordinate("held values", f"[{i}]", "signal") for i in further]
-
-        def visit(path: str, value: Vector) -> Vector:
-            owner, _, attribute = path.partition("\0")
-            entries = [f"[{i + 1}]" for i in range(value.size)] if value.ndim else [""]
-            found.extend(Coordinate(owner, attribute.strip(".") + e, "hold") for e in entries)
-            return value
-
-        for name, kept in zip(self._holds, template.holds, strict=True):
-            _mapped(kept, name + "\0", visit)
-        return found
+        coordinates += outputs + [Coordinate("held values", f"[{i}]", "signal") for i in further]
+        for owner, kept in zip(self._holds, template.holds, strict=True):
+            for path, value in _named(kept, ""):
+                entries = [f"[{i + 1}]" for i in range(value.size)] if value.ndim else [""]
+                coordinates += [Coordinate(owner, path.strip(".") + e, "hold") for e in entries]
+        return coordinates
 
 
 def keepers(simulation: Simulation) -> dict[str, Any]:
@@ -227,32 +225,68 @@ def doubles(state: bytes) -> Vector:
     return np.frombuffer(state, offset=len(state) % 8)
 
 
-def _copied(path: str, value: Vector) -> Vector:
+def _same(value: Vector) -> Vector:
     return value.copy()
 
 
-def _mapped(value: Any, path: str, visit: Visit) -> Any:
-    """A copy of nested containers and of the parts of holds, with `visit` applied to every number
+def _copied(value: Any, take: Take) -> Any:
+    """A copy of nested containers and of the parts of holds, with `take` applied to every number
     that is a float; what cannot change, functions and shared tanks stay as they are."""
-    if isinstance(value, int | str | NoneType | NearEnd):
-        return value
     match value:
-        case np.ndarray() if value.dtype.kind == "f":
-            return visit(path, value)
+        case int() | str() | None | NearEnd():
+            return value
+        case np.ndarray():
+            return take(value) if value.dtype.kind == "f" else value.copy()
         case float():
-            return float(visit(path, np.array(value)))
+            return float(take(np.array(value)))
         case dict():
-            return {
-                k: v.copy() if k in COUNTED else _mapped(v, f"{path}.{k}", visit)
-                for k, v in value.items()
-            }
+            return {k: v.copy() if k in COUNTED else _copied(v, take) for k, v in value.items()}
         case list() | tuple():
-            return type(value)(_mapped(v, f"{path}[{i + 1}]", visit) for i, v in enumerate(value))
+            return type(value)(_copied(v, take) for v in value)
         case deque():
-            each = (_mapped(v, f"{path}[{i + 1}]", visit) for i, v in enumerate(value))
-            return deque(each, value.maxlen)
+            return deque((_copied(v, take) for v in value), value.maxlen)
         case Hold() | History() | Link():
-            made = copy(value)
-            vars(made).update(_mapped(vars(value), path, visit))
-            return made
+            other = type(value).__new__(type(value))
+            vars(other).update(_copied(vars(value), take))
+            return other
     return value if callable(value) else deepcopy(value)
+
+
+def _floats(value: Any) -> Iterator[Vector]:
+    """The floats of what `_copied` copies, in its order."""
+    match value:
+        case int() | str() | None | NearEnd():
+            pass
+        case np.ndarray():
+            if value.dtype.kind == "f":
+                yield value.ravel()
+        case float():
+            yield np.array([value])
+        case dict():
+            for k, v in value.items():
+                if k not in COUNTED:
+                    yield from _floats(v)
+        case list() | tuple() | deque():
+            for v in value:
+                yield from _floats(v)
+        case Hold() | History() | Link():
+            yield from _floats(vars(value))
+
+
+def _named(value: Any, path: str) -> Iterator[tuple[str, Vector]]:
+    """`_floats` with the place of each, in the shape that it has there."""
+    match value:
+        case int() | str() | None | NearEnd():
+            pass
+        case np.ndarray() | float():
+            if np.asarray(value).dtype.kind == "f":
+                yield path, np.asarray(value)
+        case dict():
+            for k, v in value.items():
+                if k not in COUNTED:
+                    yield from _named(v, f"{path}.{k}")
+        case list() | tuple() | deque():
+            for i, v in enumerate(value, 1):
+                yield from _named(v, f"{path}[{i}]")
+        case Hold() | History() | Link():
+            yield from _named(vars(value), path)

@@ -17,13 +17,12 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.lifted_map import behind_start, lifted_map
-from hapticlink.analysis.stability.linearisable_scene import linearisable
+from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.switching import (
     Edge,
     lyapunov,
     mean_square,
 )
-from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.faults import InputFault
@@ -72,6 +71,8 @@ class VaryingStability:
     def verdict(self) -> str:
         """In mean square, for the rate as the scene draws it."""
         return self.mean_square
+
+    finding = verdict
 
     def record(self) -> dict[str, Any]:
         """The content of stability.json."""
@@ -156,14 +157,14 @@ def edges_of(scene: Scene | None, system: System, place: int, lengths: list[int]
     """The matrices of frames of the clock at `place`, of equally probable lengths (ticks)."""
     middle = lengths[len(lengths) // 2]
     seconds = system.timeline.seconds
-    with lifted_map(alternating(system, place, middle, middle), 0.0, scene) as map_:
-        at = equilibrium(map_, trajectory(map_, 60.0))
-        V = np.stack(list(map_.directions(at.point)), axis=1)
+    with lifted_map(alternating(system, place, middle, middle), scene) as map_:
+        point = equilibrium(map_, map_.start).point
+        V = np.stack(list(map_.directions(point)), axis=1)
 
         def frame(before: int, length: int, further: int | None = None) -> Matrix:
             other = alternating(system, place, before, length, further)
             view = map_.over(other, window(other, place))
-            return V.T @ view.slopes(at.point, V)[1]
+            return V.T @ view.slopes(point, V)[1]
 
         low, high = lengths[0], lengths[-1]
         remembers = not _close(frame(low, middle), frame(high, middle))

@@ -23,13 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.analysis.stability.equilibrium import nearby, rests
-from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
-from hapticlink.analysis.stability.linearisable_scene import linearisable
-from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import evenly_spaced, simulated
 from hapticlink.analysis.stability.rates import whole_frames
+from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
@@ -174,18 +171,13 @@ def transparency(
 
 def at_pose(scene: str | Path | Scene, options: Sequence[str], name: str) -> Transparency:
     """How a scene feels where it is at rest. Raises InputFault where it is not."""
-    with (
-        linearisable(scene, options) as (read, system, _),
-        lifted_map(long_enough(read, system), 0.0, read) as map_,
-    ):
-        linear = nearby(map_, map_.start)
-        if linear is None or not rests(linear):
-            raise InputFault("it has no equilibrium in a spring that holds it")
-        cut = response(map_, linear, hand_port(map_.system))
-        T = float(1 / exact(read.haptics.rate))
-        X = np.array([cut.compliance(hertz, T) for hertz in HERTZ])
+    read = open_scene.load(scene, options)
+    with resting(scene, options) as place:
+        linear = place.period({}).in_map
+        cut = response(place.map, linear, hand_port(place.map.system))
+        X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
         length = mean_link_length(_linkage(read))
-        return of(read.title, name, X, mobility(map_, linear), length)
+        return of(read.title, name, X, mobility(place), length)
 
 
 def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Transparency:
@@ -216,11 +208,10 @@ def _direction(along: Vector, column: Complex, i: int, inertia: float) -> Direct
     return Direction(along, inertia, column[:, i], np.linalg.norm(off, axis=1) / inertia, angle)
 
 
-def mobility(map_: LiftedMap, linear: Linearisation) -> Matrix:
+def mobility(place: RestingScene) -> Matrix:
     """Lambda^-1 (3, 3) at an equilibrium. Raises InputFault where no FMU puts it out."""
     for port in MOBILITIES:
-        names = [str(c).partition("[")[0] if c.kind == "signal" else "" for c in map_.coordinates]
-        if len(values := linear.image[[name == port for name in names]]) == 9:
+        if len(values := place.signal(port)) == 9:
             return values.reshape(3, 3)
     raise InputFault(f"no FMU puts out the mobility of the mechanism ({' or '.join(MOBILITIES)})")
 

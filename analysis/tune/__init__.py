@@ -23,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.stability.held_equilibria import Held
 from hapticlink.analysis.stability.poses import Pose, at_equilibrium, evenly_spaced, simulated
 from hapticlink.analysis.stability.rates import whole_frames
+from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.tune.felt_stiffness import Feel
 from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
@@ -182,5 +182,5 @@ class _Tuning:
 
     def _at_equilibrium(
         self, options: tuple[str, ...]
-    ) -> AbstractContextManager[tuple[list[Pose], dict[str, Held]]]:
+    ) -> AbstractContextManager[tuple[list[Pose], dict[str, RestingScene]]]:
         return at_equilibrium(self._scene, options, self._resting, self._tell, self._states)

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.optimize import brentq
 
+from hapticlink.analysis.stability.bisection import DOUBLINGS
 from hapticlink.analysis.stability.gains import Scales
-from hapticlink.analysis.stability.held_equilibria import Held
-from hapticlink.analysis.stability.largest_scale import DOUBLINGS
+from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.tune.stability_limits import FINE
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
@@ -36,11 +36,11 @@ CONSTRAINED = 1e-6
 class Feel:
     """What is felt in a pose along unit wrenches, by name: "constraint", "contact"."""
 
-    def __init__(self, place: Held, along: Mapping[str, Vector]) -> None:
+    def __init__(self, place: RestingScene, along: Mapping[str, Vector]) -> None:
         self._place, self.along, self.gains = place, along, place.gains
 
     @classmethod
-    def of(cls, place: Held, linkage: Linkage) -> Feel:
+    def of(cls, place: RestingScene, linkage: Linkage) -> Feel:
         """Raises InputFault where no direction is constrained and nothing touches."""
         found = {}
         mobilities = (place.signal(signal) for signal in MOBILITIES)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hapticlink.analysis.stability.largest_scale import DOUBLINGS, largest
+from hapticlink.analysis.stability.bisection import DOUBLINGS, largest
 from hapticlink.analysis.tune.felt_stiffness import Feel
 from hapticlink.orchestrator.base.faults import InputFault
 

@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from hapticlink.analysis.stability.bisection import largest
 from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.hands import SPRINGS
-from hapticlink.analysis.stability.held_equilibria import Held
-from hapticlink.analysis.stability.largest_scale import largest
+from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.orchestrator.base.faults import InputFault
 
 FINE = 0.01
@@ -20,7 +20,7 @@ FINE = 0.01
 class Judge:
     """Stability in poses, by name. Raises InputFault for a scene without gains."""
 
-    def __init__(self, at: Mapping[str, Held]) -> None:
+    def __init__(self, at: Mapping[str, RestingScene]) -> None:
         self._at = at
         self.laws = next(iter(at.values())).gains.laws
         if not self.laws:

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.peers.bare_loop import bare_loop
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.build_system import built

@@ -54,11 +54,11 @@ def plain(ring: Ring) -> Steps:
 def _ours(ring: Ring, choice: str) -> Steps:
     from benchmarks import rings  # only what a master needs is loaded
     from hapticlink.orchestrator.experiment import simulate
-    from hapticlink.orchestrator.run import event_loop
+    from hapticlink.orchestrator.run import execute_plan
     from hapticlink.orchestrator.run.compiled.library import CHOICE
 
     rings.register()
-    event_loop.perf_counter = process_time
+    execute_plan.perf_counter = process_time
     os.environ[CHOICE] = choice
 
     def seconds(steps: int) -> float:

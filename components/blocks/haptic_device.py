@@ -1,9 +1,9 @@
 """Haptic device: twin pantograph, four motors, four encoders and the observer.
 
-    M_d(x) v' + C_d(x, v) v = J_q' tau + F_hand + stops        (4.5)
+    M_d(x) v' + C_d(x, v) v = J_q' (tau + friction) + F_hand + stops        (4.5)
 
 tau, the torques of least norm for F_motor at the pose measured at t_k, saturated, is held over the
-communication step [t_k, t_k + h).
+communication step [t_k, t_k + h). A device without friction has no terms of it.
 """
 
 from __future__ import annotations
@@ -44,6 +44,10 @@ _FIXED = (
     ("distal_inertia", "kg.m2", "its inertia about the centre of mass"),
     ("handle_mass", "kg", "mass of handle and crank"),
     ("handle_inertia", "kg.m2", "inertia of handle and crank"),
+)
+_FRICTION = (
+    ("motor_damping", "N.m.s/rad", "viscous damping about each motor's axis"),
+    ("motor_friction", "N.m", "dry friction about each motor's axis"),
 )
 _TUNABLE = (
     ("torque_limit", "N.m", "largest torque of a motor"),
@@ -100,6 +104,8 @@ def _parameters(device: Device, sensed: bool) -> list[Variable]:
 
     start = Variable("x_start", (3,), POSE, 0.0, "pose of the handle at the start", "fixed")
     parameters = [start, *of(_FIXED, "fixed"), *of(_TUNABLE, "tunable")]
+    if device.motor_damping or device.motor_friction:
+        parameters += of(_FRICTION, "tunable")
     if sensed:
         parameters += of((("encoder_resolution", "rad", "angle of one encoder count"),), "fixed")
         gains = device.observer
@@ -115,7 +121,10 @@ def _plant(block: Block) -> ca.Function:
     state, drive = ca.SX.sym("x", 6), ca.SX.sym("u", 7)
     pose, v, tau, F_hand = state[:3], state[3:], drive[:4], drive[4:]
     M, c = pantograph.motion(pose, v, block.p)
-    wrench = pantograph.jacobian(pose, block.p).T @ tau + F_hand
+    J = pantograph.jacobian(pose, block.p)
+    if "motor_friction" in block.p:
+        tau = tau + pantograph.friction_torques(J @ v, block.p)
+    wrench = J.T @ tau + F_hand
     wrench += pantograph.stop_wrench(pose, v, block.p) - c
     derivative = ca.vertcat(v, ca.solve(M, wrench))
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])

@@ -133,6 +133,16 @@ def motion(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
     return M, c
 
 
+FRICTION_RATE = 0.1
+"""Rate (rad/s) over which dry friction changes its sign: at 512 Hz it takes many steps to do so."""
+
+
+def friction_torques(rates: ca.SX, p: Parameters) -> ca.SX:
+    """-b q' - f tanh(q'/v_f), (4,), of the rates of the base angles, with viscous damping b and dry
+    friction f."""
+    return -p["motor_damping"] * rates - p["motor_friction"] * ca.tanh(rates / FRICTION_RATE)
+
+
 def margins(pose: ca.SX, p: Parameters) -> ca.SX:
     """Distances (m) of the four crank ends to the limits of their arms, shape (8,).
 

@@ -70,6 +70,10 @@ class Device:
     """Mass of handle and crank."""
     handle_inertia: Annotated[float, Quantity("kg.m2", gt=0)] = 8e-5
     """Inertia of handle and crank."""
+    motor_damping: Annotated[float, Quantity("N.m.s/rad", ge=0)] = 0.0
+    """Viscous damping about the axis of each motor."""
+    motor_friction: Annotated[float, Quantity("N.m", ge=0)] = 0.0
+    """Dry friction about the axis of each motor: this times tanh of its rate over 0.1 rad/s."""
     torque_limit: Annotated[float, Quantity("N.m", gt=0)] = 0.5
     """Largest torque of a motor; if one would exceed it, all four are scaled by one factor."""
     encoder_resolution: Annotated[float, Quantity("rad", gt=0)] = 0.0015707963267948966

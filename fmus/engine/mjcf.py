@@ -154,9 +154,9 @@ def _xy(point: tuple[float, float] | None) -> str:
 
 def _bodies(parent: ET.Element, name: str, linkage: Linkage, shapes: _Shapes) -> None:
     """The sites of the body `name`, and the bodies that it carries, into their element."""
-    for site, carrier, at in _sites(linkage):
+    for site, carrier, position in _sites(linkage):
         if carrier == name:
-            ET.SubElement(parent, "site", name=site, pos=_xy(at))
+            ET.SubElement(parent, "site", name=site, pos=_xy(position))
     for joint in linkage.joint:
         if joint.parent != name:
             continue
@@ -181,11 +181,11 @@ def _sites(linkage: Linkage) -> Iterator[tuple[str, str, Point | None]]:
                 yield f"{kind}{i}.{k}", pair.bodies[k], pair.at[k]
 
 
-def _joint(body: ET.Element, joint: Joint, at: Point) -> None:
+def _joint(body: ET.Element, joint: Joint, position: Point) -> None:
     if joint.type == "free":
         for name, axis in zip(_names(joint), ("1 0 0", "0 1 0", "0 0 1"), strict=True):
             kind = "hinge" if axis == "0 0 1" else "slide"
-            ET.SubElement(body, "joint", name=name, type=kind, axis=axis, pos=_xy(at))
+            ET.SubElement(body, "joint", name=name, type=kind, axis=axis, pos=_xy(position))
         return
     hinge, direction = joint.type == "revolute", joint.axis or 0.0
     axis = "0 0 1" if hinge else _xy((math.cos(direction), math.sin(direction)))
@@ -201,7 +201,7 @@ def _joint(body: ET.Element, joint: Joint, at: Point) -> None:
         interval = " ".join(repr(none if end is None else end) for end, none in ends)
         attributes |= {"range": interval, "limited": "true", "solimplimit": RIGID}
     kind = "hinge" if hinge else "slide"
-    place = {"name": joint.name, "type": kind, "axis": axis, "pos": _xy(at)}
+    place = {"name": joint.name, "type": kind, "axis": axis, "pos": _xy(position)}
     ET.SubElement(body, "joint", place | attributes)
 
 

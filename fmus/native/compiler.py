@@ -111,9 +111,9 @@ def _compiled(
     else:
         jobs = {}
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            for each in source:
-                command = [*options, "-c", "-o", f"{each.stem}.o", str(each.resolve())]
-                jobs[f"{each.stem}.o"] = pool.submit(_zig, command, own_folder, target)
+            for file in source:
+                command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
+                jobs[f"{file.stem}.o"] = pool.submit(_zig, command, own_folder, target)
         for job in jobs.values():
             job.result()
         inputs = [*jobs]

@@ -148,17 +148,9 @@ static void restart(Model *m) {
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
                               fmi2Boolean logging) {
-    if (!callbacks || !callbacks->logger || !name || !guid) return NULL;
-    Model *m = calloc(1, sizeof(Model) + strlen(name) + 1);
-    if (!m) return NULL;
-    strcpy(m->name, name);
-    m->callbacks = *callbacks;
-    restart(m);
-    if (type == fmi2CoSimulation && !strcmp(guid, GUID)) return m;
-    if (type != fmi2CoSimulation) fail(m, fmi2Error, "this FMU is for co-simulation only");
-    else fail(m, fmi2Error, "the guid %s is not that of this binary, %s", guid, GUID);
-    free(m);
-    return NULL;
+    Model *m = allocated(name, type, guid, callbacks);
+    if (m) restart(m);
+    return m;
 }
 
 void fmi2FreeInstance(fmi2Component c) { free(c); }
@@ -210,8 +202,7 @@ fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[
     Model *m = c;
     if (is_null(m, __func__, n, vr, value)) return fmi2Error;
     for (size_t i = 0; i < n; i++) {
-        if (vr[i] >= REALS)
-            return fail(m, fmi2Error, "unknown value reference %u; %d are known", vr[i], REALS);
+        if (is_unknown(m, vr[i], REALS)) return fmi2Error;
         if (vr[i] >= SETTABLE) refresh(m);
         value[i] = m->now.reals[vr[i]];
     }
@@ -224,8 +215,7 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
     if (is_null(m, __func__, n, vr, value)) return fmi2Error;
     const int initialized = m->now.mode == STEP;
     for (size_t i = 0; i < n; i++) { /* all are looked at before any is set */
-        if (vr[i] >= REALS)
-            return fail(m, fmi2Error, "unknown value reference %u; %d are known", vr[i], REALS);
+        if (is_unknown(m, vr[i], REALS)) return fmi2Error;
         if (vr[i] >= SETTABLE)
             return fail(m, fmi2Error, "%s is an output; it cannot be set", names[vr[i]]);
         if (initialized && is_fixed[vr[i]])

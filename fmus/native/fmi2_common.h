@@ -14,12 +14,12 @@ static void say(const Model *m, fmi2Status status, const char *text) {
 
 static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
     if (!m) return fmi2Error; /* without an instance there is nobody to tell */
-    char said[1024], text[2 * sizeof said], *to_text = text;
+    char plain[1024], text[2 * sizeof plain], *to_text = text;
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(said, sizeof said, format, arguments);
+    vsnprintf(plain, sizeof plain, format, arguments);
     va_end(arguments);
-    for (const char *c = said; *c; *to_text++ = *c++)
+    for (const char *c = plain; *c; *to_text++ = *c++)
         if (*c == '%') *to_text++ = '%'; /* the logger takes a message for a format (2.1.5) */
     *to_text = 0;
     say(m, status, text);
@@ -45,6 +45,28 @@ static int is_ours(const Model *m, const void *bytes) {
     if (m && bytes && !memcmp(bytes, GUID, sizeof GUID)) return 1;
     fail(m, fmi2Error, "this FMU state was not saved by this FMU");
     return 0;
+}
+
+/* Whether a value reference is none of the `known` first. */
+static int is_unknown(const Model *m, fmi2ValueReference reference, unsigned known) {
+    if (reference < known) return 0;
+    fail(m, fmi2Error, "unknown value reference %u; %u are known", reference, known);
+    return 1;
+}
+
+/* A new instance with its name and callbacks; NULL where it cannot be one of this FMU. */
+static Model *allocated(fmi2String name, fmi2Type type, fmi2String guid,
+                        const fmi2CallbackFunctions *callbacks) {
+    if (!callbacks || !callbacks->logger || !name || !guid) return NULL;
+    Model *m = calloc(1, sizeof(Model) + strlen(name) + 1);
+    if (!m) return NULL;
+    strcpy(m->name, name);
+    m->callbacks = *callbacks;
+    if (type == fmi2CoSimulation && !strcmp(guid, GUID)) return m;
+    if (type != fmi2CoSimulation) fail(m, fmi2Error, "this FMU is for co-simulation only");
+    else fail(m, fmi2Error, "the guid %s is not that of this binary, %s", guid, GUID);
+    free(m);
+    return NULL;
 }
 
 /* --- what there is none of ------------------------------------------------------------------- */

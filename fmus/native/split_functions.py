@@ -59,7 +59,7 @@ def split(text: str) -> tuple[str, Iterable[str]]:
         return main, ()
     whole = hashlib.sha256(text.encode()).hexdigest()
     main = f"/* Pieces of {whole}. */\n{_HELPER.sub('static ', main)}"  # it is part of every file
-    return main, _files(main, (piece for each in long for piece in _pieces(*each)))
+    return main, _files(main, (piece for function in long for piece in _pieces(*function)))
 
 
 def _files(main: str, pieces: Iterator[str]) -> Iterator[str]:

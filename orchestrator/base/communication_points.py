@@ -11,8 +11,8 @@ class Frames(Sequence[int]):
     """The ticks `at(0)` to `at(count - 1)`, computed when they are read, so that a long run needs
     no memory for them. Their spacing repeats with the period `round`."""
 
-    def __init__(self, at: Callable[[int], int], count: int, round: int) -> None:
-        self._at, self._count, self.round = at, count, round
+    def __init__(self, tick_of: Callable[[int], int], count: int, round: int) -> None:
+        self._at, self._count, self.round = tick_of, count, round
 
     def __len__(self) -> int:
         return self._count
@@ -38,5 +38,5 @@ class Frames(Sequence[int]):
 
     def times(self, factor: int) -> Frames:
         """The same instants in ticks that are shorter by `factor`."""
-        at = self._at
-        return Frames(lambda i: at(i) * factor, self._count, self.round)
+        tick_of = self._at
+        return Frames(lambda i: tick_of(i) * factor, self._count, self.round)

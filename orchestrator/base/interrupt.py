@@ -64,8 +64,8 @@ def held(end: Action | None = None, after: Any = None) -> Iterator[None]:
     if _holding or threading.current_thread() is not threading.main_thread():
         yield
         return
-    found = {s: signal.getsignal(s) for s in SIGNALS}
-    before = {s: h for s, h in found.items() if h not in (signal.SIG_IGN, None)}
+    handlers = {s: signal.getsignal(s) for s in SIGNALS}
+    before = {s: h for s, h in handlers.items() if h not in (signal.SIG_IGN, None)}
 
     def take(number: int, frame: FrameType | None) -> None:
         global _count
@@ -73,8 +73,8 @@ def held(end: Action | None = None, after: Any = None) -> Iterator[None]:
         if _count == 1:
             return
         _end(end)
-        for each, handler in before.items():
-            signal.signal(each, handler)
+        for ignored_name, handler in before.items():
+            signal.signal(ignored_name, handler)
         signal.raise_signal(number)
 
     _count, _holding = 0, True

@@ -50,10 +50,10 @@ def clear(ended: int | None = None) -> None:
     ours = re.compile(rf"{_prefix()}(\d+)-\w+")
     with suppress(OSError), os.scandir(tempfile.gettempdir()) as entries:
         for entry in entries:
-            found = ours.fullmatch(entry.name)
-            if not found or not entry.is_dir(follow_symlinks=False):
+            match = ours.fullmatch(entry.name)
+            if not match or not entry.is_dir(follow_symlinks=False):
                 continue
-            owner, own = int(found[1]), entry.stat(follow_symlinks=False).st_uid == os.getuid()
+            owner, own = int(match[1]), entry.stat(follow_symlinks=False).st_uid == os.getuid()
             if own and (owner == ended or not lives(owner)):
                 shutil.rmtree(entry.path, ignore_errors=True)
 

@@ -1,5 +1,5 @@
-"""The interface of a loaded FMU, implemented in this process (`in_process`) and in a process of its
-own (`isolated`)."""
+"""The interface of a loaded FMU, implemented in this process (`in_process_fmi2`, `in_process_fmi3`)
+and in a process of its own (`isolated`)."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ class Instance(ABC):
         """Read all outputs. Raises FmuFault for the first that is not finite, unless `faults.nan`
         holds its last value, and Diverged for the first beyond its bound."""
         self.read()
-        if not self.bounds.kept():
+        if not self.bounds.hold():
             self.judge()
         elif self.good is not None:
             self.good[:] = self.outputs

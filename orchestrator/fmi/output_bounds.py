@@ -33,7 +33,7 @@ class Bounds:
                 bounds[i] = np.inf
         self.inverse[:] = 1.0 / bounds
 
-    def kept(self) -> bool:
+    def hold(self) -> bool:
         """Whether all outputs are certainly finite and within their bounds: one pass over the
         vector, since this is asked at every read."""
         np.multiply(self._outputs, self.inverse, out=self._shares)

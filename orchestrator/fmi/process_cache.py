@@ -109,7 +109,7 @@ def leave(folder: str) -> bool:
     kept. Returns whether others are open."""
     with _lock:
         file, unpacked = next(
-            ((f, each) for f, each in _unpacked.items() if each.folder == folder), (None, None)
+            ((f, entry) for f, entry in _unpacked.items() if entry.folder == folder), (None, None)
         )
         if file is None or unpacked is None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -124,6 +124,6 @@ def trim(most: int = MAX_UNPACKED) -> None:
     """Removes the folders that were used longest ago and in which no FMU is open, so that `most`
     are left."""
     with _lock:
-        closed = [file for file, each in _unpacked.items() if not each.instances]
+        closed = [file for file, entry in _unpacked.items() if not entry.instances]
         for file in closed[: max(len(_unpacked) - most, 0)]:
             shutil.rmtree(_unpacked.pop(file).folder, ignore_errors=True)

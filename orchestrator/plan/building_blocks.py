@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
 from hapticlink.orchestrator.base.faults import InputFault
@@ -29,12 +29,9 @@ def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
     return [u for u in due if u.sampled], [u for u in due if not u.sampled]
 
 
-def without_steps(event: Event, clocks: Container[str] | None = None) -> Event:
-    """The event with the steps of all plants, or of those of `clocks`, left out."""
-    firings = (
-        f._replace(final=f.final or clocks is None or f.clock in clocks) for f in event.firings
-    )
-    return event._replace(firings=tuple(firings))
+def without_steps(event: Event) -> Event:
+    """The event with the steps of all plants left out."""
+    return event._replace(firings=tuple(f._replace(final=True) for f in event.firings))
 
 
 def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:

@@ -51,10 +51,10 @@ class Stamps:
         """Process an event, in the order of time."""
         if (bound := self._bound.get(event)) is None:
             operations = self._plan.unrolled(event)
-            bound = [each for op in operations if (each := self._bind(op))]
+            bound = [trace for op in operations if (trace := self._bind(op))]
             self._bound[event] = bound
-        for each in bound:
-            each(tick)
+        for trace in bound:
+            trace(tick)
 
     def _bind(self, operation: Operation) -> Callable[[int], None] | None:
         got, pushed, held, links = self._got, self._pushed, self._held, self._links

@@ -75,10 +75,10 @@ class Recorder:
     def row(self, time: float) -> None:
         """Write a row at `time` (s). Raises OSError, as on a full disk."""
         if self.due.value and self._file:
-            filled, kept = self.block.filled, self.block.rows
-            if filled.value == len(kept):
+            filled, rows = self.block.filled, self.block.rows
+            if filled.value == len(rows):
                 self.flush()
-            row = kept[filled.value]
+            row = rows[filled.value]
             row[0], row[1:] = time, self.values[self.places] if self.view is None else self.view
             filled.value += 1
         self.reached.value = time
@@ -154,14 +154,14 @@ def make_csv(path: Path) -> int:
     """Make the CSV `path` of its rows, which stay; their number. Raises OSError, as on a full
     disk."""
     source = path.with_suffix(rows.SUFFIX)
-    made = path.with_name(f".{path.name}.{os.getpid()}")
-    made.unlink(missing_ok=True)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    unfinished.unlink(missing_ok=True)
     try:
-        with made.open("xb") as file:
+        with unfinished.open("xb") as file:
             count = rows.write_csv(source, file)
-        os.replace(made, path)
+        os.replace(unfinished, path)
     except OSError:
-        made.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
         raise
     return count
 
@@ -188,7 +188,7 @@ def write_over(path: Path, *contents: Mapping[str, Any]) -> None:
     on a full disk, too; nothing if none fits."""
     with path.open("r+b", buffering=0) as file:
         room = os.fstat(file.fileno()).st_size
-        fitting = (each for each in map(text, contents) if len(each) <= room)
+        fitting = (content for content in map(text, contents) if len(content) <= room)
         if fits := next(fitting, None):
             file.write(fits.ljust(room))
 

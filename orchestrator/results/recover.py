@@ -46,8 +46,8 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
         table = folder / f"{name}.csv"
         if (source := table.with_suffix(rows.SUFFIX)).is_file():
             lost = rows.torn(source)
-            _, kept = rows.read(source)
-            recovered[name] = Recovered(make_csv(table), float(kept[-1, 0]), lost)
+            _, table_rows = rows.read(source)
+            recovered[name] = Recovered(make_csv(table), float(table_rows[-1, 0]), lost)
             remove_rows(table)
     changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
     if record.end.process is not None:

@@ -92,8 +92,8 @@ def write_csv(source: Path, target: BinaryIO) -> int:
 
 def read(path: Path) -> tuple[tuple[str, ...], Rows]:
     """The columns and the rows of a table; a row that is not whole is left out."""
-    columns, found = parts(path)
-    return columns, np.concatenate([np.zeros((0, len(columns))), *found])
+    columns, pieces = parts(path)
+    return columns, np.concatenate([np.zeros((0, len(columns))), *pieces])
 
 
 def parts(path: Path) -> tuple[tuple[str, ...], Iterator[Rows]]:

@@ -66,9 +66,9 @@ class RunFolder:
     ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
         path = self.folder / f"{clock}.csv"
-        made = Recorder(path, columns, values, places, self._publish, every)
-        self._recorders.append(made)
-        return made
+        recorder = Recorder(path, columns, values, places, self._publish, every)
+        self._recorders.append(recorder)
+        return recorder
 
     def flush(self) -> None:
         """Write the rows of all clocks that are kept in memory. Raises OSError, as on a full
@@ -96,8 +96,8 @@ class RunFolder:
             write(self.folder / RUN, self._begun + b" " * ROOM)
         for recorder in self._recorders:
             recorder.publish()
-        kept = {RUN, *(name for recorder in self._recorders for name in recorder.files)}
-        for name in self._earlier - kept:
+        own = {RUN, *(name for recorder in self._recorders for name in recorder.files)}
+        for name in self._earlier - own:
             (self.folder / name).unlink(missing_ok=True)
         self.published = True
 
@@ -169,10 +169,10 @@ def _listed(folder: Path) -> set[str]:
     try:
         names = json_file.read(folder / RUN).get("files", ())
         texts = (n for n in names if isinstance(n, str) and "\0" not in n)
-        found = {n for n in texts if n != ".." and Path(n).name == n}
+        files = {n for n in texts if n != ".." and Path(n).name == n}
     except (InputFault, AttributeError, TypeError):
         return set()
-    tables = (folder / n for n in found if n.endswith((".csv", rows.SUFFIX)))
-    found = {n for n in found if not (folder / n).is_dir() or (folder / n).is_symlink()}
+    tables = (folder / n for n in files if n.endswith((".csv", rows.SUFFIX)))
+    files = {n for n in files if not (folder / n).is_dir() or (folder / n).is_symlink()}
     left = [f for t in tables for f in (t.with_suffix(rows.SUFFIX), *rows.blocks(t)) if f.exists()]
-    return found | {f.name for f in left}
+    return files | {f.name for f in left}

@@ -85,7 +85,7 @@ class Table(Mapping[str, Vector]):
 def _shape(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
     """The shape of the array that has entries at `indices`, which may begin at 0 or 1; one
     dimension where they fill none."""
-    if len({len(each) for each in indices}) == 1:
+    if len({len(index) for index in indices}) == 1:
         shape = tuple(max(axis) - min(axis) + 1 for axis in zip(*indices, strict=True))
         if math.prod(shape) == len({*indices}) == len(indices):
             return shape

@@ -126,11 +126,11 @@ class _Forward:
     def between(self, begin: float, end: float) -> Table:
         """The rows of begin <= time <= end (s)."""
         over = int(np.searchsorted(self._kept[:, 0], begin))
-        found = [self._kept[over:]]
-        while not (len(found[-1]) and found[-1][-1, 0] > end):
+        pieces = [self._kept[over:]]
+        while not (len(pieces[-1]) and pieces[-1][-1, 0] > end):
             if (part := next(self._parts, None)) is None:
                 break
-            found.append(part)
-        self._kept, self._first = np.concatenate(found), self._first + over
-        kept = self._kept[: np.searchsorted(self._kept[:, 0], end, "right")]
-        return Table(self._columns, kept, {}, self._first, self._total)
+            pieces.append(part)
+        self._kept, self._first = np.concatenate(pieces), self._first + over
+        span = self._kept[: np.searchsorted(self._kept[:, 0], end, "right")]
+        return Table(self._columns, span, {}, self._first, self._total)

@@ -237,9 +237,9 @@ class Binder:
 
         def derive(tick: int) -> None:
             late = simulation.late
-            found = np.stack([hold.value(tick + late, at - late) for at in instants])
-            view[:] = found[0]
-            derivatives, mean[:] = held_polynomials.split(found, seconds)
+            samples = np.stack([hold.value(tick + late, instant - late) for instant in instants])
+            view[:] = samples[0]
+            derivatives, mean[:] = held_polynomials.split(samples, seconds)
             derived[:] = derivatives.ravel()
 
         return derive

@@ -62,8 +62,8 @@ class ThreadWorker:
         self._jobs.put((job, done))
 
     def _work(self) -> None:
-        while found := self._jobs.get():
-            for call in found:
+        while calls := self._jobs.get():
+            for call in calls:
                 call()
 
     def close(self, seconds: float) -> bool:
@@ -166,7 +166,7 @@ def sides(
     fmus, clocks = plan.system.fmu, dict.fromkeys(able.values())
     return {
         name: Side(
-            all(varies_step(fmus[f].description) for f, at in able.items() if at == name),
+            all(varies_step(fmus[f].description) for f, of in able.items() if of == name),
             clock,
             worker(),
         )

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.simulation import Call, Simulation
-from hapticlink.orchestrator.run.solvers import SOLVERS, Found, Matrix, Newton, Vector
+from hapticlink.orchestrator.run.solvers import SOLVERS, Matrix, Newton, Solution, Vector
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.ports import beside
@@ -100,16 +100,16 @@ class FixedPoint:
         before = counts.rollbacks
         settings = self._settings
         start = values[places]
-        found = self._solver.solve(residual, start, settings.tolerance, settings.most)
+        solution = self._solver.solve(residual, start, settings.tolerance, settings.most)
         counts.steps += 1
         counts.iterations += 1 + counts.rollbacks - before
-        counts.max_iterations = max(counts.max_iterations, found.iterations)
+        counts.max_iterations = max(counts.max_iterations, solution.iterations)
         if isinstance(self._solver, Newton):
             counts.jacobians += self._solver.jacobians
             counts.directional_jacobians += self._solver.supplied_jacobians
             self._solver.jacobians = self._solver.supplied_jacobians = 0
-        if not found.error <= settings.tolerance:
-            self._unconverged(found, tick)
+        if not solution.error <= settings.tolerance:
+            self._unconverged(solution, tick)
 
     def _jacobian(self) -> Matrix | None:
         """Jacobian of the residual: the FMUs' directional derivatives of a step with respect to its
@@ -117,38 +117,38 @@ class FixedPoint:
         if self._ways is None:
             return None
         values, places = self._signals.values, self._places
-        kept = values.copy()
+        before = values.copy()
         responses = []
         for moved in (None, *places):
-            values[:] = kept
+            values[:] = before
             if moved is not None:
                 values[moved] += 1.0
             for call in (*self._guess, *self._ask):
                 call(self._tick)
             responses.append(values.copy())
-        values[:] = kept
+        values[:] = before
         tangent = np.stack(responses[1:], axis=1) - responses[0][:, None]
-        found = np.zeros((len(values), len(places)))
+        slopes = np.zeros((len(values), len(places)))
         for way in self._ways:
             through = way.of(tangent)
             if through is None:
                 self._ways = None
                 return None
-            found[list(way.rows)] = through
-        return found[places] - np.eye(len(places))
+            slopes[list(way.rows)] = through
+        return slopes[places] - np.eye(len(places))
 
-    def _unconverged(self, found: Found, tick: int) -> None:
+    def _unconverged(self, solution: Solution, tick: int) -> None:
         self.counts.unconverged += 1
-        if self._settings.unconverged == "accept" and np.isfinite(found.error):
+        if self._settings.unconverged == "accept" and np.isfinite(solution.error):
             return
-        shares = np.abs(found.residual) / (1.0 + np.abs(found.point))
+        shares = np.abs(solution.residual) / (1.0 + np.abs(solution.point))
         worst = int(np.argmax(np.where(np.isnan(shares), np.inf, shares)))
         other = "newton" if self._settings.method == "aitken" else "more iterations (most)"
         raise Unconverged(
             f"{self._names[worst]} does not converge at t = {self._seconds(tick):.6g} s: after "
-            f"{found.iterations} iterations ({self._settings.method}) its value at the end of the "
-            f"step is {found.point[worst]:.9g} where the FMUs give "
-            f"{found.point[worst] + found.residual[worst]:.9g}; take a higher rate, or in "
+            f"{solution.iterations} iterations ({self._settings.method}) its value at the end of "
+            f"the step is {solution.point[worst]:.9g} where the FMUs give "
+            f"{solution.point[worst] + solution.residual[worst]:.9g}; take a higher rate, or in "
             f"[iteration] {other} or a larger tolerance"
         )
 

@@ -92,12 +92,12 @@ def _solve(
 
     newton = Newton()
     newton.supplied = _jacobian(system, instances, signals, places)
-    found = newton.solve(residual, first[places], TOLERANCE, SWEEPS)
-    if not found.error <= TOLERANCE:
+    solution = newton.solve(residual, first[places], TOLERANCE, SWEEPS)
+    if not solution.error <= TOLERANCE:
         agree = np.ones(len(values), bool)
-        agree[places] = np.abs(found.residual) <= TOLERANCE * (1.0 + np.abs(found.point))
+        agree[places] = np.abs(solution.residual) <= TOLERANCE * (1.0 + np.abs(solution.point))
         before = values.copy()
-        before[places] = found.point
+        before[places] = solution.point
         _raise_unsettled(system, signals, agree, before)
 
 
@@ -108,15 +108,15 @@ def _jacobian(
     are propagated from FMU to FMU by directional derivatives. It returns None where an FMU gives
     none."""
     moved = [c for c in system.connections if {*places} & {*signals.sources(c)}]
-    found = jacobians.ways(system, signals, instances, moved, places)
+    ways = jacobians.ways(system, signals, instances, moved, places)
     held = [(signals.hold(c.name), signals.sources(c)) for c in moved if c.hold]
 
     def jacobian() -> Matrix | None:
-        if found is None:
+        if ways is None:
             return None
         tangent = np.zeros((len(signals.values), len(places)))
         tangent[places] = np.eye(len(places))
-        for way in found:
+        for way in ways:
             for taken, sources in held:
                 tangent[taken] = tangent[sources]
             through = way.of(tangent)

@@ -36,11 +36,11 @@ class Through:
     def of(self, tangent: Matrix) -> Matrix | None:
         """The derivatives (rows, n) of the outputs for derivatives `tangent` (signals, n) of all
         signals; None if the FMU does not give them."""
-        found = self.instance.jacobian(self.outputs, self.inputs)
-        if found is None:
+        slopes = self.instance.jacobian(self.outputs, self.inputs)
+        if slopes is None:
             return None
         factors = np.array([s.conversion.factor for s in self.inputs])
-        through: Matrix = found @ (factors[:, None] * tangent[list(self.columns)])
+        through: Matrix = slopes @ (factors[:, None] * tangent[list(self.columns)])
         return through
 
 
@@ -53,7 +53,7 @@ def ways(
 ) -> list[Through] | None:
     """Per FMU on the loop, the partial derivatives of the outputs at `places` with respect to the
     connected inputs, in the system's order; None where an FMU gives none."""
-    found = []
+    partial = []
     connections = list(connections)
     for fmu in system.fmus:
         incoming = [c for c in connections if c.target == fmu.name]
@@ -61,7 +61,7 @@ def ways(
         rows = tuple(p for p in places if span.start <= p < span.stop)
         if not incoming or not rows:
             continue
-        made = Through(
+        through = Through(
             instances[fmu.name],
             tuple(outputs[p - span.start] for p in rows),
             rows,
@@ -70,7 +70,7 @@ def ways(
         )
         if not gives_directional_derivatives(fmu.description):
             return None
-        if any(s.type not in ("Real", "Float64") for s in (*made.outputs, *made.inputs)):
+        if any(s.type not in ("Real", "Float64") for s in (*through.outputs, *through.inputs)):
             return None
-        found.append(made)
-    return found
+        partial.append(through)
+    return partial

@@ -44,10 +44,10 @@ def make_hold(
     context = _context(connection, system, signals, shared)
 
     def make() -> Hold:
-        made = made_by(context)
+        own = made_by(context)
         if connection.hold not in HOLDS.origins:
-            return made
-        return CheckedHold(made, size, connection.hold, connection.name)
+            return own
+        return CheckedHold(own, size, connection.hold, connection.name)
 
     hold = make()
     if connection.kind == "projector" and not made_by.gives_samples:
@@ -92,15 +92,15 @@ def _context(
 ) -> HoldContext:
     """The context of a hold; displacement, velocity and tank only if the hold needs them."""
     size, moved, moving, tank = len(connection.inputs), None, None, None
-    found = bond(connection, system, signals)
-    if HOLDS[connection.hold or ""].needs == "power" and found:
+    power = bond(connection, system, signals)
+    if HOLDS[connection.hold or ""].needs == "power" and power:
         # Samples are converted to the target's units behind the hold, so that the displacement is
         # scaled instead.
-        entries, work, places = list(found.entries), np.zeros(size), np.zeros(size, np.intp)
-        work[entries], places[entries] = found.work, found.moved
+        entries, work, places = list(power.entries), np.zeros(size), np.zeros(size, np.intp)
+        work[entries], places[entries] = power.work, power.moved
         moved = Reader(signals, places.tolist(), work)
-        if found.moving:
-            places[entries] = found.moving
+        if power.moving:
+            places[entries] = power.moving
             moving = Reader(signals, places.tolist(), work)
     if HOLDS[connection.hold or ""].needs == "spring":
         of = spring(connection, system.energy.springs)

@@ -39,7 +39,7 @@ def opened(
         interrupt.check()
         kind = Isolated if fmu.name in alone else IN_PROCESS[fmu.description.fmi]
         outputs = signals.values[signals.fmu(fmu.name)]
-        made = kind(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
-        made.seldom = fmu.seldom
-        instances[fmu.name] = stack.enter_context(made)
+        instance = kind(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
+        instance.seldom = fmu.seldom
+        instances[fmu.name] = stack.enter_context(instance)
     return instances

@@ -97,11 +97,11 @@ def quantiles(bins: NDArray[np.int64], largest: int) -> dict[str, float]:
     largest value (ns) in s."""
     below = bins.cumsum()
     shares = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999}
-    found = {
+    values = {
         name: 1e-9 * min(_upper(int(np.searchsorted(below, share * below[-1]))), largest)
         for name, share in shares.items()
     }
-    return found | {"max": 1e-9 * largest}
+    return values | {"max": 1e-9 * largest}
 
 
 def _upper(i: int) -> int:

@@ -39,9 +39,9 @@ class PythonLoop:
 
     def _calls(self, kind: Event) -> list[Call]:
         """The calls of a kind of event, bound at its first occurrence."""
-        if (found := self._bound.get(kind)) is None:
-            found = self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
-        return found
+        if (calls := self._bound.get(kind)) is None:
+            calls = self._bound[kind] = self._binder.bind_all(self._plan.block(kind))
+        return calls
 
     def iterations(self) -> Iterations | None:
         return total(loop.counts for loop in self._binder.loops.values())

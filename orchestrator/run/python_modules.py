@@ -40,18 +40,18 @@ def bundled(path: Path) -> Modules:
             crcs = {e.filename: e.CRC for e in archive.infolist()}
     except InputFault:
         return {}
-    found: Modules = {}
+    modules: Modules = {}
     for file, crc in crcs.items() if "resources/slavemodule.txt" in crcs else ():
         place = file.removeprefix("resources/")
         if place != file and place.endswith(".py"):
-            found.setdefault(place.partition("/")[0].removesuffix(".py"), {})[place] = crc
-    return found
+            modules.setdefault(place.partition("/")[0].removesuffix(".py"), {})[place] = crc
+    return modules
 
 
 def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
     """The FMUs that have to be isolated although the scene does not say so, by name, with the
     reason. The modules of the others are recorded as loaded."""
-    found = {}
+    reasons = {}
     for fmu in fmus:
         if fmu.isolate:
             continue
@@ -63,15 +63,15 @@ def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
             for name, files in modules.items():
                 _loaded.setdefault(name, files)
         else:
-            found[fmu.name] = f"another module {other!r} is loaded in this process"
-    return found
+            reasons[fmu.name] = f"another module {other!r} is loaded in this process"
+    return reasons
 
 
 def _import_installed(files: dict[str, int]) -> None:
     """Imports the installed pythonfmu where its `files` are those of an FMU: its own would be
     compiled in each process anew."""
-    found = find_spec("pythonfmu")
-    if found and _on_disk("pythonfmu", found.origin or "") == files:
+    spec = find_spec("pythonfmu")
+    if spec and _on_disk("pythonfmu", spec.origin or "") == files:
         import pythonfmu as pythonfmu
 
 

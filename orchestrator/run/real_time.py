@@ -80,10 +80,10 @@ class RealTimeRun:
 def with_ends(coming: Iterable[Event]) -> set[Event]:
     """The kinds of events that are likely beside wall clocks: those that come, those of each clock
     alone, and the same at the end of the run."""
-    found = {*coming}
-    for event in [*found]:
+    kinds = {*coming}
+    for event in [*kinds]:
         alone = (event._replace(firings=(firing,)) for firing in event.firings)
         for kind in (event, *alone) if not event.first else ():
             last = tuple(firing._replace(final=True) for firing in kind.firings)
-            found |= {kind, kind._replace(firings=last)}
-    return found
+            kinds |= {kind, kind._replace(firings=last)}
+    return kinds

@@ -99,7 +99,7 @@ class SignalVector:
         table."""
         span, written = self.clock(clock), self._system.recording.outputs
         names = {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
-        found = {n: i for n, i in names.items() if span.start <= i < span.stop}
+        columns = {n: i for n, i in names.items() if span.start <= i < span.stop}
         if written is None:
-            return found
-        return {n: found[n] for n in written if n in found} or None
+            return columns
+        return {n: columns[n] for n in written if n in columns} or None

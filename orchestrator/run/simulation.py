@@ -73,8 +73,8 @@ class Simulation:
         self.derivative_setters: dict[str, Set] = {}
 
     def _dismiss(self) -> None:
-        for made in self.instances.values():
-            made.dismiss()
+        for instance in self.instances.values():
+            instance.dismiss()
 
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
@@ -106,16 +106,16 @@ class Simulation:
             columns = None if recorded is None else [*recorded]
             places = [] if recorded is None else [*recorded.values()]
             every = self.system.recording.every
-            made = self._results.recorder(clock.name, columns, values, places, every)
-            self.recorders[clock.name] = self._stack.enter_context(made)
+            recorder = self._results.recorder(clock.name, columns, values, places, every)
+            self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:
-                    self.instances[fmu.name].due = made.due
+                    self.instances[fmu.name].due = recorder.due
         for side in self.sides:
             sample, all_of_it = np.zeros(len(COLUMNS)), range(len(COLUMNS))
-            made = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, sample, all_of_it)
-            self.arrivals[side] = self._stack.enter_context(made)
-            made.row(0.0)  # the sample of t = 0 is there at once
+            recorder = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, sample, all_of_it)
+            self.arrivals[side] = self._stack.enter_context(recorder)
+            recorder.row(0.0)  # the sample of t = 0 is there at once
 
     def collect(self, clock: str, tick: int) -> None:
         """Take over the sample that the FMUs beside the loop have left for a tick, `late`."""

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.arrays import Matrix, Vector
 Residual = Callable[[Vector], Vector]
 
 
-class Found(NamedTuple):
+class Solution(NamedTuple):
     """The last point at which r was evaluated; error is its largest |r_i| / (1 + |w_i|)."""
 
     point: Vector
@@ -25,15 +25,15 @@ class Found(NamedTuple):
 
 
 class Solver(Protocol):
-    def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Found:
+    def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Solution:
         """Iterate from `start` until error <= tolerance or `most` points were tried. The last
         evaluation of r is at the point that is returned."""
 
 
 def error(residual: Vector, point: Vector) -> float:
     """The largest |r_i| / (1 + |w_i|); infinite where it is not finite."""
-    found = np.max(np.abs(residual) / (1.0 + np.abs(point)), initial=0.0)
-    return float(found) if np.isfinite(found) else np.inf
+    largest = np.max(np.abs(residual) / (1.0 + np.abs(point)), initial=0.0)
+    return float(largest) if np.isfinite(largest) else np.inf
 
 
 class Aitken:
@@ -45,11 +45,11 @@ class Aitken:
     def __init__(self) -> None:
         self._omega = 1.0
 
-    def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Found:
+    def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Solution:
         w, r = start, residual(start)
         for iteration in range(1, most + 1):
-            found = Found(w, r, error(r, w), iteration)
-            if found.error <= tolerance or iteration == most or np.isinf(found.error):
+            solution = Solution(w, r, error(r, w), iteration)
+            if solution.error <= tolerance or iteration == most or np.isinf(solution.error):
                 break
             scale = 1.0 + np.abs(w)
             w = w + self._omega * r
@@ -59,7 +59,7 @@ class Aitken:
                 omega = -self._omega * float((before / scale) @ change / length)
                 if np.isfinite(omega) and omega != 0.0:
                     self._omega = omega
-        return found
+        return solution
 
 
 class Newton:
@@ -79,12 +79,12 @@ class Newton:
         self.supplied: Callable[[], Matrix | None] = lambda: None
         self.jacobians = self.supplied_jacobians = 0
 
-    def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Found:
+    def solve(self, residual: Residual, start: Vector, tolerance: float, most: int) -> Solution:
         w, r = start, residual(start)
         fresh = doubted = False
         for iteration in range(1, most + 1):
-            found = Found(w, r, error(r, w), iteration)
-            if found.error <= tolerance or iteration == most or np.isinf(found.error):
+            solution = Solution(w, r, error(r, w), iteration)
+            if solution.error <= tolerance or iteration == most or np.isinf(solution.error):
                 break
             if self._jacobian is None:
                 self._jacobian = None if doubted else self.supplied()
@@ -96,17 +96,17 @@ class Newton:
             step = -np.linalg.lstsq(self._jacobian, r, rcond=None)[0]
             before, w = r, w + step
             r = residual(w)
-            if not error(r, w) <= found.error / 2:
+            if not error(r, w) <= solution.error / 2:
                 self._jacobian = None
-                if not fresh and not error(r, w) <= found.error:
-                    w, r = found.point, residual(found.point)
+                if not fresh and not error(r, w) <= solution.error:
+                    w, r = solution.point, residual(solution.point)
                 fresh = False
                 continue
             doubted = False
             weighted = step / (1.0 + np.abs(w)) ** 2
             change = np.outer(r - before - self._jacobian @ step, weighted)
             self._jacobian = self._jacobian + change / (step @ weighted)
-        return found
+        return solution
 
     def _differences(self, residual: Residual, w: Vector, r: Vector) -> Matrix:
         self.jacobians += 1

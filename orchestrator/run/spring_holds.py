@@ -87,10 +87,10 @@ def join_sides(
                 continue
             if f"{fmu}.{c.source_port}" != s.force or c.target != sets.source:
                 continue
-            found = bond(c, system, signals)
-            if not found or np.any(found.factor != 1.0) or np.any(found.offset != 0.0):
+            power = bond(c, system, signals)
+            if not power or np.any(power.factor != 1.0) or np.any(power.offset != 0.0):
                 continue
-            if list(found.moved) == signals.sources(sets):
+            if list(power.moved) == signals.sources(sets):
                 observer.tank, place = tanks[s], signals.credit(i)
                 credit = reader(signals, [place]), (observer, signals.values[place : place + 1])
                 holds[sets.name] = WithFurther(holds[sets.name], *credit)

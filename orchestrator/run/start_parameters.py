@@ -26,20 +26,20 @@ def settled(system: System) -> System:
     for fmu in system.fmus:
         new = carried.get(fmu.name, ())
         names = {scalar.name for scalar, _ in new}
-        kept = tuple(row for row in fmu.starts if row[0].name not in names)
-        fmus.append(replace(fmu, starts=kept + new))
+        others = tuple(row for row in fmu.starts if row[0].name not in names)
+        fmus.append(replace(fmu, starts=others + new))
     connections = tuple(c for c in system.connections if not c.initial)
     return replace(system, fmus=tuple(fmus), connections=connections)
 
 
 def by_port(system: System) -> dict[str, dict[str, tuple[float, ...]]]:
     """What those connections carry, by FMU and parameter. Raises FmuFault as `settled` does."""
-    found: dict[str, dict[str, tuple[float, ...]]] = {}
+    carried: dict[str, dict[str, tuple[float, ...]]] = {}
     for name, starts in _carried(system).items():
-        ports = found.setdefault(name, {})
+        ports = carried.setdefault(name, {})
         for scalar, value in starts:
             ports[scalar.port] = (*ports.get(scalar.port, ()), float(value))
-    return found
+    return carried
 
 
 def _carried(system: System) -> dict[str, Starts]:
@@ -47,12 +47,12 @@ def _carried(system: System) -> dict[str, Starts]:
     if not once:
         return {}
     signals = _initialized(system)
-    found: dict[str, Starts] = {}
+    starts: dict[str, Starts] = {}
     for c in once:
         rows = zip(c.inputs, signals.values[signals.sources(c)].tolist(), strict=True)
         taken = tuple((replace(s, conversion=SAME), _start(s, value)) for s, value in rows)
-        found[c.target] = found.get(c.target, ()) + taken
-    return found
+        starts[c.target] = starts.get(c.target, ()) + taken
+    return starts
 
 
 def _start(scalar: Scalar, value: float) -> Given:

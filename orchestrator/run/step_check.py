@@ -122,23 +122,23 @@ class StepCheck:
         return moved
 
     def _compare(self, whole: Vector, halves: Vector, time: float, end: float, weight: int) -> None:
-        found = np.zeros(len(self._names))
-        np.maximum.at(found, self.ports, np.abs(whole[self.rates] - halves[self.rates]))
-        if not np.all(np.isfinite(found)):
+        estimate = np.zeros(len(self._names))
+        np.maximum.at(estimate, self.ports, np.abs(whole[self.rates] - halves[self.rates]))
+        if not np.all(np.isfinite(estimate)):
             return
         if (k := self.count.value) == len(self.times):
             self.estimates = np.concatenate([self.estimates, np.zeros_like(self.estimates)])
             self.times, self.weights = (np.append(v, 0.0 * v) for v in (self.times, self.weights))
             self.changed()
-        self.estimates[k], self.times[k], self.weights[k] = found, time, weight
+        self.estimates[k], self.times[k], self.weights[k] = estimate, time, weight
         self.count.value, self.size.value = k + 1, max(self.size.value, end - time)
 
     def errors(self) -> StepErrors | None:
         """What was found; None before the first check."""
         if not self.count.value:
             return None
-        found = self.estimates[: self.count.value]
-        share = found / np.where(self.scales > 0, self.scales, 1.0)
+        estimates = self.estimates[: self.count.value]
+        share = estimates / np.where(self.scales > 0, self.scales, 1.0)
         k, port = np.unravel_index(int(share.argmax()), share.shape)
         return StepErrors(
             checked=len(share),

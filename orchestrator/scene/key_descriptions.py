@@ -13,7 +13,7 @@ from types import NoneType
 from typing import Any
 
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.scene.schema import annotations_at, as_written, at, measured
+from hapticlink.orchestrator.scene.schema import annotations_at, as_written, measured, types_at
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 _COUNTS = ("no", "one", "two", "three", "four")
@@ -22,7 +22,7 @@ _COUNTS = ("no", "one", "two", "three", "four")
 def vector(path: Path, data: Any) -> str:
     """The array that may be at `path` in words, `three numbers (N/m, N/m, N.m/rad)`; "" where no
     array may be."""
-    arrays = [k for k in at(path, data) if typing.get_origin(k) is tuple]
+    arrays = [k for k in types_at(path, data) if typing.get_origin(k) is tuple]
     return " or ".join(dict.fromkeys(words(k) + _beside(unit(k)) for k in arrays))
 
 

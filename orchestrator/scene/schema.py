@@ -39,7 +39,7 @@ def chosen(kinds: list[Any], table: Any) -> list[Any]:
     return [k for k in _records(kinds) if name in types(k)] or kinds
 
 
-def at(path: Path, data: Any = None) -> list[Any]:
+def types_at(path: Path, data: Any = None) -> list[Any]:
     """The types that the value at `path` may have, unions and annotations taken apart."""
     return [branch for kind in annotations_at(path, data) for branch in branches(kind)]
 
@@ -51,7 +51,7 @@ def annotations_at(path: Path, data: Any = None) -> list[Any]:
         return [Scene]
     if record := part_tables.record_of(path, data):
         return [record]
-    above, part = chosen(at(path[:-1], data), value(data, path[:-1])), path[-1]
+    above, part = chosen(types_at(path[:-1], data), value(data, path[:-1])), path[-1]
     if isinstance(part, int):
         tuples = [typing.get_args(k) for k in above if typing.get_origin(k) is tuple]
         entries = [t[0] if Ellipsis in t else t[part] for t in tuples if t[part:] or Ellipsis in t]
@@ -85,7 +85,7 @@ def measured(kind: Any, quantity: Quantity | None = None) -> Iterator[tuple[Any,
 
 def is_needed(path: Path, of: Any = None) -> bool:
     """Whether the key at `path` has no default, in the record `of` or in any."""
-    kinds = [of] if of else _records(at(path[:-1]))
+    kinds = [of] if of else _records(types_at(path[:-1]))
     return any(
         path[-1] in hints(kind) and default(kind, str(path[-1])) is MISSING for kind in kinds
     )

@@ -56,7 +56,7 @@ def _path(error: Any, data: Any) -> Path | None:
         elif error["type"] == "missing" and i == len(error["loc"]) - 1:
             path = (*path, part)
         else:
-            kinds = schema.at(path, data)
+            kinds = schema.types_at(path, data)
             names = {k.__name__ for k in schema.chosen(kinds, node)}
             if part in {k.__name__ for k in kinds} - names:
                 return None
@@ -95,12 +95,12 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
 
 def _is_kind(path: Path) -> bool:
     """Whether the record at `path` is one of several, selected by its `type`."""
-    return sum(bool(schema.types(kind)) for kind in schema.at(path)) > 1
+    return sum(bool(schema.types(kind)) for kind in schema.types_at(path)) > 1
 
 
 def _placeholder(path: Path) -> Any:
     """A value of the right type that causes no error elsewhere; None where there is none."""
-    kinds = schema.at(path)
+    kinds = schema.types_at(path)
     if float in kinds or int in kinds:
         return 1
     if str in kinds:
@@ -123,7 +123,7 @@ def _message(error: Any, path: Path, data: Any) -> str:
     if kind == "value_error":  # an unknown name of a registry
         return str(error["ctx"]["error"])
     if kind == "union_tag_invalid":
-        known = [t for k in schema.at(path[:-1]) for t in schema.types(k)]
+        known = [t for k in schema.types_at(path[:-1]) for t in schema.types(k)]
         return unknown("type", error["ctx"]["tag"], known)
     if kind in _RANGE:
         finite = "" if shown.lstrip("-") not in ("inf", "nan") else "finite "
@@ -153,7 +153,7 @@ def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     """The message for an unknown key, or for one that belongs to another `type` of the table."""
     if path in _GONE:
         return _GONE[path]
-    kinds, table, key = schema.at(path[:-1], data), value(data, path[:-1]), str(path[-1])
+    kinds, table, key = schema.types_at(path[:-1], data), value(data, path[:-1]), str(path[-1])
     types = {name: k for k in kinds for name in schema.types(k)}
     branch = loc[-2] if len(loc) > 1 else None  # without a type, pydantic tried the default's
     this = table.get("type", branch) if isinstance(table, dict) else branch

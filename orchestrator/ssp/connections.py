@@ -109,7 +109,7 @@ class Wires:
         units = self._units_along(nodes)
         relative = any(s.relative for n in nodes if (s := self.variables.get(n)))
         around = zip(lines, nodes, nodes[1:], units, units[1:], strict=False)
-        steps = [self._step(relative, *each) for each in around]
+        steps = [self._step(relative, *step) for step in around]
         for i, node in enumerate(nodes):
             if node[0] in self._systems:
                 sink_reach = Reach(*sink, units[i], _all(steps[i:]), relative)

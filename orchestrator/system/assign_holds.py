@@ -18,7 +18,7 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import annotated_ports, springs
-from hapticlink.orchestrator.system.ports import carries_power, derivative, integral, kind, names
+from hapticlink.orchestrator.system.ports import beside, carries_power, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 
@@ -129,12 +129,12 @@ def misfit(
     if c.kind == "table" and not HOLDS[hold].gives_samples:
         able = ", ".join(HOLDS.names(lambda kind: kind.gives_samples))
         return f"{c.source_port} is a table, whose rows have no values in between; take {able}"
-    if needs == "derivative" and derivative(c, fmus) is None:
+    if needs == "derivative" and not beside(c, fmus, hold):
         return (
             f"{c.source} does not put out the derivative of {c.source_port}, or does not declare "
             "it (docs/holds.md, Derivatives); take 'foh', which uses the difference of two samples"
         )
-    if needs == "integral" and integral(c, fmus) is None:
+    if needs == "integral" and not beside(c, fmus, hold):
         return (
             f"{c.source} does not put out anything of which {c.source_port} is the derivative, or "
             "does not declare it (docs/holds.md, Derivatives); take 'foh'"

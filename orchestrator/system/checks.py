@@ -44,15 +44,12 @@ def unfit(
                 message = f"{c.source}.{c.source_port} {why}; take another kind, or leave it out"
                 yield ("kinds", key), message
     yield from _refused(scene, refused, sets)
-    for name in scene.substeps:
-        if name not in by_name or by_name[name].sampled:
-            plants = ", ".join(u.name for u in by_name.values() if not u.sampled)
-            yield ("substeps", name), f"is no plant of this scene; there are {plants}"
+    plants = [u.name for u in by_name.values() if not u.sampled]
+    why = f"is no plant of this scene; there are {', '.join(plants)}"
+    yield from ((("substeps", name), why) for name in scene.substeps if name not in plants)
     for name in scene.get_after_set:
-        if name not in by_name or by_name[name].sampled:
-            plants = ", ".join(u.name for u in by_name.values() if not u.sampled)
-            message = f"{name!r} is no plant of this scene; there are {plants}"
-            yield ("get_after_set",), message
+        if name not in plants:
+            yield ("get_after_set",), f"{name!r} {why}"
     for i, p in enumerate(scene.power):
         yield from _power(scene, i, p, by_name)
     yield from springs.unfit(scene, by_name)

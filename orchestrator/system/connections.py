@@ -24,20 +24,20 @@ def connect(
     fed: dict[tuple[str, str], str] = {}
     for path, wire in wires:
         (source, output), (target, entry) = (e.split(".", 1) for e in (wire.from_, wire.to))
-        found: tuple[Scalar, ...] = ()
+        scalars: tuple[Scalar, ...] = ()
         inputs: tuple[Scalar, ...] = ()
         try:
-            found = outputs(described[source], output)
+            scalars = outputs(described[source], output)
         except ValueError as error:
             problems.append(((*path, "from"), str(error)))
         try:
             inputs = settable(described[target], entry)
         except ValueError as error:
             problems.append(((*path, "to"), str(error)))
-        if not found or not inputs:
+        if not scalars or not inputs:
             continue
         try:
-            inputs = _converted(wire, described[source], found, described[target], inputs)
+            inputs = _converted(wire, described[source], scalars, described[target], inputs)
         except ValueError as error:
             problems.append((path, str(error)))
             continue
@@ -47,7 +47,7 @@ def connect(
             problems.append(((*path, "to"), message))
             continue
         fed |= {(target, s.name): wire.from_ for s in inputs}
-        yield path, Connection(source, output, target, entry, found, inputs)
+        yield path, Connection(source, output, target, entry, scalars, inputs)
 
 
 def whole(
@@ -80,7 +80,7 @@ def _converted(
     if len(outputs) != len(inputs) or inputs[0].type == "String":
         sizes = f"{wire.from_} has {len(outputs)} numbers, {wire.to} takes {len(inputs)}"
         raise ValueError(f"{sizes}; connect their entries one by one")
-    found = []
+    converted = []
     for a, b in zip(outputs, inputs, strict=True):
         units = SAME
         if wire.convert:
@@ -91,5 +91,5 @@ def _converted(
                     f"{a.name} is in {a.unit}, {b.name} in {b.unit}: {error}; connect quantities "
                     "of one dimension, or write convert = false"
                 ) from None
-        found.append(replace(b, conversion=Linear(wire.factor, wire.offset).after(units)))
-    return tuple(found)
+        converted.append(replace(b, conversion=Linear(wire.factor, wire.offset).after(units)))
+    return tuple(converted)

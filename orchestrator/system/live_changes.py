@@ -53,12 +53,12 @@ def require_other_rate(system: System, clock: str) -> None:
 
 def choices(system: System, c: Connection) -> list[str]:
     """The holds that a run can give to a connection, its present one first."""
-    found = [c.hold or ""]
+    holds = [c.hold or ""]
     for hold in HOLDS:
         with suppress(InputFault):
             changed(system, c, hold, None)
-            found += [hold] if hold != c.hold else []
-    return found
+            holds += [hold] if hold != c.hold else []
+    return holds
 
 
 def choices_of_slower(system: System) -> dict[str, list[str]]:

@@ -29,25 +29,25 @@ def mapped(
     a port or variable that there is not, and for a number of variables that is not the port's."""
     causes = {"input": block.inputs, "output": block.outputs, "parameter": block.parameters}
     ports = {v.name: (v, cause) for cause, variables in causes.items() for v in variables}
-    found: Mapped = {}
+    renamings: Mapped = {}
     for port, names in given.items():
         if port not in ports:
             raise ValueError(unknown("port of the block", port, ports))
-        found[port] = tuple(s.name for s in _named(description, names))
-        if len(found[port]) != (size := len(_places(ports[port][0]))):
-            raise ValueError(f"{len(found[port])} variables for the {size} entries of {port}")
-        if {s.name for s in description.scalars if port in (s.name, s.port)} - {*found[port]}:
+        renamings[port] = tuple(s.name for s in _named(description, names))
+        if len(renamings[port]) != (size := len(_places(ports[port][0]))):
+            raise ValueError(f"{len(renamings[port])} variables for the {size} entries of {port}")
+        if {s.name for s in description.scalars if port in (s.name, s.port)} - {*renamings[port]}:
             raise ValueError(f"the FMU has a port {port} of its own: take {port} out of the map")
-    every = [name for names in found.values() for name in names]
+    every = [name for names in renamings.values() for name in names]
     if twice := [name for name in every if every.count(name) > 1]:
         raise ValueError(f"{twice[0]} is given twice")
     for port, (variable, cause) in ports.items():
-        taken = {name for names in found.values() for name in names}
+        taken = {name for names in renamings.values() for name in names}
         free = [s for s in description.scalars if s.causality == cause and s.name not in taken]
-        if port not in found and not description.port(port, cause):
+        if port not in renamings and not description.port(port, cause):
             own = [s for s in free if s.port not in ports]
-            found |= {port: names} if (names := _alike(variable, own)) else {}
-    return found
+            renamings |= {port: names} if (names := _alike(variable, own)) else {}
+    return renamings
 
 
 def renamed(description: Description, names: Mapped, block: Component) -> Description:
@@ -92,15 +92,15 @@ def _alike(variable: Variable, scalars: Iterable[Scalar]) -> tuple[str, ...]:
     if not variable.shape:
         names = [s.name for s in scalars if _plain(s.name) == stem]
         return tuple(names) if len(names) == 1 else ()
-    found: dict[tuple[int, ...], str] = {}
+    by_index: dict[tuple[int, ...], str] = {}
     for s in scalars:
         end = _INDEX.search(s.name)
         if end and _plain(s.name[: end.start()]) == stem:
-            found[tuple(map(int, re.split("[,_]", end[1])))] = s.name
+            by_index[tuple(map(int, re.split("[,_]", end[1])))] = s.name
     for first in (1, 0):
         places = [*product(*(range(first, first + n) for n in variable.shape))]
-        if sorted(found) == places:
-            return tuple(found[place] for place in places)
+        if sorted(by_index) == places:
+            return tuple(by_index[place] for place in places)
     return ()
 
 

@@ -46,33 +46,23 @@ def kind(c: Connection, fmus: Mapping[str, Fmu]) -> Kind | None:
     matrix."""
     source = fmus[c.source].description
     port = c.outputs[0].port
-    found = source.kinds.get(port)
+    declared = source.kinds.get(port)
     whole = len(c.outputs) == len(source.port(port, "output"))
-    return found if whole or found not in MATRICES else None
+    return declared if whole or declared not in MATRICES else None
 
 
 def turns(c: Connection, fmus: Mapping[str, Fmu]) -> dict[int, float]:
     """For each entry that is an angle, by its index, a full turn in its unit."""
     source = fmus[c.source].description
-    found = {i: turn(source.unit(s)) for i, s in enumerate(c.outputs)}
-    return {i: whole for i, whole in found.items() if whole}
+    by_entry = {i: turn(source.unit(s)) for i, s in enumerate(c.outputs)}
+    return {i: whole for i, whole in by_entry.items() if whole}
 
 
-def derivative(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...] | None:
-    """The outputs of the source that are the time derivatives of the connection's outputs; None
-    where the source does not declare them."""
-    return fmus[c.source].description.derivative(c.outputs)
-
-
-def integral(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...] | None:
-    """The outputs of the source of which the connection's outputs are the time derivatives; None
-    where the source does not declare them."""
-    return fmus[c.source].description.integral(c.outputs)
-
-
-def beside(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...]:
-    """The outputs of the source that a connection's hold reads beside the connection's own: their
-    derivatives or integrals, if it needs them."""
-    needs = HOLDS[c.hold].needs if c.hold else None
-    found = {"derivative": derivative, "integral": integral}.get(needs or "")
-    return (found(c, fmus) or ()) if found else ()
+def beside(c: Connection, fmus: Mapping[str, Fmu], hold: str | None = None) -> tuple[Scalar, ...]:
+    """The outputs of the source that `hold`, by default the connection's own, reads beside the
+    connection's outputs: their time derivatives or integrals, if it needs them; () where the source
+    does not declare them."""
+    name, source = hold or c.hold, fmus[c.source].description
+    related = {"derivative": source.derivative, "integral": source.integral}
+    find = related.get(HOLDS[name].needs or "") if name else None
+    return (find(c.outputs) or ()) if find else ()

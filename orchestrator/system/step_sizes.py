@@ -25,9 +25,9 @@ def with_sizes(fmu: Fmu, timeline: Timeline) -> Fmu:
     """A block's FMU with the step sizes of `timeline` as start values, unless it has others."""
     if fmu.description.block is None:
         return fmu
-    given, found = {s.name for s, _ in fmu.starts}, sizes(fmu.clock, timeline)
-    wanted = (s for s in fmu.description.scalars if s.causality == "parameter" and s.name in found)
-    starts = tuple((s, found[s.name]) for s in wanted if s.name not in given)
+    given, own = {s.name for s, _ in fmu.starts}, sizes(fmu.clock, timeline)
+    wanted = (s for s in fmu.description.scalars if s.causality == "parameter" and s.name in own)
+    starts = tuple((s, own[s.name]) for s in wanted if s.name not in given)
     return replace(fmu, starts=fmu.starts + starts)
 
 

@@ -34,22 +34,39 @@ def changes(
     if scene.at and scene.coupling == "iterated":
         problems.append((("at",), 'steps are repeated with coupling = "iterated": take another'))
     events = _Events(scene, {u.name: u for u in fmus}, connections, timeline, rules)
-    found: list[Change] = []
+    taken: list[Change] = []
     for i, event in enumerate(scene.at):
         for key, asked in (("set", event.set), ("override", event.override)):
             for name, value in asked.items():
-                _take(found, problems, ("at", i, key, name), events.given, event, key, name, value)
+                _take(
+                    taken,
+                    problems,
+                    ("at", i, key, name),
+                    events.given,
+                    event,
+                    key,
+                    name,
+                    value,
+                )
         for name in event.freeze:
-            _take(found, problems, ("at", i, "freeze"), events.brought, event, name, 0.0)
+            _take(taken, problems, ("at", i, "freeze"), events.brought, event, name, 0.0)
         for name, noise in event.noise.items():
-            _take(found, problems, ("at", i, "noise", name), events.brought, event, name, noise)
+            _take(
+                taken,
+                problems,
+                ("at", i, "noise", name),
+                events.brought,
+                event,
+                name,
+                noise,
+            )
         problems += ((("at", i, key), why) for key, why in _times(event))
     end = timeline.seconds(timeline.end)
-    return tuple(sorted((c for c in found if c.begin < end), key=lambda change: change.begin))
+    return tuple(sorted((c for c in taken if c.begin < end), key=lambda change: change.begin))
 
 
 def _take(
-    found: list[Change],
+    taken: list[Change],
     problems: list[Problem],
     path: Keys,
     make: Callable[..., Change],
@@ -57,7 +74,7 @@ def _take(
 ) -> None:
     """Append the change, or why there is none."""
     try:
-        found.append(make(*arguments))
+        taken.append(make(*arguments))
     except ValueError as error:
         problems.append((path, str(error)))
 
@@ -144,8 +161,8 @@ class _Events:
         if fmu not in self._fmus:
             raise ValueError(unknown("FMU", fmu, self._fmus))
         description = self._fmus[fmu].description
-        if found := description.port(port, "input", "parameter"):
-            return found
+        if scalars := description.port(port, "input", "parameter"):
+            return scalars
         every = dict.fromkeys(
             s.port for s in description.scalars if s.causality in ("input", "parameter")
         )

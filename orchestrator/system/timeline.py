@@ -76,11 +76,11 @@ def _changed(
             message = f"{rate!r}: give a rate (Hz) from 0.001 to that of the haptics, {1 / least}"
             raise SceneFault(scene.title, [scene.place(where, message)])
         period = 1 / (exact(rate) * base)  # type: ignore[arg-type]
-        kept = starts[: bisect_left(starts, exact(event.time) / base) + 1]
-        begin = kept[-1]
+        before = starts[: bisect_left(starts, exact(event.time) / base) + 1]
+        begin = before[-1]
         count = max(math.ceil((end - begin) / period), 0) + 3
         later = (math.ceil((begin + k * period) / a_tick) * a_tick for k in range(1, count))
-        starts = (*kept, *later)
+        starts = (*before, *later)
     return starts
 
 

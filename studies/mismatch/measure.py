@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hapticlink.analysis.maps import run_checks
-from hapticlink.analysis.stability.loaded_variants import LoadedVariants
+from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep import row as sweep_row
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene
@@ -52,7 +52,7 @@ def at_rest(experiment: Experiment) -> Row:
     scene = experiment.scene
     assert scene.linkage is not None
     target = f"hand.target={[[0.0, *map(float, _first(experiment))]]}"
-    with LoadedVariants(scene) as session:
+    with SceneVariants(scene) as session:
         found = session.judge([target])
     joint = scene.linkage.joint[0].name
     kicked = open_scene.load(scene, [target, f"linkage.start_velocity.{joint}={KICK}"])

@@ -120,7 +120,10 @@ def test_signals_go_by_name_each_with_its_times(short: hl.Run) -> None:
 def test_print_gives_the_lines_of_the_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert status("run", "closed-loop", *sets(["duration=0.1"]), "--out", tmp_path) == 0
+    assert (
+        status("run", "closed-loop", *sets(["duration=0.1"]), "--no-figures", "--out", tmp_path)
+        == 0
+    )
     name, said = capsys.readouterr().out.partition(":")[::2]
     found = hl.load(tmp_path)
     assert name == "closed-loop"
@@ -199,7 +202,7 @@ def test_without_pandas_a_frame_says_what_to_install(
 
 def test_a_fault_of_the_run_is_told_with_its_results(bar: Path, tmp_path: Path) -> None:
     for out in (None, tmp_path):
-        lost = hl.run(bar, FAR, out=out)
+        lost = hl.run(bar, FAR, out=out, figures=False)
         assert lost.fault is not None
         assert lost.fault.startswith("virtual_mechanism: ")
         assert lost.fault in repr(lost)
@@ -222,7 +225,7 @@ def test_a_fault_before_the_first_step_has_no_samples() -> None:
 
 
 def test_what_a_killed_run_has_written_can_be_looked_at(bar: Path, tmp_path: Path) -> None:
-    whole = hl.run(bar, out=tmp_path)
+    whole = hl.run(bar, out=tmp_path, figures=False)
     run = tmp_path / "run.json"
     begin, _, _ = run.read_text().partition('  "end": {')
     run.write_text(begin + '  "end": {"reason": "running"}\n}\n')
@@ -239,7 +242,7 @@ def test_a_folder_without_a_run_is_refused(bar: Path, tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text("{}")
     with pytest.raises(hl.InputFault, match=r"run\.json: scene: field required: run the"):
         hl.load(tmp_path)
-    hl.run(bar, out=tmp_path)
+    hl.run(bar, out=tmp_path, figures=False)
     (tmp_path / "haptics.csv").unlink()
     with pytest.raises(hl.InputFault, match=r"haptics\.csv"):
         hl.load(tmp_path)
@@ -286,14 +289,17 @@ def test_what_a_run_warns_of_stands_in_run_json(tmp_path: Path, kept: bool) -> N
     """A pulled graphics copy at 10 Hz folds; one that follows exactly does not."""
     options = {"graphics.rate": 10, "duration": 2.0}
     out = tmp_path if kept else None
-    pulled = hl.run("closed-loop", {**options, "graphics.sync": "operational"}, out=out)
+    pulled = hl.run(
+        "closed-loop", {**options, "graphics.sync": "operational"}, out=out, figures=False
+    )
     (warning,) = pulled.run["warnings"]
     off = int((pulled["virtual_environment.branch_ok"] == 0).sum())
     assert off > 0
     assert warning.startswith(f"warning: the graphics copy was folded in {off} of ")
     if kept:
         assert hl.load(tmp_path).run["warnings"] == [warning]
-    assert hl.run("closed-loop", options, out=out).run["warnings"] == []
+    plain = hl.run("closed-loop", options, out=out, figures=False)
+    assert plain.run["warnings"] == []
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")

@@ -138,8 +138,9 @@ class Attack:
         if run["end"]["reason"] == "running":
             yield "run.json has no end"
             return
-        printed = "Bad file descriptor" not in said  # of an FMU that has closed the output
-        if (status == 0) != (run["end"]["reason"] == "duration") and not crash and printed:
+        # By an FMU that has closed the output, or one that interrupts after the run has ended.
+        late = "Bad file descriptor" in said or "not all of its figures" in said
+        if (status == 0) != (run["end"]["reason"] == "duration") and not crash and not late:
             yield f"run.json says {run['end']['reason']}"
         times = tables.load(self.out).haptics["time"]
         if len(times) and abs(times[-1] - run["end"]["time"]) > 1e-12:

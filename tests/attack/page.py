@@ -20,8 +20,8 @@ from typing import Any
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.visualization.live import messages
-from hapticlink.visualization.live.session import Session
+from hapticlink.visualization.served import messages
+from hapticlink.visualization.served.session import Session
 from tests.attack.cases import Made, command
 
 ASKED = {"resets": 10, "holds": 100, "anything": 50}

@@ -24,7 +24,7 @@ def test_every_call_returns(
     assert counts == {"returned": 2000}, capsys.readouterr().err
 
 
-BEYOND = ("vr[i] >= REALS", "vr[i] > REALS")
+BEYOND = ("is_unknown(m, vr[i], REALS)", "is_unknown(m, vr[i], REALS + 1)")
 SHORT = ("size < sizeof(State)", "size < 8")
 
 

@@ -12,6 +12,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.commands import completion, options
+from tests.plugins import hapticlink
 from tests.shared_fixtures import status
 
 
@@ -126,8 +127,7 @@ def test_the_doctor_builds_and_runs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("command", ["run", "sweep", "stability"])
-def test_help_has_examples(command: str) -> None:
-    called = [sys.executable, "-m", "hapticlink", command, "--help"]
-    told = subprocess.run(called, capture_output=True, text=True, check=True).stdout
+def test_help_has_examples(command: str, tmp_path: Path) -> None:
+    told = hapticlink(tmp_path, f"hapticlink {command} --help")[0].said
     assert f"hapticlink {command} " in told.partition("For example:")[2]
     assert "\x1b" not in told  # no colours where it is no terminal

@@ -13,7 +13,7 @@ from hapticlink.commands import scene_reference
 from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.scene import (
     find_scene,
-    load_scene,
+    read_and_check,
 )
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.shared_fixtures import status
@@ -53,7 +53,7 @@ def test_every_way_to_write_a_key_follows_it(more: str) -> None:
     text = f"{more}\n{text.replace('[graphics]', '')}" if "graphics" in more else f"{more}\n{text}"
     if more.startswith("controller"):
         text = text.replace("[controller]\n", "")
-    load_scene.read(text)
+    read_and_check.read(text)
     SCHEMA.validate(tomllib.loads(text))
 
 

@@ -26,7 +26,7 @@ def test_a_start_outside_is_told_by_info_and_by_a_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert OUTSIDE in list(lines(Device(), (0.22, 0.0, 0.0)))[-1]
-    assert status("run", "single-body", "--out", tmp_path, *FAR) == 0
+    assert status("run", "single-body", "--no-figures", "--out", tmp_path, *FAR) == 0
     assert OUTSIDE in capsys.readouterr().out
 
 

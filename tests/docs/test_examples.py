@@ -27,7 +27,9 @@ from tests.plugins import hapticlink
 
 ELSEWHERE = {"docs/extending.md", "docs/api.md"}
 WITH_EXAMPLES = [p for p in PAGES if name(p) not in ELSEWHERE and [*blocks(p, "sh", "python")]]
-SHORTER = {"hapticlink sweep": 0.02} | {f"hapticlink run {name}": 0.2 for name in hl.shipped()}
+SHORTER = {"hapticlink sweep": 0.02} | {
+    f"hapticlink run {name}": 0.2 for name in (*hl.shipped(), "watt.toml")
+}
 """Duration (s) of commands that take longer than their page needs."""
 NOT_RUN = {
     "hapticlink sweep closed-loop --set controller.bias=full --vary graphics.rate=10..60..5 "
@@ -58,9 +60,13 @@ NOT_RUN = {
     "hapticlink bench master": "is long, and measures the machine",
     "hapticlink bench real-time": "takes a minute, and measures the machine",
     "hapticlink bench stress": "is long; its short form: tests/reference/test_stress.py",
+    "hapticlink fit shaken.csv": "of a log of one's own; tests/analysis/fit",
     "hapticlink report runs/closed-loop": "of a run that is shorter here, elsewhere; replay.md",
     "hapticlink compare runs/closed-loop "
     "runs/closed-loop,graphics.rate=10,controller.topology=false": "as its runs; replay.md",
+    "hapticlink stability held.toml --equilibrium "
+    "--set 'controller.teleoperation.stiffness=[500.0, 500.0, 0.5]'":
+        "as the one above it on its page",
     "hapticlink bench one": "takes minutes, and measures the machine",
     "hapticlink bench standalone": "takes minutes, and measures the machine",
     "hapticlink bench view": "takes a minute, and measures the machine",
@@ -73,7 +79,7 @@ NOT_RUN = {
 }  # fmt: skip
 """Commands that are parsed, with their scene, keys and values, but not run; the reason."""
 UNTIL_STOPPED = re.compile("hapticlink view (?!.*--export)")
-"""Commands that run until Ctrl-C, parsed but not run; tests/visualization/live."""
+"""Commands that run until Ctrl-C, parsed but not run; tests/visualization/served."""
 TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""
 
@@ -86,7 +92,24 @@ def shown(command: str, folder: Path) -> str:
     return command + next(limits, "") + " --no-figures" * (again and "--no-fig" not in command)
 
 
-def failures(folder: Path, block: Block) -> dict[str, str]:
+def first_pages() -> dict[str, Path]:
+    """Each command without files of a page, with the first page that has it, where it is run."""
+    alone = re.compile(
+        rf"hapticlink (doctor|schema|\w+ ({'|'.join(hl.shipped())}))( (?!.*--out)|$)"
+    )
+    return {
+        command: page
+        for page in reversed(WITH_EXAMPLES)
+        for block in blocks(page, "sh")
+        for command in block.commands
+        if alone.match(command)
+    }
+
+
+FIRST_PAGES = first_pages()
+
+
+def failures(folder: Path, page: Path, block: Block) -> dict[str, str]:
     """Executes a block in `folder`; what each of its commands that failed has printed."""
     if block.title:
         (folder / block.title).write_text(block.text, encoding="utf-8")
@@ -97,6 +120,8 @@ def failures(folder: Path, block: Block) -> dict[str, str]:
     for command in block.commands:
         words = shlex.split(command)
         if command in NOT_RUN or UNTIL_STOPPED.match(command):
+            continue
+        if FIRST_PAGES.get(command, page) != page:
             continue
         if words[0] == "hapticlink":
             (ended,) = hapticlink(folder, shown(command, folder))
@@ -119,7 +144,7 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     failed: dict[str, str] = {}
     for block in blocks(page, "toml", "python", "sh"):
         if block.title or block.language != "toml":
-            failed |= failures(tmp_path, block)
+            failed |= failures(tmp_path, page, block)
     assert failed == {}
 
 

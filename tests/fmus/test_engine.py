@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.fmus import engine
 from hapticlink.fmus.blocks import build_block, component
 from hapticlink.fmus.check import check_fmu
+from hapticlink.fmus.engine import mujoco_fmu
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.blocks import blocks
+from tests.shared_fixtures import run_once
 
 mujoco = pytest.importorskip("mujoco", reason="needs MuJoCo: pip install hapticlink[engine]")
 from hapticlink.fmus.engine import mujoco_functions  # noqa: E402 - it imports mujoco
@@ -29,7 +30,7 @@ def both(scene, block, folder, *options):
     loaded = open_scene.load(scene, options)
     plan = next(b for b in blocks(loaded).loop if b.name == block)
     ours = component(plan.block, plan.settings)
-    files = engine.entries(ours, plan.settings, stop_time=1.0, step_size=1 / 512)
+    files = mujoco_fmu.entries(ours, plan.settings, stop_time=1.0, step_size=1 / 512)
     for name in ("model.xml", "engine.json"):
         (folder / name).write_bytes(files[f"resources/{name}"])
     return ours, mujoco_functions.Engine(str(folder)), json.loads(files["resources/engine.json"])
@@ -95,28 +96,28 @@ def difference(one, two, name):
     return np.abs(a - b).max()
 
 
-def test_a_placed_copy_gives_the_same_loop(tmp_path):
-    ours = hl.run("closed-loop", ["duration=0.5"], out=tmp_path / "ours")
-    theirs = hl.run("closed-loop", ["duration=0.5", by("virtual_environment")], out=tmp_path / "b")
+def test_a_placed_copy_gives_the_same_loop():
+    ours = run_once("closed-loop", ["duration=0.5"])
+    theirs = hl.run("closed-loop", ["duration=0.5", by("virtual_environment")])
     assert not any(theirs.run["replaced"]["virtual_environment"].values())
     for name in ("virtual_mechanism.x[1]", "haptic_device.x[3]", "controller.F_motor[2]"):
         assert difference(ours, theirs, name) < 1e-11
 
 
-def test_a_pulled_copy_follows_as_ours_does(tmp_path):
+def test_a_pulled_copy_follows_as_ours_does():
     """Both take the pull with x and v at the end of a substep."""
     options = ["duration=0.5", "graphics.sync=operational"]
-    ours = hl.run("closed-loop", options, out=tmp_path / "ours")
-    placed = hl.run("closed-loop", ["duration=0.5"], out=tmp_path / "placed")
-    theirs = hl.run("closed-loop", [*options, by("virtual_environment")], out=tmp_path / "theirs")
+    ours = hl.run("closed-loop", options)
+    placed = run_once("closed-loop", ["duration=0.5"])
+    theirs = hl.run("closed-loop", [*options, by("virtual_environment")])
     name = "haptic_device.x[1]"
     assert 0 < difference(ours, theirs, name) < 1e-4
     assert difference(ours, theirs, name) < 0.2 * difference(ours, placed, name)
 
 
-def test_a_mechanism_moves_as_ours_does(tmp_path):
-    ours = hl.run("closed-loop", ["duration=0.5"], out=tmp_path / "ours")
-    theirs = hl.run("closed-loop", ["duration=0.5", by("virtual_mechanism")], out=tmp_path / "b")
+def test_a_mechanism_moves_as_ours_does():
+    ours = run_once("closed-loop", ["duration=0.5"])
+    theirs = hl.run("closed-loop", ["duration=0.5", by("virtual_mechanism")])
     for i in (1, 2):
         assert 0 < difference(ours, theirs, f"virtual_mechanism.x[{i}]") < 1e-5
 
@@ -148,7 +149,7 @@ def test_a_disc_bounces_as_its_spring_and_damper_say(tmp_path):
     """Rebound of m x'' + b x' + k x = 0 that lets go where its force is 0."""
     path = tmp_path / "bounce.toml"
     path.write_text(BOUNCE)
-    found = hl.run(path, [by("virtual_mechanism")], out=tmp_path / "run").haptics
+    found = hl.run(path, [by("virtual_mechanism")]).haptics
     m, k, b = 0.2, 3000.0, 10.0
     delta = b / 2 / m
     omega = math.sqrt(k / m - delta**2)
@@ -174,19 +175,19 @@ def test_the_fmu_keeps_the_contract_of_our_fmus(tmp_path):
         ("closed-loop", "controller", [], "virtual_mechanism and virtual_environment"),
     ],
 )
-def test_what_it_does_not_hold_is_refused_with_the_remedy(scene, block, options, why, tmp_path):
+def test_what_it_does_not_hold_is_refused_with_the_remedy(scene, block, options, why):
     with pytest.raises(InputFault, match=why):
-        hl.run(scene, [*options, by(block)], out=tmp_path)
+        hl.run(scene, [*options, by(block)])
 
 
-def test_without_mujoco_it_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr(engine, "find_spec", lambda name: None)
+def test_without_mujoco_it_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(mujoco_fmu, "find_spec", lambda name: None)
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")
     with pytest.raises(InputFault, match=r"hapticlink\[engine\]"):
-        hl.run("closed-loop", [by("virtual_environment")], out=tmp_path)
+        hl.run("closed-loop", [by("virtual_environment")])
 
 
-def test_a_motion_that_diverges_ends_the_run_with_its_cause(tmp_path):
+def test_a_motion_that_diverges_ends_the_run_with_its_cause():
     huge = 'hand={type="constant", wrench=[1e14, 0.0, 0.0]}'
-    found = hl.run("five-bar", [huge, by("virtual_mechanism")], out=tmp_path)
+    found = hl.run("five-bar", [huge, by("virtual_mechanism")])
     assert "MuJoCo finds a huge or undefined" in found.run["fault"]["message"]

@@ -13,3 +13,8 @@ def crash_monitor_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     crashes. The tests of run/test_faults.py and run/test_interrupt.py, which have it, replace
     this fixture."""
     monkeypatch.setattr(crash_monitor, "watched", lambda folder: nullcontext())
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _fmus_stay_unpacked(fmus_unpacked_once: None) -> None:
+    """From one run to the next."""

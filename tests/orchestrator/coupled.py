@@ -18,7 +18,7 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
-from hapticlink.orchestrator.run.event_loop import Outcome, run
+from hapticlink.orchestrator.run.execute_plan import Outcome, run
 from hapticlink.orchestrator.scene.records import Iteration, PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Coupling, EnergyPorts, Fmu, System

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from itertools import islice
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from hapticlink.analysis.findings import summary
@@ -27,6 +26,8 @@ FAULTS = ("fault", "warnings", "holds generate more than is put in")
 """Rows that are shown as bad where they say anything."""
 NUMBERS = 3
 """Of a run in its opening."""
+WIDE = 8.0
+"""Width (in) above which a figure takes the whole width of the page."""
 FINE = ("none", "no", numbers.NONE)
 
 
@@ -119,8 +120,8 @@ def _figures(runs: Mapping[str, Results]) -> Iterator[str]:
     for name, run in runs.items():
         if mechanism := of_a_run.drawings(run).get("mechanism"):
             drawn = mechanism()
-            title = f"{name}: {drawn.axes[0].get_title()}"
-            drawn.axes[0].set_title(plain(fill(title, 70)), fontsize="medium")
+            title = drawn.axes[0].title
+            title.set_text(f"{plain(name)}: {title.get_text()}")
             yield _picture(f"mechanism, {name}", drawn)
 
 
@@ -129,7 +130,8 @@ def _picture(name: str, figure: Figure) -> str:
     kept: dict[str, Any] = {"metadata": {"Software": None}}  # the same bytes every time
     figure.savefig(file, format="png", dpi=110, **kept)
     data = base64.b64encode(file.getvalue()).decode()
-    return f'<figure><img alt="{escape(name)}" src="data:image/png;base64,{data}"></figure>'
+    wide = ' class="wide"' if figure.get_figwidth() > WIDE else ""
+    return f'<figure{wide}><img alt="{escape(name)}" src="data:image/png;base64,{data}"></figure>'
 
 
 def _again(runs: Mapping[str, Results]) -> Iterator[str]:

@@ -6,21 +6,19 @@ from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from hapticlink.analysis.stability.workspace_verdict import WorkspaceStability
+from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.visualization.figure_axes import plain
 
 COLOURS = {"stable": "tab:green", "marginal": "0.6", "unstable": "tab:red", "drift": "tab:orange"}
 
 
-def draw(found: WorkspaceStability) -> Figure:
+def draw(found: Stability) -> Figure:
     """A table of growth rates, hands by poses, coloured by the verdict of each."""
     poses = list(dict.fromkeys(case.pose for case in found.cases))
     hands = list(dict.fromkeys(case.hand for case in found.cases))
     figure = Figure(figsize=(3.2 + 1.5 * len(poses), 1.6 + 0.36 * len(hands)), layout="constrained")
-    FigureCanvasAgg(figure)
     axes: Axes = figure.subplots()
     for case in found.cases:
         said = "drift" if case.drifts else case.verdict

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from textwrap import fill
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from hapticlink.analysis.transparency import FORCE, HERTZ, Transparency
@@ -20,7 +19,6 @@ def draw(found: Sequence[Transparency]) -> Figure:
     stiff = [c.stiffness for pose in found for c in pose.constrained]
     shown = any(np.isfinite(k).any() for k in stiff)
     figure = Figure(figsize=(4.2 * (2 + shown), 3.8), layout="constrained")
-    FigureCanvasAgg(figure)
     felt, error, *third = figure.subplots(1, 2 + shown)
     for i, pose in enumerate(found):
         for j, direction in enumerate(pose.free):

@@ -6,7 +6,6 @@ from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from hapticlink.analysis.tune.felt_stiffness import HERTZ
@@ -20,7 +19,6 @@ NAMES = {"scene": "the scene's gains", "tuned": "tuned"}
 def draw(tuned: Tuned) -> Figure:
     """Bars of the felt stiffnesses and of the margins."""
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
     _felt(left, tuned)
     _margins(right, tuned)

@@ -117,7 +117,7 @@ def marks(
         *_slides(linkage),
         *_springs(linkage),
         *(m for i, b in enumerate(linkage.body) for m in _body(linkage, b, BODIES[i % 6])),
-        *outlined(linkage, "ghost", "#333333aa", "as the graphics block has it"),
+        *outlined(linkage, "ghost", "#333333aa", "graphics copy"),
         *outlined(linkage, "ghost", KINDS["folded"][0], when="folded"),
         *_joints(linkage),
         *_points(linkage),
@@ -302,14 +302,15 @@ def _forces(linkage: Linkage, users: Sequence[str]) -> Iterator[Mark]:
     for name, (meaning, color, where) in FORCES.items():
         for user in users:
             at, vector = (Place((*_of(user), where)),), (*_of(user), name)
-            yield _arrow("force", at, color, f"force, {meaning}", vector)
+            yield arrow("force", at, color, f"force, {meaning}", vector)
     for i, loop in enumerate(linkage.loop):
         at = (_on(loop.bodies[0], loop.at[0]),)
-        yield _arrow("cut", at, "#228833", "force, in the cut joints", ("cut", i))
+        yield arrow("cut", at, "#228833", "force, in the cut joints", ("cut", i))
 
 
-def _arrow(role: str, at: tuple[Place, ...], color: str, said: str, vector: Path) -> Mark:
-    return Mark(role, "arrow", at, color, color, 2.2, (), said, size=PER_NEWTON, vector=vector)
+def arrow(role: str, at: tuple[Place, ...], color: str, label: str, vector: Path) -> Mark:
+    """A force at a place."""
+    return Mark(role, "arrow", at, color, color, 2.2, (), label, size=PER_NEWTON, vector=vector)
 
 
 def obstacles(contacts: Contacts | None) -> Iterator[Mark]:

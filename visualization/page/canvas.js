@@ -12,12 +12,12 @@ export function fitted(canvas) {
   return { context, width, height };
 }
 
-// Magnitudes that nobody feels: charts do not magnify less, and of less than a hundredth numbers show 0.
+// Magnitudes that nobody feels: charts do not magnify less, and numbers below a fiftieth of it show 0.
 export const FELT = { mm: 1, N: 0.5, mJ: 1, m: 1e-9, count: 2 };
 
 // A number with its unit, in three digits; a count, without a unit, as it is.
 export function text(value, unit) {
-  const size = Math.abs(value) < (FELT[unit] ?? 0) / 100 ? 0 : Math.abs(value);
+  const size = Math.abs(value) < (FELT[unit] ?? 0) / 50 ? 0 : Math.abs(value);
   if (unit === "count" || !size) return unit === "count" ? String(value) : `0 ${unit}`;
   if (unit === "1") return value.toFixed(2);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
@@ -26,6 +26,8 @@ export function text(value, unit) {
 
 // A colour of the page, which differs in the dark.
 export const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
+
+export const SECOND = "#dd6600"; // of the second of two runs in one picture
 
 // Colours of marks and curves in the dark: greys change places, hues are lighter.
 const DARK = {

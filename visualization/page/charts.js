@@ -163,7 +163,7 @@ function line(context, color, points) {
 // A number at an axis, in two digits.
 function tick(v) {
   const size = Math.abs(v);
-  return size >= 1e4 || (size && size < 1e-2) ? v.toExponential(1).replace(".0e", "e") : +v.toPrecision(2);
+  return size >= 1e4 || (size && size < 1e-2) ? v.toExponential(1).replace(".0e", "e").replace("e+", "e") : +v.toPrecision(2);
 }
 
 // Round limits of an axis that has 0 and all values, at least of a length.

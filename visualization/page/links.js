@@ -1,4 +1,6 @@
 // Settings in the address of a page: #graphics.rate=10&hold=passive. Those of a second run begin with "b.".
+import { changes } from "./changes.js";
+
 const number = (text) => {
   const value = Number(text);
   if (text.trim() === "" || !Number.isFinite(value)) throw new Error(`${text} is no number`);
@@ -41,22 +43,16 @@ function messagesOf(key, text, { rate, holds, gains, topology }) {
   return [];
 }
 
-// What an address says of controls that are not as at the `start`.
+// What an address says of controls that are not as at the `start`; one key where all connections have the same.
 export function differing(controls, start) {
-  const found = [];
-  if (controls.rate && controls.rate.value !== start.rate.value) found.push(["graphics.rate", controls.rate.value]);
-  if (controls.rate && controls.rate.jitter !== start.rate.jitter) found.push(["jitter", controls.rate.jitter]);
-  if (controls.topology !== start.topology) found.push(["controller.topology", controls.topology]);
-  for (const what of ["hold", "delay"]) {
-    const other = controls.holds.filter((hold, i) => hold[what] !== start.holds[i][what]);
-    const alike = other.length === controls.holds.length && new Set(other.map((hold) => hold[what])).size === 1;
-    if (alike) found.push([what, other[0][what]]);
-    else found.push(...other.map((hold) => [`${what}s.${hold.connection}`, hold[what]]));
-  }
-  controls.gains.forEach(({ name, factor }, i) => {
-    if (factor !== start.gains[i].factor) found.push([`gains.${name}`, +factor.toPrecision(3)]);
-  });
-  return found;
+  const every = changes(controls, start), count = controls.holds.length;
+  const pairs = (type) => every.filter(({ message }) => message.type === type).map(({ key, value }) => [key, value]);
+  const merged = (type) => {
+    const found = pairs(type), [first] = found;
+    return found.length === count && found.every(([, value]) => value === first[1]) ? found.slice(0, 1).map(([, value]) => [type, value]) : found;
+  };
+  const gains = pairs("gain").map(([key, factor]) => [key, +factor.toPrecision(3)]);
+  return [...pairs("rate"), ...pairs("jitter"), ...pairs("topology"), ...merged("hold"), ...merged("delay"), ...gains];
 }
 
 // As the part of an address behind "#".

@@ -1,4 +1,5 @@
 // The page: messages from and to the run, the buttons, and who draws what.
+import { SECOND } from "./canvas.js";
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
 import { Ending } from "./ending.js";
@@ -21,7 +22,6 @@ const stage = new Stage($("scene"), $("legend"), (at, user) => {
 const ending = new Ending($("ended"), () => act("reset"));
 const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), send);
-const SECOND = "#dd6600"; // of run B, where two settings are compared
 const view = { frame: null, levels: [], state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
 let refusedUntil = 0, energies = [], sound = null;

@@ -1,21 +1,10 @@
 // Settings of a scene that show something, each with what it changes; and all settings as at the start.
+import { changes } from "./changes.js";
+
 const BUZZ_RATE = 18, STIFF = 5; // Hz, and the factor of the coupling's damping
 
 // The messages that set all controls as they were at the `start`.
-export function restored(controls, start) {
-  const messages = [];
-  if (start.rate?.value && controls.rate.value !== start.rate.value) messages.push({ type: "rate", value: start.rate.value });
-  if (start.rate && controls.rate.jitter !== start.rate.jitter) messages.push({ type: "jitter", value: start.rate.jitter });
-  if (start.topology !== controls.topology) messages.push({ type: "topology", on: start.topology });
-  start.holds.forEach(({ connection, hold, delay }, i) => {
-    if (controls.holds[i].hold !== hold) messages.push({ type: "hold", connection, hold });
-    if (controls.holds[i].delay !== delay) messages.push({ type: "delay", connection, value: delay });
-  });
-  start.gains.forEach(({ name, factor }, i) => {
-    if (controls.gains[i].factor !== factor) messages.push({ type: "gain", name, factor });
-  });
-  return messages;
-}
+export const restored = (controls, start) => changes(start, controls).map(({ message }) => message);
 
 // Name, what it changes, and the messages of each preset, to be sent after those of `restored`.
 export function presets({ rate, holds, gains }) {

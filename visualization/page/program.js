@@ -40,7 +40,7 @@ export class Program {
 
   run(ticks = 1) { this.require(this.c.run(this.m, ticks)); }
 
-  // --- what is changed: as visualization/live/controls.py does it --------------------------------
+  // --- what is changed: as visualization/served/controls.py does it --------------------------------
 
   apply(message) {
     const { changed } = this;

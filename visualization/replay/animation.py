@@ -32,7 +32,7 @@ WIDTH, DPI = 4.6, 80
 title and the legend."""
 TEXT = (0.6, 0.35)
 LEGEND = (
-    "dashed: the linkage as the graphics block has it; dotted: from the handle (circle) to the "
+    "dashed: the graphics copy of the linkage; dotted: from the handle (circle) to the "
     "point that it should be at (cross); arrow: force of the hand"
 )
 ARROW = 60.0

@@ -25,7 +25,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import JOINT_COORDINATES, POINT_POSE
 from hapticlink.orchestrator.results.scene_part import by_user, scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector, load
-from hapticlink.visualization.frame_signals import shown, shown_of_user
+from hapticlink.visualization.mechanism.frame_signals import candidates
 from hapticlink.visualization.mechanism.picture import PORT, Picture
 
 PLACES = ("q", "x", "handle")
@@ -146,9 +146,9 @@ def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
     scene has them. A signal that stands in for another one does so only where there is no other."""
     left_out = results.record.not_recorded
     signals, missing = dict[str, str](), list[str]()
-    asked = shown()
+    asked = candidates()
     for user in further_users(results):
-        asked |= {f"{user}.{key}": names for key, names in shown_of_user(user).items()}
+        asked |= {f"{user}.{key}": names for key, names in candidates(user).items()}
     for key, names in asked.items():
         for name in names:
             if name in left_out:

@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.named_runs import names
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
-from hapticlink.visualization.replay import one_file
+from hapticlink.visualization.page import one_file
 from hapticlink.visualization.replay.recorded_frames import Recorded
 
 WRITTEN = (".html", ".gif", ".webp", ".png")

@@ -8,17 +8,21 @@ from typing import Any
 
 import casadi as ca
 
-from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.orchestrator.base.loop_names import MECHANISM_ENERGY
 from hapticlink.orchestrator.results.scene_part import by_user
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolved import Resolved
-from hapticlink.visualization.frame_signals import shown, shown_of_user
-from hapticlink.visualization.live.controls import Offered, Settings, stiffness, target, users
-from hapticlink.visualization.live.frames import power, there
-from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
-from hapticlink.visualization.mechanism.picture import PORT, RAW, Part, Picture
+from hapticlink.visualization.interactive import scene_message
+from hapticlink.visualization.interactive.offered_controls import (
+    Offered,
+    Settings,
+    stiffness,
+    target,
+    users,
+)
+from hapticlink.visualization.mechanism.frame_signals import outputs
+from hapticlink.visualization.mechanism.picture import RAW, Part, Picture
 
 Places = Mapping[str, Mapping[str, Sequence[int]]]
 """By user and name in a frame, the indices of its signal in the vector of signals."""
@@ -34,7 +38,6 @@ class Description:
         places, offered = _places(program), Offered(scene, system)
         parts = [p for p in picture.parts if {*p.needs} <= {*places.get(p.user, {})}]
         self.drawing = _drawing(parts, places)
-        timeline = system.timeline
         if program.changes.clock < 0:
             offered.rate = None
         references: dict[str, list[int]] = {}
@@ -42,24 +45,15 @@ class Description:
             references.setdefault(port.name.partition("[")[0], []).append(reference)
         self.parameters = {name: value.tolist() for name, (value, _) in offered.gains.items()}
         """The gains with which the page begins, with all hands pulling where the handles are."""
-        for user, found in places.items():
-            handle = [float(program.start_values[place]) for place in found["handle"]]
+        for user, signals in places.items():
+            handle = [float(program.start_values[place]) for place in signals["handle"]]
             self.parameters[target(user)] = handle
         hands = {u: {"stiffness": stiffness(u), "target": target(u)} for u in users(scene)}
         chosen = [*offered.gains, *(hand["target"] for hand in hands.values())]
         self.data: dict[str, Any] = {
             "name": name,
-            "scene": {
-                "title": scene.title,
-                "marks": [mark._asdict() for mark in picture.marks],
-                "users": [*users(scene)],
-                "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
-                "power": power(system, program.meters),
-                "shapes": SHAPES,
-                "kinds": KINDS,
-                "port": PORT,
-                "noticeable": NOTICEABLE_J,
-            },
+            "scene": scene_message.running(scene, system, program.meters)
+            | scene_message.drawn(picture),
             "controls": offered.described(Settings()),
             "topology": offered.topology,
             "hands": hands,
@@ -68,9 +62,9 @@ class Description:
                 {"connection": c.connection, "hold": c.hold} for c in program.changes.choices
             ],
             "signals": [
-                {"user": user, "name": key, "places": [*at]}
-                for user, found in places.items()
-                for key, at in found.items()
+                {"user": user, "name": key, "places": [*indices]}
+                for user, signals in places.items()
+                for key, indices in signals.items()
                 if key not in RAW
             ],
             "parts": [*_laid_out(parts)],
@@ -84,14 +78,13 @@ class Description:
 def _places(program: Resolved) -> Places:
     """The signals that frames of a scene show."""
     fmus, signals = program.system.fmu, program.simulation.signals
-    found = {}
+    by_user = {}
     for user in users(program.scene):
-        asked = there(fmus, shown_of_user(user) if user else shown())
-        found[user] = {
+        by_user[user] = {
             key: signals.port(fmus[output.partition(".")[0]], output.partition(".")[2])
-            for key, output in asked.items()
+            for key, output in outputs(fmus, user).items()
         }
-    return found
+    return by_user
 
 
 def _drawing(parts: Sequence[Part], places: Places) -> Drawing:
@@ -117,14 +110,14 @@ def _drawing(parts: Sequence[Part], places: Places) -> Drawing:
 
 def _laid_out(parts: Sequence[Part]) -> Iterator[dict[str, Any]]:
     """Where the results of the parts are among the numbers that are drawn."""
-    at = 0
+    offset = 0
     for part in parts:
         rows, columns = part.function.size_out(0)
         yield {
-            "user": part.user, "gives": part.gives, "at": at, "rows": rows, "columns": columns,
+            "user": part.user, "gives": part.gives, "at": offset, "rows": rows, "columns": columns,
             "names": [*part.names], "sparse": part.sparse, "is_state": part.is_state,
         }  # fmt: skip
-        at += rows * columns
+        offset += rows * columns
 
 
 def _columns(program: Resolved, clock: str) -> list[str]:

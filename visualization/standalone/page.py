@@ -18,9 +18,9 @@ from hapticlink.programs.build import components
 from hapticlink.programs.page_program import webassembly, webassembly_files
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolved import resolved
-from hapticlink.visualization.live.controls import Settings
-from hapticlink.visualization.live.prediction import predicted
-from hapticlink.visualization.replay import one_file
+from hapticlink.visualization.interactive.offered_controls import Settings
+from hapticlink.visualization.interactive.prediction import predicted
+from hapticlink.visualization.page import one_file
 from hapticlink.visualization.standalone.description import Description
 
 POLICY = (
@@ -44,10 +44,10 @@ def html(scene: Scene, name: str) -> str:
     """The page. The same scene gives the same bytes."""
     with temporary_folders.room() as room:
         with resolved(scene, changing=True) as program:
-            made = components(program)
-            variables = ports(program, made)
+            blocks = components(program)
+            variables = ports(program, blocks)
             description = Description(program, variables, name)
-            files = webassembly_files(program, made, variables, description.drawing)
+            files = webassembly_files(program, blocks, variables, description.drawing)
         module = _compiled(files, room)
     verdict = predicted(scene, Settings(), description.parameters)
     description.data["map"] = {"type": "map"} | verdict
@@ -74,8 +74,8 @@ def _compiled(files: Mapping[str, str], room: Path) -> bytes:
             return path
 
         path = cache.cached(material, make, room, interrupt.check)
-        with zipfile.ZipFile(path) as kept:
-            return kept.read(MODULE)
+        with zipfile.ZipFile(path) as archived:
+            return archived.read(MODULE)
     except CompilerError as error:
         interrupt.check()
         raise Fault(str(error)) from error

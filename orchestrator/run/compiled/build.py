@@ -18,8 +18,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 LAWS = runpy.run_path(str(HERE / "generate_laws.py"))
 SOURCES = (
-    "loop.h", "loop.c", "events.c", "pace.c", "fmu_calls.c", "step_check.c", "meters.c", "holds.c",
-    "manifolds.c", "energy_account.c", "energy_tank.c", "platform.c", "process_state.c",
+    "loop.h", "operations.c", "event_loop.c", "pace.c", "fmu_calls.c", "step_check.c", "meters.c",
+    "holds.c", "manifolds.c", "energy_account.c", "energy_tank.c", "platform.c", "process_state.c",
     "python_errors.c",
 )  # fmt: skip
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
@@ -65,8 +65,8 @@ def compilers() -> Iterator[list[str]]:
     """The commands of the compilers that are there: the machine's own, which takes a fraction of a
     second, then the package `ziglang`."""
     for command in ("cc", "gcc", "clang"):
-        if sys.platform != "win32" and (found := shutil.which(command)):
-            yield [found]
+        if sys.platform != "win32" and (path := shutil.which(command)):
+            yield [path]
     if find_spec("ziglang"):
         yield zig()
 
@@ -82,11 +82,11 @@ def compile_loop(library: Path, compiler: Sequence[str]) -> None:
     """Compile the loop to `library`, which is there whole or not at all. Raises
     subprocess.CalledProcessError, or OSError, where that fails."""
     with tempfile.TemporaryDirectory(dir=library.parent, prefix=".loop-") as room:
-        made = Path(room) / library.name
+        unfinished = Path(room) / library.name
         Path(room, "hold_laws.h").write_text(LAWS["text"](), encoding="utf-8")
         sources = [str(HERE / source) for source in SOURCES if source.endswith(".c")]
         math = [] if library.suffix == ".dll" else ["-lm"]
-        command = [*compiler, *FLAGS, f"-I{room}", "-o", str(made), *sources, *math]
+        command = [*compiler, *FLAGS, f"-I{room}", "-o", str(unfinished), *sources, *math]
         environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(Path(room) / "cache")}
         subprocess.run(command, check=True, capture_output=True, env=environment)
-        os.replace(made, library)
+        os.replace(unfinished, library)

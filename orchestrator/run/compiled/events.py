@@ -54,8 +54,8 @@ class Events:
     @property
     def complete(self) -> int:
         """The number of events that are complete."""
-        found: int = self._c.events
-        return found
+        events: int = self._c.events
+        return events
 
     def run(self, turn: Callable[[int], object]) -> None:
         """Run all events; `turn` is called from time to time, and at the end, with the tick."""

@@ -99,10 +99,10 @@ int fmu_get(const Fmu *f, int64_t judged, At *at) {
     }
     keep_arithmetic(f->place);
     if (!judged) return 0;
-    int kept = 1;
+    int within = 1;
     for (int64_t i = 0; i < f->n_outputs; i++)
-        kept &= fabs(f->outputs[i]) * f->inverse[i] <= 1.0;
-    if (!kept) return JUDGE;
+        within &= fabs(f->outputs[i]) * f->inverse[i] <= 1.0;
+    if (!within) return JUDGE;
     if (f->good) memcpy(f->good, f->outputs, f->n_outputs * sizeof(double));
     return 0;
 }

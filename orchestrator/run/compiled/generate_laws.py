@@ -53,13 +53,13 @@ def _symbol(name: str) -> Symbol:
 
 def text() -> str:
     """The cases of `switch (LAW(kind, i))` in holds.c, one for each law i of a kind."""
-    found: dict[str, Any] = runpy.run_path(str(LAWS))
+    module: dict[str, Any] = runpy.run_path(str(LAWS))
     cases = [
         f"case LAW({kind}, {i}):\n"
         f"    for (int64_t k = 0; k < n; k++) value[k] = {value.text};\n"
         "    return;\n"
-        for kind, laws in found["LAWS"].items()
+        for kind, laws in module["LAWS"].items()
         for i, law in enumerate(laws)
-        for value in [law(*map(_symbol, found["arguments"](law)))]
+        for value in [law(*map(_symbol, module["arguments"](law)))]
     ]
     return "".join(cases)

@@ -84,11 +84,11 @@ def can(hold: Hold, repeats: bool) -> bool:
     """Whether there is C for a hold: not for classes of plugins, not for matrices whose hold needs
     more than their samples, and not for samples in transit or an energy account where steps are
     repeated."""
-    found = parts(hold)
-    if found.matrix and found.own.needs:
+    of = parts(hold)
+    if of.matrix and of.own.needs:
         return False
-    grows = found.link or isinstance(found.own, Account)
-    return type(found.own) in KINDS and not (grows and repeats)
+    grows = of.link or isinstance(of.own, Account)
+    return type(of.own) in KINDS and not (grows and repeats)
 
 
 class State:
@@ -271,10 +271,10 @@ class CompiledHold(Hold, State):
             self.serve(code)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        found = np.zeros(self._n)
-        while code := self._value(self.address, self._loop, tick, ahead, found.ctypes.data):
+        value = np.zeros(self._n)
+        while code := self._value(self.address, self._loop, tick, ahead, value.ctypes.data):
             self.serve(code)
-        return found
+        return value
 
 
 def tanks(holds: Iterable[Hold], repeats: bool) -> dict[int, CompiledTank]:

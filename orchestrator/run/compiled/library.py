@@ -33,7 +33,7 @@ def loaded() -> ctypes.CDLL:
     """The library, whatever CHOICE says. Raises Unavailable where it can neither be found nor
     be compiled."""
     built = build.HERE / build.name()
-    found = ctypes.CDLL(str(built if built.exists() else _compiled()))
+    library = ctypes.CDLL(str(built if built.exists() else _compiled()))
     pointer, integer, number = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
     for name, arguments in {
         "events": (pointer, pointer),
@@ -46,14 +46,14 @@ def loaded() -> ctypes.CDLL:
         "wait": (integer,),
         "python": (pointer,) * 3,
     }.items():
-        function = found[f"hapticlink_{name}"]
+        function = library[f"hapticlink_{name}"]
         function.argtypes = arguments
-        setattr(found, name, function)
-    found.now.restype = integer
+        setattr(library, name, function)
+    library.now.restype = integer
     api = ctypes.pythonapi
     calls = (api.PyGILState_Ensure, api.PyErr_Occurred, api.PyGILState_Release)
-    found.python(*(ctypes.cast(call, pointer) for call in calls))
-    return found
+    library.python(*(ctypes.cast(call, pointer) for call in calls))
+    return library
 
 
 def _compiled() -> Path:

@@ -334,6 +334,11 @@ int fmu_checked_step(Fmu *f, double time, double end, double size, At *at);
 int meter_sample(Meter *m, const double *board, int64_t stamp);
 int meter_move(Meter *m, const double *board, int64_t tick);
 void meter_feed(Meter *m, const double *board, double share);
+int meter_fold(Meter *m); /* adds rows to the sums and drops them; whether that made room */
+/* The work (J) of the held effort so far, and that of the ideal one; the first less the second is
+ * what sampling and holding have generated, which is the other's result. */
+void meter_work(const Meter *m, double work[2]);
+double meter_energy(const Meter *m);
 int pace_wait(const Loop *l, Events *e, int64_t tick);
 void pace_begin(const Loop *l, Events *e);
 void pace_end(const Loop *l, Events *e, int64_t time);

@@ -50,11 +50,11 @@ static void eigen(double *a, double *v, int64_t n) {
     }
 }
 
-/* Row i times row j of `v`, of the columns that are `kept`. */
-static double product(const double *v, const double *kept, int64_t n, int64_t i, int64_t j) {
+/* Row i times row j of `v`, of the columns that are `chosen`. */
+static double product(const double *v, const double *chosen, int64_t n, int64_t i, int64_t j) {
     double sum = 0.0;
     for (int64_t k = 0; k < n; k++)
-        if (kept[k] != 0.0) sum += v[i * n + k] * v[j * n + k];
+        if (chosen[k] != 0.0) sum += v[i * n + k] * v[j * n + k];
     return sum;
 }
 

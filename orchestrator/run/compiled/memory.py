@@ -26,12 +26,12 @@ class Memory:
             self._blocks.append(block)
             self._next = -(-ctypes.addressof(block) // LINE) * LINE
             self._end = ctypes.addressof(block) + len(block)
-        found, self._next = self._next, self._next + whole
-        return found
+        address, self._next = self._next, self._next + whole
+        return address
 
     def copy(self, array: Any) -> int:
         """The address of a copy of an array."""
         content = memoryview(array).cast("B")
-        found = self.room(len(content))
-        ctypes.memmove(found, content.tobytes(), len(content))
-        return found
+        address = self.room(len(content))
+        ctypes.memmove(address, content.tobytes(), len(content))
+        return address

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import (
@@ -96,12 +96,12 @@ class Machine:
             tank = shared.get(id(needed))
             if not can(hold, repeats) or (needed and tank is None):
                 continue
-            simulation.holds[name] = self._made(name, hold, tank)
+            simulation.holds[name] = self._compiled(name, hold, tank)
         compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
         for hold in compiled:
             hold.join(compiled)
 
-    def _made(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:
+    def _compiled(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:
         signals = self._simulation.signals
         sources = signals.sources(self._simulation.system.connection[name])
         values, loop = signals.values[signals.hold(name)], ctypes.addressof(self.loop)
@@ -111,16 +111,16 @@ class Machine:
         """Replace the hold of a connection. Raises InputFault where the old or the new one has no
         C."""
         self._require_compiled(name, self._simulation.holds[name])
-        self._simulation.holds[name] = made = self.other_hold(name, hold)
-        self._holds[self._index("hold", name, lambda at: made)] = made.address
+        self._simulation.holds[name] = compiled = self.other_hold(name, hold)
+        self._holds[self._index("hold", name, lambda index: compiled)] = compiled.address
 
     def other_hold(self, name: str, hold: Hold) -> CompiledHold:
         """A hold that a connection can have in place of its own. Raises InputFault where it has no
         C."""
         self._require_compiled(name, hold)
-        made = self._made(name, hold)
-        self._kept.append(made)
-        return made
+        compiled = self._compiled(name, hold)
+        self._kept.append(compiled)
+        return compiled
 
     def _require_compiled(self, name: str, hold: Hold) -> None:
         if not isinstance(hold, CompiledHold) and not can(hold, repeats=False):
@@ -137,8 +137,8 @@ class Machine:
     def counts(self) -> dict[str, int]:
         """The number of entries of each array, by the names that loop.h uses."""
         kinds = ("fmu", "setter", "hold", "meter", "table")
-        found = {f"n_{kind}s": len(self.names(kind)) for kind in kinds}
-        return {**found, "n_ops": len(self._ops), "n_points": len(self._points)}
+        of_objects = {f"n_{kind}s": len(self.names(kind)) for kind in kinds}
+        return {**of_objects, "n_ops": len(self._ops), "n_points": len(self._points)}
 
     # --- records --------------------------------------------------------------------------
 
@@ -155,18 +155,18 @@ class Machine:
     def joined(self, bound: Bound) -> Call:
         """One call that carries out a sequence of instructions at a tick."""
         first, last = self.block(bound)
-        at, run = structures.At(), self.library.block
-        loop, here = ctypes.addressof(self.loop), ctypes.addressof(at)
+        position, run = structures.At(), self.library.block
+        loop, here = ctypes.addressof(self.loop), ctypes.addressof(position)
 
         def call(tick: int) -> None:
-            at.op, at.last = first, last
-            while code := self.code(at, run, loop, here, tick):
-                self.serve(code, at, tick)
+            position.op, position.last = first, last
+            while code := self.code(position, run, loop, here, tick):
+                self.serve(code, position, tick)
 
         return call
 
     def _record(self, instruction: Instruction) -> tuple[float, ...]:
-        record = self._found(instruction)
+        record = self._coded(instruction)
         if record is None:
             self.in_python[in_python.named(instruction)] = in_python.why(
                 instruction, self._simulation
@@ -174,30 +174,30 @@ class Machine:
             return (structures.PYTHON, 0, 0, 0, 0, 0.0)
         return (*record, *(0,) * (5 - len(record)), 0.0) if len(record) < 6 else record
 
-    def _found(self, instruction: Instruction) -> tuple[float, ...] | None:
+    def _coded(self, instruction: Instruction) -> tuple[float, ...] | None:
         """Code, a, b, c, d and x of an operation; None where it is for Python."""
         simulation, system = self._simulation, self._simulation.system
         match instruction:
-            case Get(fmu) | Read(fmu) if (at := self._fmu(fmu)) is not None:
-                return structures.GET, at, isinstance(instruction, Get)
-            case Set(fmu, now, False) if (at := self._setter(fmu, now)) is not None:
-                return structures.SET, at
+            case Get(fmu) | Read(fmu) if (index := self._fmu(fmu)) is not None:
+                return structures.GET, index, isinstance(instruction, Get)
+            case Set(fmu, now, False) if (index := self._setter(fmu, now)) is not None:
+                return structures.SET, index
             case Step(fmu) if fmu in simulation.beside:
                 return None
-            case Step(fmu, dticks, part, parts) if (at := self._fmu(fmu)) is not None:
+            case Step(fmu, dticks, part, parts) if (index := self._fmu(fmu)) is not None:
                 size = float(dticks * (system.timeline.base / parts))
                 over = 0 if system.fmu[fmu].sampled and parts == 1 else dticks
-                return structures.STEP, at, part * dticks, parts, over, size
-            case Push(connection, ahead) if (at := self._hold(connection)) is not None:
-                return structures.PUSH, at, ahead
-            case Evaluate(connection, ahead, 0) if (at := self._hold(connection)) is not None:
-                return structures.EVALUATE, at, 0, 0, 0, float(ahead)
-            case Blend(connection, points) if (at := self._hold(connection)) is not None:
+                return structures.STEP, index, part * dticks, parts, over, size
+            case Push(connection, ahead) if (index := self._hold(connection)) is not None:
+                return structures.PUSH, index, ahead
+            case Evaluate(connection, ahead, 0) if (index := self._hold(connection)) is not None:
+                return structures.EVALUATE, index, 0, 0, 0, float(ahead)
+            case Blend(connection, points) if (index := self._hold(connection)) is not None:
                 first = len(self._points)
                 self._points += [(weight, float(ahead)) for weight, ahead in points]
                 self._kept.append(of := np.array(self._points))
                 self.loop.fill(points=of)
-                return structures.BLEND, at, first, len(self._points)
+                return structures.BLEND, index, first, len(self._points)
             case Sample(connection, ahead):
                 return structures.SAMPLE, self._meter(connection), ahead
             case Move(connection, ahead):
@@ -217,9 +217,9 @@ class Machine:
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
         """The index of an object of `kind`, made at its first use."""
         if (kind, key) not in self._indices:
-            at = sum(k == kind for k, _ in self._indices)
-            self._kept.append(make(at))
-            self._indices[kind, key] = at
+            index = sum(k == kind for k, _ in self._indices)
+            self._kept.append(make(index))
+            self._indices[kind, key] = index
         return self._indices[kind, key]
 
     def _fmu(self, name: str) -> int | None:
@@ -230,7 +230,7 @@ class Machine:
         return self._index(
             "fmu",
             name,
-            lambda at: fmus.of_instance(instance, check, self._fmus[at], self._memory),
+            lambda index: fmus.of_instance(instance, check, self._fmus[index], self._memory),
         )
 
     def _setter(self, name: str, now: bool) -> int | None:
@@ -241,16 +241,19 @@ class Machine:
             return None
         if any(transfer.exact for transfer in setter.transfers):
             return None
-        make = partial(fmus.of_setter, setter, instance)
-        return self._index("setter", (name, now), lambda at: make(self._setters[at], self._memory))
+
+        def make(index: int) -> None:
+            fmus.of_setter(setter, instance, self._setters[index], self._memory)
+
+        return self._index("setter", (name, now), make)
 
     def _hold(self, connection: str) -> int | None:
         hold = self._simulation.holds[connection]
         if not isinstance(hold, CompiledHold):
             return None
 
-        def make(at: int) -> object:
-            self._holds[at] = hold.address
+        def make(index: int) -> object:
+            self._holds[index] = hold.address
             return hold
 
         return self._index("hold", connection, make)
@@ -258,8 +261,8 @@ class Machine:
     def _meter(self, connection: str) -> int:
         meter, c = self._simulation.meters.of[connection], structures.Meter()
 
-        def make(at: int) -> object:
-            self._meters[at] = ctypes.addressof(c)
+        def make(index: int) -> object:
+            self._meters[index] = ctypes.addressof(c)
             for kind in ("source", "held", "x"):
                 fill_reader(getattr(c, kind), getattr(meter, kind))
             c.fill(meter, "counts")
@@ -272,8 +275,8 @@ class Machine:
     def _table(self, clock: str) -> int:
         recorder = self._simulation.recorders[clock]
 
-        def make(at: int) -> object:
-            c = self._tables[at]
+        def make(index: int) -> object:
+            c = self._tables[index]
             if recorder.files:
                 c.fill(block=recorder.block.rows, rows=recorder.block.filled)
             c.fill(recorder, "room", "due", "count", "reached", "every", "view")
@@ -285,21 +288,23 @@ class Machine:
 
     # --- what the loop returns for --------------------------------------------------------
 
-    def code(self, at: structures.At, run: Callable[..., int], *arguments: int) -> int:
+    def code(self, position: structures.At, run: Callable[..., int], *arguments: int) -> int:
         """What a function of the loop returns. Raises FmuFault for an exception that a Python FMU
         left behind in it."""
         try:
             return run(*arguments)
         except SystemError as error:
-            instruction, _ = self._bound[at.op]
+            instruction, _ = self._bound[position.op]
             assert isinstance(instruction, Get | Read | Set | Step)
             instance = self._simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
-            raise instance.raised(self._called(instruction, at.what, instance), error) from error
+            raise instance.raised(
+                self._called(instruction, position.what, instance), error
+            ) from error
 
-    def serve(self, code: int, at: structures.At, tick: int) -> None:
-        """Does what the loop cannot do at operation `at.op`, and sets where it goes on."""
-        instruction, call = self._bound[at.op]
+    def serve(self, code: int, position: structures.At, tick: int) -> None:
+        """Does what the loop cannot do at operation `position.op`, and sets where it goes on."""
+        instruction, call = self._bound[position.op]
         simulation = self._simulation
         if code == structures.CALL:
             simulation.late = self.loop.late
@@ -317,18 +322,20 @@ class Machine:
             instance = simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
             if code == structures.FAILED:
-                raise instance.failed(self._called(instruction, at.what, instance), at.status)
+                raise instance.failed(
+                    self._called(instruction, position.what, instance), position.status
+                )
             if code == structures.UNRESTORED:
                 called = f"fmi{instance.description.fmi}SetFMUstate"
-                raise instance.failed(called, at.status)
+                raise instance.failed(called, position.status)
             if code == structures.JUDGE:
                 instance.judge()
             elif code == structures.STEPPED:
-                instance.after_step(at.status)
+                instance.after_step(position.status)
             else:
                 assert code == structures.UNSAVED
-                instance.stepped(at.status)
-        at.op += 1
+                instance.stepped(position.status)
+        position.op += 1
 
     def _called(self, instruction: Instruction, number: int, instance: InProcess) -> str:
         """The name of the failed call of a get, a set or a step."""

@@ -93,14 +93,14 @@ static void take(int number) {
  * it one after the event. */
 void watch_signals(int on) {
     for (int i = 0; i < 2; i++) {
-        struct sigaction found, ours = {.sa_handler = take};
-        sigaction(SIGNALS[i], NULL, &found);
-        if (!on && found.sa_handler == take) sigaction(SIGNALS[i], before + i, NULL);
-        if (!on || found.sa_handler == take || found.sa_flags & SA_SIGINFO) continue;
-        if (found.sa_handler == SIG_DFL || found.sa_handler == SIG_IGN) continue;
-        before[i] = found;
-        ours.sa_mask = found.sa_mask;
-        ours.sa_flags = found.sa_flags;
+        struct sigaction present, ours = {.sa_handler = take};
+        sigaction(SIGNALS[i], NULL, &present);
+        if (!on && present.sa_handler == take) sigaction(SIGNALS[i], before + i, NULL);
+        if (!on || present.sa_handler == take || present.sa_flags & SA_SIGINFO) continue;
+        if (present.sa_handler == SIG_DFL || present.sa_handler == SIG_IGN) continue;
+        before[i] = present;
+        ours.sa_mask = present.sa_mask;
+        ours.sa_flags = present.sa_flags;
         sigaction(SIGNALS[i], &ours, NULL);
     }
 }

@@ -16,7 +16,7 @@ void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(in
 /* Whether there is one, which stays: ctypes raises it when the loop returns. */
 int exception_left(void) {
     const int state = ensure_();
-    const int found = occurred_() != NULL;
+    const int occurred = occurred_() != NULL;
     release_(state);
-    return found;
+    return occurred;
 }

@@ -31,12 +31,12 @@ static void note_rates(Check *c, const double *outputs, int jumped) {
 
 /* The largest differences of the outputs from `halves`, by port, unless one is not finite. */
 static void compare(Check *c, const double *outputs, double time, double end, double weight) {
-    double *found = c->errors + *c->count * c->n_ports;
-    for (int64_t k = 0; k < c->n_ports; k++) found[k] = 0.0;
+    double *largest = c->errors + *c->count * c->n_ports;
+    for (int64_t k = 0; k < c->n_ports; k++) largest[k] = 0.0;
     for (int64_t i = 0; i < c->n; i++) {
         const double apart = fabs(outputs[c->rates[i]] - c->halves[c->rates[i]]);
         if (!isfinite(apart)) return;
-        if (apart > found[c->ports[i]]) found[c->ports[i]] = apart;
+        if (apart > largest[c->ports[i]]) largest[c->ports[i]] = apart;
     }
     c->weights[*c->count] = weight;
     c->times[(*c->count)++] = time;

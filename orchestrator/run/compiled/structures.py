@@ -66,7 +66,7 @@ def _address(value: Any) -> Any:
 
 def _declared(text: str) -> dict[str, Any]:
     """The structures and numbers of a header whose fields are all of 2 or 8 bytes."""
-    found: dict[str, Any] = {
+    types: dict[str, Any] = {
         "double": ctypes.c_double, "int64_t": ctypes.c_int64, "int16_t": ctypes.c_int16
     }  # fmt: skip
 
@@ -75,7 +75,7 @@ def _declared(text: str) -> dict[str, Any]:
             kind, names = declaration.replace("const ", "").split(maxsplit=1)
             for field in map(_FIELD.fullmatch, re.split(r",\s*", names)):
                 assert field, declaration
-                entry = found[kind] if not field["stars"] else ctypes.c_void_p
+                entry = types[kind] if not field["stars"] else ctypes.c_void_p
                 several = field["n"] and not field["stars"]
                 if stars := len(field["stars"]):
                     of = Pointer(kind, stars, int(field["n"] or 1), field["count"] or "1")
@@ -85,16 +85,16 @@ def _declared(text: str) -> dict[str, Any]:
     for declared in _DECLARED.finditer(_COMMENT.sub("", _COUNT.sub(r"<\1>", text))):
         if name := declared["name"]:
             rows = [*fields(name, declared["fields"])]
-            found[name] = type(name, (Structure,), {"__slots__": (), "_fields_": rows})
+            types[name] = type(name, (Structure,), {"__slots__": (), "_fields_": rows})
         else:
             names = re.findall(r"\w+", declared["numbers"])
-            found |= {name: number for number, name in enumerate(names)}
-    return found
+            types |= {name: number for number, name in enumerate(names)}
+    return types
 
 
-_FOUND = _declared((HERE / "loop.h").read_text(encoding="utf-8"))
-assert [*_FOUND.pop("Place")._fields_] == [*Place._fields_]
-globals().update(_FOUND)
+_TYPES = _declared((HERE / "loop.h").read_text(encoding="utf-8"))
+assert [*_TYPES.pop("Place")._fields_] == [*Place._fields_]
+globals().update(_TYPES)
 
 if TYPE_CHECKING:
 

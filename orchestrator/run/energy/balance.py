@@ -64,7 +64,7 @@ def unstable(system: System, booked: Mapping[str, Energy]) -> str:
     generated, put_in = generated_and_put_in(system, booked)
     if generated <= put_in + LEAST:
         return ""
-    said = f"sampling and holding generated {generated:.3g} J, where "
+    generation = f"sampling and holding generated {generated:.3g} J, where "
     if put_in:
-        return f"{said}{put_in:.3g} J were put in"
-    return f"{said}neither hands nor mechanism put in any on the whole"
+        return f"{generation}{put_in:.3g} J were put in"
+    return f"{generation}neither hands nor mechanism put in any on the whole"

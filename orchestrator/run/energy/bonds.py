@@ -51,18 +51,18 @@ class Bond:
 def bond(c: Connection, system: System, signals: SignalVector) -> Bond | None:
     target = system.fmu[c.target].description
     pairs = [(i, s, paired(c, s, system.energy.power)) for i, s in enumerate(c.inputs)]
-    found = [(i, s, p) for i, s, p in pairs if p]
-    if not found or c.initial:
+    carrying = [(i, s, p) for i, s, p in pairs if p]
+    if not carrying or c.initial:
         return None
-    units = [_factor(target, s) for _, s, _ in found]
-    moved = [_displacement(target, s, p.effort, p.displacement) for _, s, p in found]
-    signs = [p.sign * _factor(target, x) for x, (_, _, p) in zip(moved, found, strict=True)]
+    units = [_factor(target, s) for _, s, _ in carrying]
+    moved = [_displacement(target, s, p.effort, p.displacement) for _, s, p in carrying]
+    signs = [p.sign * _factor(target, x) for x, (_, _, p) in zip(moved, carrying, strict=True)]
     return Bond(
-        tuple(i for i, _, _ in found),
+        tuple(i for i, _, _ in carrying),
         tuple(signals.scalar(c.target, x.name) for x in moved),
         _moving(target, c.target, moved, signals),
-        np.array([s.conversion.factor for _, s, _ in found]) * units,
-        np.array([s.conversion.offset for _, s, _ in found]) * units,
+        np.array([s.conversion.factor for _, s, _ in carrying]) * units,
+        np.array([s.conversion.offset for _, s, _ in carrying]) * units,
         np.array(signs),
     )
 

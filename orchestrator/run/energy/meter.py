@@ -130,12 +130,12 @@ class Meter:
         if len(ticks) > 1:
             done = self.efforts[: len(ticks) - 1] * np.diff(x, axis=0)
             work[1:] = _over_entries(done).cumsum()
-        at = _between(stamps, ticks)
-        x_stamps = at(x)
+        interpolated = _between(stamps, ticks)
+        x_stamps = interpolated(x)
         ideal = np.zeros(len(stamps))
         done = (efforts[:-1] + efforts[1:]) / 2 * np.diff(x_stamps, axis=0)
         ideal[1:] = _over_entries(done).cumsum()
-        held = at(work)
+        held = interpolated(work)
         total, total_ideal, peak = self.totals.tolist()
         return _Sums(
             total + float(held[-1]),
@@ -165,8 +165,8 @@ class Meter:
 
 def _over_entries(rows: Vector) -> Vector:
     """The sum over each row, column by column: NumPy's along rows takes seven times as long."""
-    found: Vector = reduce(np.add, rows.T)
-    return found
+    sums: Vector = reduce(np.add, rows.T)
+    return sums
 
 
 def _between(stamps: NDArray[np.int64], ticks: NDArray[np.int64]) -> Callable[[Vector], Vector]:
@@ -176,12 +176,12 @@ def _between(stamps: NDArray[np.int64], ticks: NDArray[np.int64]) -> Callable[[V
     if np.array_equal(ticks[:n], stamps):
         return lambda values: values[:n]
 
-    def at(values: Vector) -> Vector:
+    def interpolated(values: Vector) -> Vector:
         if values.ndim == 1:
             return np.interp(stamps, ticks, values)
         return np.stack([np.interp(stamps, ticks, column) for column in values.T], axis=1)
 
-    return at
+    return interpolated
 
 
 def _grown(array: Rows, rows: int) -> Rows:

@@ -21,14 +21,14 @@ class Meters:
         self._seconds = float(system.timeline.base)
         self.shares = {name: 1.0 / parts for name, parts in system.coupling.substeps.items()}
         for c in system.connections:
-            found = bond(c, system, signals)
-            if found is None:
+            power = bond(c, system, signals)
+            if power is None:
                 continue
             source, held = (
-                Reader(signals, found.of(places), found.factor, found.offset)
+                Reader(signals, power.of(places), power.factor, power.offset)
                 for places in (signals.sources(c), signals.mean(c))
             )
-            meter = Meter(source, held, Reader(signals, found.moved, found.scale))
+            meter = Meter(source, held, Reader(signals, power.moved, power.scale))
             self.of[c.name] = meter
             self.of_source.setdefault(c.source, []).append(c.name)
             self.of_target.setdefault(c.target, []).append(c.name)

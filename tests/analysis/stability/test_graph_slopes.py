@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import hapticlink as hl
 from hapticlink.analysis.stability import forward_sensitivity
+from tests.analysis.stability.own_hand import own_hand
 
 Vector = NDArray[np.float64]
 HELD: dict[str, Any] = {
@@ -63,18 +63,18 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
         return decide(exact, slope, error)
 
     monkeypatch.setattr(forward_sensitivity, "decided", watched)
-    found = hl.equilibrium_stability(scene, options)
+    found = own_hand(scene, options)
     assert compared > 10
     assert worst < 1.0
-    for fmu, way in found.linearised.items():
+    for fmu, way in found.slopes.items():
         graph, _, others = way.partition("; by differences: ")
         assert graph == "graph"
         assert set(filter(None, others.split(", "))) <= without.get(fmu, set())
 
     monkeypatch.setattr(forward_sensitivity, "graph_slopes", lambda *_: None)
-    differences = hl.equilibrium_stability(scene, options)
-    assert set(differences.linearised.values()) == {"differences"}
-    both = found.uncertainty + differences.uncertainty
+    differences = own_hand(scene, options)
+    assert set(differences.slopes.values()) == {"differences"}
+    both = found.first.uncertainty + differences.first.uncertainty
     assert abs(found.radius - differences.radius) <= both
     assert found.verdict == differences.verdict
 
@@ -82,7 +82,7 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
 def test_semi_implicit_euler_of_a_pendulum_has_the_eigenvalues_of_its_map() -> None:
     """Of a hanging rod, phi'' = -w^2 phi - c phi': z^2 - (2 - (w h)^2 - c h) z + 1 - c h = 0."""
     h, c = 1 / 512, 0.01 * 3
-    found = hl.equilibrium_stability("pendulum", {"mechanism.integrator": "semi-implicit-euler"})
+    found = own_hand("pendulum", {"mechanism.integrator": "semi-implicit-euler"})
     z = np.roots([1.0, -(2 - 1.5 * 9.81 * h**2 - c * h), 1 - c * h])[0]
     (mode,) = found.modes
     assert mode.z.real == pytest.approx(z.real, abs=1e-14)

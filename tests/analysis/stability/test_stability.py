@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
+from hapticlink.analysis.stability.forward_sensitivity import KINK
+from hapticlink.analysis.stability.hand_cases import SLIGHT
 from hapticlink.analysis.stability.linearisation import Linearisation
-from hapticlink.analysis.stability.modes import counted, modes
-from hapticlink.analysis.stability.radius_verdict import verdict
+from hapticlink.analysis.stability.modes import counted, modes, verdict
+from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.commands import main
+from tests.analysis.stability.own_hand import own_hand
 
 T = 1 / 512
 HELD: dict[str, Any] = {
@@ -31,7 +33,7 @@ HELD: dict[str, Any] = {
 
 def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
     """m = 1, K = 100, T = 0.05: z^2 - (2 - alpha/2) z + 1 + alpha/2 with alpha = K T^2/m."""
-    found = hl.equilibrium_stability("sampled-spring")
+    found = own_hand("sampled-spring")
     alpha = 0.25
     z = max(np.roots([1.0, -(2 - alpha / 2), 1 + alpha / 2]), key=lambda root: root.imag)
     (mode,) = found.modes
@@ -39,8 +41,7 @@ def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
     assert found.growth == pytest.approx(math.log(abs(z)) / 0.05, rel=1e-8)
     assert mode.omega == pytest.approx(np.angle(z) / 0.05, rel=1e-8)
     assert found.verdict == "unstable"
-    shares = found.record()["modes"][0]["participation"]
-    assert shares == pytest.approx(
+    assert found.participation == pytest.approx(
         {"virtual_mechanism.q[1]": 0.5, "virtual_mechanism.qd[1]": 0.5}, abs=1e-6
     )
 
@@ -64,12 +65,12 @@ def test_a_mode_that_may_grow_is_counted(A: list[list[float]], error: float, sai
 def test_a_hanging_and_a_standing_mechanism_move_as_their_linearisations_do() -> None:
     """A uniform rod of 1 m and 1 kg with 0.01 N.m.s/rad, and the N-four-bar above its pivots, which
     is singular there: phi'' = a phi, a = g ((N + 1)/2 + N)/((N + 1)/3 + N)."""
-    (hanging,) = hl.equilibrium_stability("pendulum").modes
+    (hanging,) = own_hand("pendulum").modes
     assert hanging.growth == pytest.approx(-0.01 / (2 / 3), rel=1e-5)
     assert math.hypot(hanging.growth, hanging.omega) == pytest.approx(
         math.sqrt(1.5 * 9.81), rel=1e-6
     )
-    standing = hl.equilibrium_stability("n-four-bar")
+    standing = own_hand("n-four-bar")
     a = 9.81 * (1.5 + 2) / (1.0 + 2)
     growth = [mode.growth for mode in standing.modes]
     assert growth == pytest.approx([math.sqrt(a), -math.sqrt(a)], rel=1e-5)
@@ -83,9 +84,7 @@ def test_semi_implicit_euler_is_stable_up_to_alpha_4_minus_2_beta(
     spring = {"stiffness": share * (4 - 2 * beta) / T**2, "damping": beta / T}
     options = {"haptics.rate": 512, "mechanism.integrator": "semi-implicit-euler"}
     options |= {f"linkage.joint.rail.{name}": value for name, value in spring.items()}
-    found = hl.equilibrium_stability(
-        "sampled-spring", options | {"hand.stiffness": [0.0, 0.0, 0.0]}
-    )
+    found = own_hand("sampled-spring", options | {"hand.stiffness": [0.0, 0.0, 0.0]})
     assert found.verdict == verdict
 
 
@@ -101,11 +100,9 @@ def test_baumgarte_is_stable_up_to_its_limit_off_the_closures(share: float, verd
         "mechanism.beta": 1.0,
         "hand.wrench": [0.0, 0.0, 0.0],
     }
-    found = hl.equilibrium_stability("five-bar", options)
+    found = own_hand("five-bar", options)
     assert found.verdict == verdict
     assert len(found.neutral) >= 2  # it moves freely
-    line = "growth up to 0.051 1/s cannot be distinguished from none"
-    assert any(line in text for text in found.lines())
 
 
 @pytest.mark.parametrize(("start", "at", "pull"), [(0.1, 0.0, 50.0), (1.0, 0.95, 1.0)])
@@ -139,26 +136,32 @@ def test_the_equilibrium_at_a_contact_is_that_at_which_a_run_rests(
         },
     })  # fmt: skip
     found = hl.equilibrium_stability(scene)
+    assert isinstance(found, hl.Stability)
     run = hl.run(scene, figures=False)
     q = run["virtual_mechanism.q"][:, 0]
-    assert found.equilibrium["virtual_mechanism.q[1]"] == pytest.approx(q[-1], abs=1e-8)
+    assert found.poses[0].joints["hinge"] == pytest.approx(q[-1], abs=1e-8)
     near = np.diff(q[600:800])  # q'_{k+1} = a q'_k + b q'_{k-1}
     a, b = np.linalg.lstsq(np.column_stack([near[1:-1], near[:-2]]), near[2:])[0]
     assert found.verdict == "stable"
-    assert found.modes[0].z == pytest.approx(max(np.roots([1.0, -a, -b]), key=np.imag), abs=1e-4)
+    z = np.exp((found.worst.growth + 2j * np.pi * found.worst.hertz) / 1024)
+    assert z == pytest.approx(max(np.roots([1.0, -a, -b]), key=np.imag), abs=1e-4)
 
 
 def test_growth_and_frequency_are_those_of_a_run_across_rates() -> None:
     """closed-loop-direct in a hand that is a spring: unstable at 30 Hz, with a period of half a
     second that has more than one turn of its mode."""
-    found = hl.equilibrium_stability("closed-loop-direct", HELD)
+    found = own_hand("closed-loop-direct", HELD)
     assert found.period == 0.5
     assert found.verdict == "unstable"
     first = found.modes[0]
-    rest = found.equilibrium
+    rest = found.point
     start = {f"shoulder{i}": rest[f"virtual_mechanism.q[{k}]"] for i, k in ((1, 1), (2, 3))}
     start |= {f"elbow{i}": rest[f"virtual_mechanism.q[{k}]"] for i, k in ((1, 2), (2, 4))}
-    run = hl.run("closed-loop-direct", HELD | {"linkage.start": start, "duration": 6.0})
+    run = hl.run(
+        "closed-loop-direct",
+        HELD
+        | {"linkage.start": start, "duration": 6.0, "linkage.start_velocity": {"shoulder1": 1e-9}},
+    )
     x = run["virtual_mechanism.x"]
     moved = (x - x[0])[75::15]  # once in a hyperperiod, since the faster mode prevails
     # x_{k+1} = 2 Re(z) x_k - |z|^2 x_{k-1}, in the coordinate that moves most
@@ -186,12 +189,12 @@ def test_an_algebraic_loop_has_the_growth_of_its_run(method: str, interpolation:
                  "damping": [0.3, 0.0, 0.0], "target": [[0.0, 0.0, 0.0, 0.0]]},
         "haptics.rate": 60,
     }  # fmt: skip
-    found = hl.equilibrium_stability("sampled-spring", options)
+    found = own_hand("sampled-spring", options)
     x = hl.run("sampled-spring", options | {"duration": 3.0}, figures=False)["virtual_mechanism.q"]
     late = x[len(x) // 2 :, 0]
     a, b = np.linalg.lstsq(np.column_stack([late[1:-1], late[:-2]]), late[2:])[0]
     assert found.modes[0].z == pytest.approx(max(np.roots([1.0, -a, -b]), key=np.imag), abs=1e-6)
-    assert found.kinks == ()
+    assert found.kinks.max() < KINK
 
 
 def test_redundant_closures_are_kept_by_perturbations(tmp_path: Path) -> None:
@@ -222,48 +225,24 @@ def test_redundant_closures_are_kept_by_perturbations(tmp_path: Path) -> None:
         lines += [f'[[linkage.loop]]\nbodies = ["bar", "rod{k}"]\nat = {ends}']
     path = tmp_path / "bar.toml"
     path.write_text("\n".join(lines))
-    found = hl.equilibrium_stability(path)
+    found = own_hand(path)
     (mode,) = found.modes
     omega = math.sqrt(9.81 * (1.5 * rods + bar) / (length * (rods + bar)))
     assert mode.omega == pytest.approx(omega, rel=1e-6)
     assert found.verdict == "marginal"
 
 
-def test_a_moving_target_and_a_push_into_the_free_have_no_equilibrium() -> None:
-    with pytest.raises(hl.InputFault, match="moves with time"):
-        hl.equilibrium_stability("two-hands")
-    with pytest.raises(hl.InputFault, match=r"no equilibrium found: virtual_mechanism\.qd?\["):
-        hl.equilibrium_stability(
-            "sampled-spring", {"hand": {"type": "constant", "wrench": [1.0, 0.0, 0.0]}}
-        )
-
-
-def test_growth_along_a_trajectory_is_that_of_the_variational_equation() -> None:
-    """Of phi'' + b/J phi' + 1.5 g sin(phi) = 0, a rod of 1 m and 1 kg that swings down, integrated
-    to a tight tolerance: ln sigma_max of the transition matrix, which 2 x 2 balances exactly by
-    the square root of the quotient of its other entries."""
-    start, at, seconds = 1.0, 0.1, 0.3
-    damping, J = 0.01, 1 / 3
-
-    def rate(t: float, y: Any) -> Any:
-        phi, speed, *rest = y
-        M = np.reshape(rest, (2, 2))
-        slope = np.array([[0.0, 1.0], [-1.5 * 9.81 * math.cos(phi), -damping / J]])
-        acceleration = -1.5 * 9.81 * math.sin(phi) - damping / J * speed
-        return [speed, acceleration, *(slope @ M).ravel()]
-
-    first = math.ceil(at * 512) / 512
-    fine = {"rtol": 1e-11, "atol": 1e-12}
-    begin = solve_ivp(rate, (0.0, first), [start, 0.0, 1, 0, 0, 1], **fine).y[:2, -1]
-    lasting = round(seconds * 512) / 512
-    end = solve_ivp(rate, (0.0, lasting), [*begin, 1, 0, 0, 1], **fine).y[:, -1]
-    M = end[2:].reshape(2, 2).copy()
-    M[0, 1] = M[1, 0] = math.sqrt(abs(M[0, 1] * M[1, 0]))
-    M[1, 0] *= np.sign(end[4])
-    M[0, 1] *= np.sign(end[3])
-    options = {"linkage.start": {"pivot": start - math.pi / 2}}
-    grown = hl.finite_time_growth("pendulum", options, at=at, seconds=seconds)
-    assert grown == pytest.approx(math.log(np.linalg.norm(M, 2)) / lasting, rel=1e-3)
+@pytest.mark.parametrize(
+    ("scene", "options"),
+    [
+        ("sampled-spring", {"hand": {"type": "constant", "wrench": [1.0, 0.0, 0.0]}}),
+        ("virtual-wall", {"fmu.wall.start.stiffness": 6000.0}),
+    ],
+    ids=["push into the free", "unstable"],
+)
+def test_a_run_that_keeps_moving_has_no_equilibrium(scene: str, options: dict[str, Any]) -> None:
+    with pytest.raises(hl.InputFault, match=r"does not come to rest in 60 s: .* at up to"):
+        hl.equilibrium_stability(scene, options)
 
 
 @pytest.mark.parametrize("late", [3, 4, 12])
@@ -276,9 +255,7 @@ def test_many_samples_are_on_their_way(late: int) -> None:
         "fmu.wall.settings": {"stiffness": 300.0, "unilateral": False},
         "delays": {"wall.F": late / 512},
     }
-    assert hl.equilibrium_stability("virtual-wall", options).radius == pytest.approx(
-        expected, abs=1e-8
-    )
+    assert own_hand("virtual-wall", options).radius == pytest.approx(expected, abs=1e-8)
 
 
 def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -> None:
@@ -298,7 +275,7 @@ def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -
         "fmu.wall.settings": {"stiffness": K, "unilateral": False},
         "delays": {"virtual_mechanism.rail.position": 0.005},
     }
-    found = hl.equilibrium_stability("virtual-wall", options)
+    found = own_hand("virtual-wall", options)
     first = max(np.linalg.eigvals(A), key=lambda z: (abs(z), z.imag))
     assert found.radius == pytest.approx(abs(first), rel=1e-6)
     assert found.modes[0].omega == pytest.approx(np.angle(first) * 64, rel=1e-6)
@@ -307,17 +284,15 @@ def test_samples_of_a_position_gather_while_a_slower_wall_does_not_read_them() -
 def test_what_has_no_map_is_refused() -> None:
     rates = {"graphics.rate": [0.03, 0.07, 0.1, 0.2], "duration": 0.1}
     with pytest.raises(hl.InputFault, match=r"the period of \w+ varies"):
-        hl.equilibrium_stability("closed-loop-direct", HELD | rates)
+        own_hand("closed-loop-direct", HELD | rates)
     with pytest.raises(hl.InputFault, match="latency and loss are random"):
-        hl.equilibrium_stability(
-            "virtual-wall", {"delays": {"wall.F": {"min": 0.001, "loss": 0.5}}}
-        )
+        own_hand("virtual-wall", {"delays": {"wall.F": {"min": 0.001, "loss": 0.5}}})
 
 
 @pytest.mark.parametrize("options", [{"packaging": "native"}, {"isolate": True}])
 def test_every_kind_of_fmu_has_the_same_map(options: dict[str, Any]) -> None:
-    found = hl.equilibrium_stability("virtual-wall", options)
-    assert found.radius == pytest.approx(hl.equilibrium_stability("virtual-wall").radius, rel=1e-9)
+    found = own_hand("virtual-wall", options)
+    assert found.radius == pytest.approx(own_hand("virtual-wall").radius, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -332,7 +307,7 @@ def test_every_kind_of_fmu_has_the_same_map(options: dict[str, Any]) -> None:
 )
 def test_the_memory_of_a_hold_is_part_of_the_state(hold: str, weights: tuple[float, ...]) -> None:
     """The mass takes the mean over its step of the force that is extrapolated from samples."""
-    found = hl.equilibrium_stability("sampled-spring", {"holds": {"hand.F": hold}})
+    found = own_hand("sampled-spring", {"holds": {"hand.F": hold}})
     h, A = 0.05, np.eye(4, k=-1)  # of x_k, x_{k-1}, x_{k-2} and, in the last row, v
     A[0] = A[3] = 0.0
     A[0, 0], A[0, 3], A[3, 3] = 1.0, h, 1.0
@@ -342,40 +317,32 @@ def test_the_memory_of_a_hold_is_part_of_the_state(hold: str, weights: tuple[flo
     assert found.radius == pytest.approx(np.abs(np.linalg.eigvals(A)).max(), rel=1e-8)
 
 
-def test_friction_and_quanta_are_taken_out_and_told() -> None:
-    plain = hl.equilibrium_stability("virtual-wall")
-    rough = hl.equilibrium_stability(
-        "virtual-wall",
-        {"fmu.wall.settings.quantum": 1e-4, "linkage.joint.rail.friction": 0.1},
-    )
-    assert rough.radius == pytest.approx(plain.radius, rel=1e-8)
-    told = "\n".join(rough.frozen)
-    assert "virtual_mechanism.rail.friction: Coulomb friction, taken out" in told
-    assert "wall.quantum: quantisation of the encoder, taken out" in told
+def test_friction_and_quanta_are_taken_out_and_named() -> None:
+    rough = {"fmu.wall.settings.quantum": 1e-4, "linkage.joint.rail.friction": 0.1}
+    radius = own_hand("virtual-wall", rough).radius
+    assert radius == pytest.approx(own_hand("virtual-wall").radius, rel=1e-8)
+    with linearisable("virtual-wall", rough) as (_, _, removed):
+        text = "\n".join(removed)
+    assert "virtual_mechanism.rail.friction: Coulomb friction, taken out" in text
+    assert "wall.quantum: quantisation of the encoder, taken out" in text
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The wall in the hand of the scene, and the closed form of its port: K T/2."""
+    command = ["stability", "virtual-wall", "--equilibrium", "--port", "--out", str(tmp_path)]
     with pytest.raises(SystemExit) as ended:
-        main(
-            [
-                "stability",
-                "virtual-wall",
-                "--equilibrium",
-                "--set",
-                "fmu.wall.start.stiffness=6000",
-                "--out",
-                str(tmp_path),
-            ]
-        )
+        main(command)
     assert ended.value.code == 0
     out = capsys.readouterr().out
-    assert out.startswith("virtual-wall: unstable\n  spectral radius 1.0")
+    assert out.startswith("virtual-wall: stable in the scene's own hand and 1 pose")
     record = json.loads((tmp_path / "stability.json").read_text())
-    assert record["verdict"] == "unstable"
-    assert record["margin"] == -record["growth_rate"] < 0
-    assert record["modes"][0]["participation"].keys() == {
+    assert record["verdict"] == "stable"
+    growth = math.log(own_hand("virtual-wall").radius) * 512
+    assert record["growth_rate"] == pytest.approx(growth, rel=1e-6)
+    assert record["worst"]["participation"].keys() == {
         "virtual_mechanism.q[1]", "virtual_mechanism.qd[1]"
     }  # fmt: skip
+    assert record["port"]["damping_needed"] == pytest.approx(3000 / 512 / 2, rel=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -384,7 +351,7 @@ def held_by_spring() -> tuple[dict[str, Any], float]:
     hand = {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [5.0, 5.0, 0.01]}
     target = [[0.0, 0.0445, 0.0148, -0.7878]]
     options = {"graphics.rate": 64, "hand": hand | {"target": target}}
-    return options, hl.equilibrium_stability("closed-loop-direct", options).radius
+    return options, own_hand("closed-loop-direct", options).radius
 
 
 @pytest.mark.parametrize("pspm", [False, True])
@@ -397,10 +364,12 @@ def test_the_hold_passive_is_judged_without_its_friction(
     if pspm:
         poses = ("virtual_mechanism.x -> controller.x_S", "virtual_mechanism.v -> controller.v_S")
         held["holds"] = dict.fromkeys(poses, "pspm")
-    found = hl.equilibrium_stability("closed-loop-direct", options | held)
-    assert found.verdict == "stable"
-    assert any("the friction of hold passive, taken out" in line for line in found.frozen)
-    assert found.radius == pytest.approx(plain, abs=1e-6)
+    found = own_hand("closed-loop-direct", options | held)
+    assert found.growth < SLIGHT  # with pspm marginal, in the regime of its start
+    with linearisable("closed-loop-direct", options | held) as (_, _, removed):
+        assert any("the friction of hold passive, taken out" in line for line in removed)
+    if not pspm:
+        assert found.radius == pytest.approx(plain, abs=1e-6)
     run = hl.run("closed-loop-direct", options | held | {"duration": 10.0}, figures=False)
     speed = np.abs(run["virtual_mechanism.qd"]).max(axis=1)
     assert speed[-64:].max() < 0.1 * speed.max()

@@ -23,7 +23,6 @@ from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.passivity import Passivity
 from hapticlink.analysis.stability.port_response import HandPort, MechanismPort
-from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.fmi.description import describe
@@ -102,9 +101,7 @@ def judged(folder: Path, rate: int) -> Passivity:
         "mechanism", ((("F", -1.0),),), (place("mechanism", "x"),), (place("mechanism", "v"),)
     )
     with lifted_map(made) as map_:
-        return passivity.of(
-            "two masses", map_, equilibrium(map_, trajectory(map_, 1.0)), hand, port, T
-        )
+        return passivity.of("two masses", map_, equilibrium(map_, map_.start).in_map, hand, port, T)
 
 
 DECAY = np.exp(-DAMPING * T / MASS)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import hapticlink as hl
-from hapticlink.analysis.stability.loaded_variants import LoadedVariants
+from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.orchestrator import open_scene
 
 T = 1 / 512
@@ -81,7 +81,7 @@ def test_the_closed_form_and_the_lifted_map_have_the_limit(
     assert np.linalg.eigvalsh(mobility)[-1] == pytest.approx(896.1, rel=1e-3)
     exact = limit(mobility, late)
     assert exact == pytest.approx(reference, rel=0.02)
-    with LoadedVariants(open_scene.load("closed-loop", HELD | (LATE if late else {}))) as session:
+    with SceneVariants(open_scene.load("closed-loop", HELD | (LATE if late else {}))) as session:
         verdicts = [
             session.judge([f"controller.teleoperation.damping=[70, 70, {share * exact}]"]).verdict
             for share in (0.995, 1.005)
@@ -112,7 +112,7 @@ def test_growth_until_motors_saturate() -> None:
     scene: dict[str, Any] = {"hand": hand, "hands.left": hand, "graphics.rate": 32, "duration": 0.2}
     scene["linkage.start"] = dict(zip(POSE, pose, strict=True))
     loose = open_scene.load("two-users", scene)
-    with LoadedVariants(loose) as session:
+    with SceneVariants(loose) as session:
         growth = session.judge({}).growth
     assert 150 < growth < 200
     largest = []

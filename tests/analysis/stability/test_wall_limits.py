@@ -11,8 +11,9 @@ from scipy.linalg import expm
 
 import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
-from hapticlink.analysis.stability.loaded_variants import LoadedVariants
+from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.orchestrator import open_scene
+from tests.analysis.stability.own_hand import own_hand
 
 M, D, T = 0.3, 5.0, 1 / 512
 """Mass (kg), damping (N.s/m) and period (s) of the scene."""
@@ -133,9 +134,7 @@ CASES = [
 
 @pytest.mark.parametrize(("options", "key", "limit"), CASES)
 def test_the_lifted_map_has_the_limit(options: Options, key: str, limit: float) -> None:
-    found = [
-        hl.equilibrium_stability("virtual-wall", options | {key: k * limit}) for k in (0.995, 1.005)
-    ]
+    found = [own_hand("virtual-wall", options | {key: k * limit}) for k in (0.995, 1.005)]
     assert [f.verdict for f in found] == ["stable", "unstable"]
 
 
@@ -160,7 +159,7 @@ TABLE = [0.1810, 0.3273, 0.4435, 0.5333, 0.6000, 0.6462, 0.6741, 0.6857, 0.6828]
 
 
 def test_the_lifted_map_has_the_table_of_a_sampled_damper() -> None:
-    with LoadedVariants(open_scene.load("virtual-wall", UNDAMPED)) as session:
+    with SceneVariants(open_scene.load("virtual-wall", UNDAMPED)) as session:
         for n, alpha in enumerate(TABLE, start=1):
             gains = [f"{DAMPING}={n / 10 * M / T}"]
             for share, verdict in ((0.995, "stable"), (1.005, "unstable")):
@@ -179,9 +178,9 @@ def test_a_unilateral_wall_has_the_same_limit_in_contact() -> None:
     """The scene as it is: the equilibrium lies within the wall, the start outside of it."""
     limit = wall_limits.stable(M, D, T)
     for share, verdict in ((0.995, "stable"), (1.005, "unstable")):
-        found = hl.equilibrium_stability("virtual-wall", {STIFFNESS: share * limit})
+        found = own_hand("virtual-wall", {STIFFNESS: share * limit})
         assert found.verdict == verdict
-        assert found.equilibrium["virtual_mechanism.q[1]"] == pytest.approx(2 / (share * limit))
+        assert found.point["virtual_mechanism.q[1]"] == pytest.approx(2 / (share * limit))
 
 
 def test_a_quantised_wall_chatters_beyond_its_limit() -> None:

@@ -53,14 +53,14 @@ def _as_it_was() -> Iterator[None]:
 @pytest.mark.parametrize(
     ("file", "other"),
     [
-        ("orchestrator/run/compiled/loop.c", True),
+        ("orchestrator/run/compiled/operations.c", True),
         ("orchestrator/run/compiled/holds.c", True),
         ("orchestrator/run/compiled/loop.h", True),
         ("fmus/native/fmi2.c", True),
         ("components/component.py", True),
         ("analysis/sweep/row.py", True),
         ("visualization/figure_axes.py", False),
-        ("visualization/live/server.py", False),
+        ("visualization/served/server.py", False),
     ],
 )
 def test_a_changed_byte_changes_the_key_of_what_computes_a_row(

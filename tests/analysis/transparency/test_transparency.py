@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 import hapticlink as hl
 from hapticlink.analysis import transparency
-from hapticlink.analysis.stability.equilibrium import nearby
 from hapticlink.analysis.stability.hands import spring
-from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
-from hapticlink.analysis.stability.linearisable_scene import linearisable
 from hapticlink.analysis.stability.port_response import hand_port, response
+from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.analysis.transparency import FORCE, HERTZ
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.orchestrator import open_scene
@@ -90,13 +88,8 @@ def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
     start = hl.run("closed-loop", {"duration": 0.01}, figures=False)
     pose = start.tables["haptics"]["virtual_mechanism.x"][0].tolist()
     held = written(options | {"hand": spring(pose, (0.0, 0.0, 0.0), 1000.0)})
-    with (
-        linearisable("closed-loop", held) as (read, system, _),
-        lifted_map(long_enough(read, system), 0.0, read) as map_,
-    ):
-        linear = nearby(map_, map_.start)
-        assert linear
-        cut = response(map_, linear, hand_port(map_.system))
+    with resting("closed-loop", held) as place:
+        cut = response(place.map, place.period({}).in_map, hand_port(place.map.system))
     S = np.diag([1.0, 1.0, LENGTH])
     for hertz, axis in ((2.0, 0), (8.0, 1), (24.0, 0), (50.0, 1)):
         amplitude = [0.0, 0.0, 0.0]

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 
 import hapticlink as hl
 from hapticlink.analysis.stability.hands import FIRM, spring
-from hapticlink.analysis.stability.held_equilibria import held
-from hapticlink.analysis.stability.linearisation import linearised
 from hapticlink.analysis.stability.poses import LIGHT, Pose, simulated
+from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.overrides import written
+from tests.analysis.stability.own_hand import linearised
 
 pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
@@ -127,7 +127,7 @@ def test_felt_stiffness_has_its_closed_form(
     """The closed form is the limit of high rates."""
     pose = Pose(0.0, {"rail": 0.0205}, (0.0205, 0.0, 0.0), (1.0, 0.0, 0.0))
     options = pose.options((f"haptics.rate={rate}", f"graphics.rate={rate // 16}"))
-    with held(slider, options) as place:
+    with resting(slider, options) as place:
         X = place.compliance({}, hertz)
         assert place.signal("virtual_mechanism.F_env")[0] == pytest.approx(-1.0, abs=0.03)
         M = place.signal("haptic_device.M").reshape(3, 3)
@@ -234,7 +234,7 @@ def test_rest_is_found_with_gains_that_are_unstable_there() -> None:
     """Own gains of `obstacles` throw the handle off; they are judged at the pose all the same."""
     pose = {pose.name: pose for pose in poses(recorded("obstacles"))}["1.8 s"]
     given = pose.options(("sensing=encoders", "graphics.rate=32"))
-    with held("obstacles", given) as place:
+    with resting("obstacles", given) as place:
         assert place.signal("haptic_device.x_true") == pytest.approx(pose.point, abs=1e-6)
         assert place.stable(dict.fromkeys(place.gains.laws, 0.5), FIRM)
         assert not place.stable({}, FIRM)
@@ -259,7 +259,7 @@ def test_slopes_of_operations_have_the_radius_of_the_whole_map() -> None:
     its columns, has the same spectral radius."""
     pose = poses(recorded("closed-loop"))[0]
     given = pose.options(("sensing=encoders", "graphics.rate=32"))
-    with held("closed-loop", given) as place:
+    with resting("closed-loop", given) as place:
         for scale in (0.1, 1.0, 3.0):
             period = place.period(dict.fromkeys(("drift", "topology"), scale))
             whole = linearised(place.map, period.point)

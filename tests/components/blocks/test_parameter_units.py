@@ -17,9 +17,11 @@ def declared() -> dict[str, str]:
 
 
 def test_device_and_observer() -> None:
-    units = {p.name: p.unit for p in haptic_device(Device(), encoders=True).parameters}
+    units = {
+        p.name: p.unit for p in haptic_device(Device(motor_friction=0.01), encoders=True).parameters
+    }
     keys = declared()
-    assert len(keys) == 24
+    assert len(keys) == 26
     unused = {"substeps"}  # structure
     assert {name: unit for name, unit in units.items() if name != "x_start"} == {
         name: unit for name, unit in keys.items() if name not in unused

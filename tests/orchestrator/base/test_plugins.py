@@ -146,7 +146,7 @@ def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path: Path) -> None
         write(tmp_path, **{f"mine{i}": HOLDING.format(value=value)})
     lines = (
         f"hapticlink run closed-loop --plugin mine{i} --set hold=mine --out {i} "
-        "--set graphics.rate=100 --set duration=0.1"
+        "--set graphics.rate=100 --set duration=0.1 --no-figures"
         for i in range(len(values))
     )
     for ended, message in zip(hapticlink(tmp_path, *lines), values.values(), strict=True):
@@ -253,7 +253,7 @@ def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(SCENE)
     write(tmp_path, push=PUSH, mine=HOLD.format(name="mine"))
     sweep = "hapticlink sweep scene.toml --plugin push --vary duration=0.5,1"
-    run = "hapticlink run scene.toml --plugin push"
+    run = "hapticlink run scene.toml --plugin push --no-figures"
     cache = tmp_path / "cache"
 
     def reached(line: str) -> float:

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results.tables import Table
-from hapticlink.orchestrator.run.event_loop import Outcome
+from hapticlink.orchestrator.run.execute_plan import Outcome
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.compiled import compiled

@@ -12,10 +12,15 @@ import pytest
 
 from hapticlink.fmus.build import build, build_native
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.process_cache import described
 from tests.orchestrator import coupled
 from tests.orchestrator.foreign_fmus import c_fmu
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _fmus_stay_unpacked() -> None:
+    """Here they do not: folders are counted."""
 
 
 @pytest.mark.parametrize("make", [build, build_native])

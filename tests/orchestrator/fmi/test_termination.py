@@ -53,7 +53,7 @@ def test_a_retried_step_that_ends_is_no_discard(tmp_path: Path) -> None:
 def test_the_command_says_who_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stair_fmu(tmp_path)
     path = scene(tmp_path, STAIR.format(5), rate=10, duration=20)
-    assert status("run", path, "--out", tmp_path / "out") == 0
+    assert status("run", path, "--no-figures", "--out", tmp_path / "out") == 0
     told = capsys.readouterr()
     assert "scene: ended: stair has asked to end the simulation, at 9 s" in told.out
     assert not told.err

@@ -26,8 +26,6 @@ from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.build_system import built
 from tests.orchestrator.foreign_fmus import python_fmu_of, run
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 Vector = NDArray[np.float64]
 TICK = 1e-3
 

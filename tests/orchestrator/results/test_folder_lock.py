@@ -14,6 +14,7 @@ import hapticlink as hl
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import folder_lock, tables
+from tests.orchestrator.foreign_fmus import RUN as COMMAND
 from tests.shared_fixtures import status
 
 RUN = "import hapticlink as hl; print(hl.run('pendulum', out={!r}, figures=False).folder)"
@@ -29,7 +30,9 @@ def test_a_second_run_is_refused_at_once(tmp_path: Path) -> None:
         said = subprocess.run(command, capture_output=True, text=True, check=False).stderr
         refusals.append(said.splitlines()[-1])
 
-    first = hl.run("pendulum", {"duration": 20}, out=tmp_path / "out", progress=second)
+    first = hl.run(
+        "pendulum", {"duration": 20}, out=tmp_path / "out", figures=False, progress=second
+    )
     assert f"--out {tmp_path / 'out'}: another run writes there, in process" in refusals[0]
     assert first.run["end"]["reason"] == "duration"
     assert tables.load(tmp_path / "out").haptics["time"][-1] == first.run["end"]["time"] == 20
@@ -73,7 +76,7 @@ def test_a_killed_run_leaves_no_lock(tmp_path: Path) -> None:
 
 
 def test_many_at_once_leave_one_whole_run(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "hapticlink", "run", "pendulum", "--out", str(tmp_path / "o")]
+    command = [*COMMAND, "pendulum", "--out", str(tmp_path / "o")]
     started = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(3)]
     ends = [(process.communicate()[1], process.returncode) for process in started]
     assert all(code in (0, 2) for _, code in ends), ends

@@ -24,8 +24,6 @@ from tests.orchestrator import coupled
 from tests.orchestrator.foreign_fmus import c_fmu, fmu_table, python_fmu, scene
 from tests.orchestrator.native_mass import held
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 try:
     load()
 except Unavailable as why:

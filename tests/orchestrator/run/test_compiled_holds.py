@@ -26,8 +26,6 @@ from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.system.latency import Late, Link
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 NUMERATOR, DENOMINATOR = 3, 7680
 SIZE = 3
 NAMES = [*HOLDS.names(lambda kind: kind in KINDS)]

@@ -11,8 +11,6 @@ from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Table
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 TOUCHED = "duration=0.6"
 """By then the hand has moved a link to the wall."""
 

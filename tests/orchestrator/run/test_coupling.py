@@ -20,9 +20,9 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged
-from hapticlink.orchestrator.scene.load_scene import read
+from hapticlink.orchestrator.scene.read_and_check import read
 from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.scene.scene import Scene
 from tests.orchestrator.coupled import (

@@ -16,8 +16,6 @@ from tests.orchestrator.foreign_fmus import (
 )
 from tests.shared_fixtures import status
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 
 @pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
 @pytest.mark.parametrize(("start", "bound", "rows"), [(0.0, "1e+12", 3), (2e5, "2e+17", 5)])

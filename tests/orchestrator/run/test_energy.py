@@ -14,8 +14,6 @@ from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 FORCE = "hand.F -> virtual_mechanism.F_hand"
 
 

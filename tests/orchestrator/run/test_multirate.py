@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.modes import modes
-from hapticlink.analysis.stability.trajectory import trajectory
 from hapticlink.analysis.stability.varying_rate import edges_of
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
@@ -31,7 +30,7 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
-from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
 from tests.orchestrator.timelines import fixed
@@ -184,7 +183,7 @@ def test_limit_of_the_coupling_to_one_percent(
 def radius(made: System) -> float:
     """The spectral radius of the lifted map, over a hyperperiod."""
     with lifted_map(made) as map_:
-        found = modes(equilibrium(map_, trajectory(map_, 0.2)), map_.period)
+        found = modes(equilibrium(map_, map_.start).linear, map_.period)
     return max(abs(mode.z) for mode in found if not mode.neutral)
 
 

@@ -12,16 +12,16 @@ from scipy.optimize import least_squares
 
 import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
+from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.components.blocks.controller import controller
 from hapticlink.components.device.encoder_count import count_energies
 from hapticlink.components.device.numeric_torques import numbers
 from hapticlink.components.device.pantograph import base_angles, dynamics
 from hapticlink.components.specs.control import Controller, Passivity
 from hapticlink.components.specs.device import Device
+from tests.analysis.stability.own_hand import own_hand
 from tests.blocks import Running
 from tests.shared_fixtures import run_once
-
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
 MASS, T = 0.3, 1 / 512
 M = np.diag([0.3, 0.3, 3e-4])
@@ -102,12 +102,11 @@ def test_a_coupling_beyond_its_limit_gives_the_handle_little() -> None:
 
 
 def test_the_lifted_map_is_that_of_the_loop_without_it() -> None:
-    found = [
-        hl.equilibrium_stability("virtual-wall", options)
-        for options in ({}, {"fmu.wall.settings.passivity": MASS})
-    ]
-    assert found[1].growth == pytest.approx(found[0].growth, rel=1e-6)
-    assert any("passivity controller, taken out" in line for line in found[1].frozen)
+    given = {"fmu.wall.settings.passivity": MASS}
+    without, with_it = (own_hand("virtual-wall", options) for options in ({}, given))
+    assert with_it.growth == pytest.approx(without.growth, rel=1e-6)
+    with linearisable("virtual-wall", given) as (_, _, removed):
+        assert any("passivity controller, taken out" in line for line in removed)
 
 
 def block(**spec: Any) -> Running:

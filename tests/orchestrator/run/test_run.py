@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.fmi.in_process import InProcess
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
-from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_fmus import run as run_scene

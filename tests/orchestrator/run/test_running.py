@@ -28,7 +28,7 @@ def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path: Path
     run = json.loads((out / "run.json").read_text())
     run["files"] += ["../outside.txt", str(outside), "..", 3]
     (out / "run.json").write_text(json.dumps(run))
-    assert status("run", "four-bar", "--out", out, *SHORT) == 0
+    assert status("run", "four-bar", "--no-figures", "--out", out, *SHORT) == 0
     found = {p.name for p in out.iterdir()}
     assert found == {*tables.load(out).run["files"], "notes.txt"}
     assert "graphics.csv" not in found

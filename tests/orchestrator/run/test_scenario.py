@@ -56,34 +56,34 @@ def seen(run, at=slice(None)):
 
 
 def test_both_loops_write_the_same_bytes(tmp_path, monkeypatch):
-    hl.run("scenario", out=tmp_path / "c")
+    hl.run("scenario", out=tmp_path / "c", figures=False)
     monkeypatch.setenv("HAPTICLINK_LOOP", "python")
-    hl.run("scenario", out=tmp_path / "python")
+    hl.run("scenario", out=tmp_path / "python", figures=False)
     for table in ("haptics.csv", "graphics.csv"):
         assert (tmp_path / "c" / table).read_bytes() == (tmp_path / "python" / table).read_bytes()
 
 
 def test_a_hand_that_lets_go_leaves_a_mass_at_its_speed(slider, tmp_path):
-    found = hl.run(slider, out=tmp_path / "run")
+    found = hl.run(slider, out=tmp_path / "run", figures=False)
     time, speed = found.haptics["time"], found.haptics["virtual_mechanism.v[1]"]
     np.testing.assert_allclose(speed, np.minimum(time, 0.5) / 2.0, atol=1e-12)
     assert found.run["events"] == [[0.5, "hand.wrench = (0.0, 0.0, 0.0)"]]
 
 
-def test_events_take_the_first_step_from_their_time_on(slider, tmp_path):
-    found = hl.run(slider, ["at.0.time=0.5001"], out=tmp_path / "run")
+def test_events_take_the_first_step_from_their_time_on(slider):
+    found = hl.run(slider, ["at.0.time=0.5001"])
     assert found.run["events"][0][0] == 257 / 512
     assert found.haptics["virtual_mechanism.v[1]"][-1] == pytest.approx(257 / 512 / 2, abs=1e-12)
 
 
-def test_without_events_nothing_runs_in_python(tmp_path):
-    found = hl.run("closed-loop", ["duration=0.1"], out=tmp_path)
+def test_without_events_nothing_runs_in_python():
+    found = hl.run("closed-loop", ["duration=0.1"])
     assert found.run["events"] == []
     assert found.run["in_python"] == {}
 
 
-def test_what_comes_after_the_end_does_not_happen(slider, tmp_path):
-    found = hl.run(slider, ["duration=0.5"], out=tmp_path / "run")
+def test_what_comes_after_the_end_does_not_happen(slider):
+    found = hl.run(slider, ["duration=0.5"])
     assert found.run["events"] == []
     assert found.haptics["virtual_mechanism.v[1]"][-1] == pytest.approx(0.25, abs=1e-12)
 
@@ -93,9 +93,9 @@ def around(table, begin, end):
     return (time >= begin) & (time < end)
 
 
-def test_a_frozen_input_keeps_what_it_had(tmp_path):
+def test_a_frozen_input_keeps_what_it_had():
     at = 'at=[{time=0.2, until=0.3, freeze=["controller.x_D"]}]'
-    run = hl.run("closed-loop", ["duration=0.5", at], out=tmp_path).haptics
+    run = hl.run("closed-loop", ["duration=0.5", at]).haptics
     x_D, inside = vectors(run, "haptic_device.x"), around(run, 0.2, 0.3)
     begin = np.flatnonzero(inside)[0]
     np.testing.assert_allclose(seen(run)[inside], np.tile(x_D[begin], (inside.sum(), 1)), atol=1e-9)
@@ -103,25 +103,25 @@ def test_a_frozen_input_keeps_what_it_had(tmp_path):
     assert np.abs(x_D[inside] - x_D[begin]).max() > 1e-4
 
 
-def test_an_overridden_input_has_the_value_given(tmp_path):
+def test_an_overridden_input_has_the_value_given():
     at = 'at=[{time=0.2, until=0.3, override={"controller.x_D"=[0.05, 0.01, 0.1]}}]'
-    run = hl.run("closed-loop", ["duration=0.5", at, "stop_when="], out=tmp_path).haptics
+    run = hl.run("closed-loop", ["duration=0.5", at, "stop_when="]).haptics
     inside = around(run, 0.2, 0.3)
     np.testing.assert_allclose(seen(run)[inside], [[0.05, 0.01, 0.1]] * inside.sum(), atol=1e-9)
 
 
-def test_noise_has_its_standard_deviation_and_its_seed(tmp_path):
+def test_noise_has_its_standard_deviation_and_its_seed():
     at = 'at=[{time=0.1, until=0.4, noise={"controller.x_D"=1e-6}, seed=7}]'
-    run = hl.run("closed-loop", ["duration=0.5", at], out=tmp_path).haptics
+    run = hl.run("closed-loop", ["duration=0.5", at]).haptics
     off, inside = seen(run) - vectors(run, "haptic_device.x"), around(run, 0.1, 0.4)
     drawn = np.random.Generator(np.random.PCG64(7)).standard_normal((inside.sum(), 3)) * 1e-6
     np.testing.assert_allclose(off[inside], drawn, atol=1e-10)
     assert np.abs(off[~inside][:-1]).max() < 1e-10
 
 
-def test_graphics_go_on_at_another_rate(tmp_path):
+def test_graphics_go_on_at_another_rate():
     at = 'at=[{time=0.5, set={"graphics.rate"=10}}, {time=0.75, set={"graphics.rate"=60}}]'
-    run = hl.run("closed-loop", ["duration=1.0", at], out=tmp_path)
+    run = hl.run("closed-loop", ["duration=1.0", at])
     times = run.graphics["time"]
     assert math.isclose(times[times <= 0.5][-1], 0.5)
     slow, fast = (np.diff(times[(times >= a) & (times <= b)]) for a, b in ((0.5, 0.79), (0.85, 1)))
@@ -146,20 +146,20 @@ def test_graphics_go_on_at_another_rate(tmp_path):
         ('{time=0.1, noise={"controller.x_D"=0.0}}', "noise"),
     ],
 )
-def test_what_cannot_happen_is_refused(at, why, tmp_path):
+def test_what_cannot_happen_is_refused(at, why):
     with pytest.raises(InputFault, match=why):
-        hl.run("closed-loop", ["duration=0.5", f"at=[{at}]"], out=tmp_path)
+        hl.run("closed-loop", ["duration=0.5", f"at=[{at}]"])
 
 
-def test_iterated_coupling_is_refused(tmp_path):
+def test_iterated_coupling_is_refused():
     at = 'at=[{time=0.1, freeze=["controller.x_D"]}]'
     with pytest.raises(InputFault, match="steps are repeated"):
-        hl.run("closed-loop", ["coupling=iterated", at], out=tmp_path)
+        hl.run("closed-loop", ["coupling=iterated", at])
 
 
-def test_lines_in_the_figures(tmp_path):
+def test_lines_in_the_figures():
     at = 'at=[{time=0.25, set={"graphics.rate"=15}}]'
-    found = hl.run("closed-loop", ["duration=0.6", at], out=tmp_path / "run")
+    found = hl.run("closed-loop", ["duration=0.6", at])
     axes = found.figures()["distance"].axes[0]
     assert any(list(line.get_xdata()) == [found.run["events"][0][0]] * 2 for line in axes.lines)
 

@@ -11,7 +11,7 @@ import pytest
 from hapticlink.analysis.sweep import grid
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
-from hapticlink.orchestrator.scene import load_scene, overrides
+from hapticlink.orchestrator.scene import overrides, read_and_check
 from tests.orchestrator.scene.test_scene import GOOD, findings
 
 
@@ -35,7 +35,7 @@ def refused(scene: object, *options: str) -> str:
 )
 def test_what_is_too_deep_is_told_before_it_is_parsed(text: str) -> None:
     with pytest.raises(SceneFault, match=r"more than 32 names or brackets deep \(at line [12]\)"):
-        load_scene.read(text)
+        read_and_check.read(text)
 
 
 def test_a_key_of_too_many_names_is_no_option() -> None:
@@ -138,7 +138,7 @@ def test_a_date_in_a_list_of_runs_is_told_of_by_its_run(tmp_path: Path) -> None:
 
 def test_findings_are_shown_to_the_twentieth() -> None:
     with pytest.raises(SceneFault) as fault:
-        load_scene.read(GOOD + "[holds]\n" + "".join(f"a{i}.b = 'zoo'\n" for i in range(70)))
+        read_and_check.read(GOOD + "[holds]\n" + "".join(f"a{i}.b = 'zoo'\n" for i in range(70)))
     assert len(fault.value.findings) == 70
     lines = str(fault.value).splitlines()
     assert len(lines) == 22
@@ -193,7 +193,7 @@ def test_time_grows_with_the_size_of_a_file(text: Callable[[int], str]) -> None:
     def read(n: int) -> Callable[[], object]:
         def reads() -> None:
             with suppress(SceneFault):
-                load_scene.read(text(n))
+                read_and_check.read(text(n))
 
         return reads
 

@@ -7,7 +7,7 @@ import pytest
 
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.scene import load_scene
+from hapticlink.orchestrator.scene import read_and_check
 
 HEAD = 'title = "Poles"\nduration = 1.0\nhaptics.rate = 100\n'
 
@@ -26,7 +26,9 @@ start.re = -2.0
 def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path: Path) -> None:
     """x' = s x: z = 1/(1 - s h) backward, (1 + s h/2)/(1 - s h/2) trapezoidal, of each step."""
     text = HEAD + pole("fast", "backward") + pole("slow", "trapezoidal", "rate = 10")
-    results = simulate(load_scene.read(text, ["fmu.fast.start.re=-3"]), tmp_path / "out").results
+    results = simulate(
+        read_and_check.read(text, ["fmu.fast.start.re=-3"]), tmp_path / "out"
+    ).results
     backward = (1 / 1.03) ** np.arange(101)
     np.testing.assert_allclose(results.haptics["fast.x"][:, 0], backward, rtol=1e-13)
     trapezoidal = (0.9 / 1.1) ** np.arange(11)
@@ -55,7 +57,7 @@ def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path: Path) -> None:
 )
 def test_faults_stand_at_their_place(keys: str, finding: str) -> None:
     with pytest.raises(SceneFault) as fault:
-        load_scene.read(f'{HEAD}[[fmu]]\nname = "one"\n{keys}\n')
+        read_and_check.read(f'{HEAD}[[fmu]]\nname = "one"\n{keys}\n')
     assert [finding] == [str(f)[: len(finding)] for f in fault.value.findings]
 
 
@@ -63,11 +65,11 @@ def test_a_file_takes_neither_block_nor_settings(tmp_path: Path) -> None:
     (tmp_path / "a.fmu").touch()
     text = f'{HEAD}[[fmu]]\nname = "one"\npath = "a.fmu"\nblock = "hand"\nsettings.hand = 1\n'
     with pytest.raises(SceneFault) as fault:
-        load_scene.read(text, folder=tmp_path)
+        read_and_check.read(text, folder=tmp_path)
     told = [f.key for f in fault.value.findings]
     assert told == [f"fmu[0] (one).{key}" for key in ("settings.hand", "block")]
 
 
 def test_values_that_give_no_component(tmp_path: Path) -> None:
     with pytest.raises(InputFault, match=r"discrete_equivalent: .*'sideways'"):
-        simulate(load_scene.read(HEAD + pole("one", "sideways")), tmp_path / "out")
+        simulate(read_and_check.read(HEAD + pole("one", "sideways")), tmp_path / "out")

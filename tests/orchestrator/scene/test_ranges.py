@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.base.faults import SceneFault
-from hapticlink.orchestrator.scene import load_scene, overrides
+from hapticlink.orchestrator.scene import overrides, read_and_check
 from hapticlink.orchestrator.scene.scene_source import Source
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.orchestrator.scene_numbers import SCENES, beyond, key, of_scene, put, tables, toml
@@ -29,7 +29,7 @@ def test_numbers_of_shipped_scenes_out_of_range(data: st.DataObject) -> None:
     value = data.draw(beyond(number), "value")
     option = f"{'.'.join(map(str, number.path))}={toml(put(number.value, number.place, value))}"
     with pytest.raises(SceneFault) as refused:
-        load_scene.from_source(Source(name, tables(name), {}, (option,)))
+        read_and_check.from_source(Source(name, tables(name), {}, (option,)))
     found = {re.sub(r" \(\w+\)", "", f.key): f for f in refused.value.findings}
     finding = found[key(number)]
     assert finding.option == f"--set {option}"
@@ -82,4 +82,4 @@ def test_what_once_ran_is_refused(
 )
 def test_numbers_that_limit_each_other(options: list[str], message: str) -> None:
     with pytest.raises(SceneFault, match=re.escape(message)):
-        load_scene.read(GOOD, options)
+        read_and_check.read(GOOD, options)

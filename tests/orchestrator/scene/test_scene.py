@@ -6,7 +6,7 @@ from hapticlink.components.specs.hand import SpringHand
 from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
-from hapticlink.orchestrator.scene import find_scene, load_scene
+from hapticlink.orchestrator.scene import find_scene, read_and_check
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.toml_keys import key_lines
@@ -43,13 +43,13 @@ wrench = [
 
 def findings(text: str, *options: str) -> dict[str, tuple[int | None, str]]:
     with pytest.raises(SceneFault) as refused:
-        load_scene.read(text, options)
+        read_and_check.read(text, options)
     assert refused.value.exit_status == 2
     return {f.key: (f.line, f.message) for f in refused.value.findings}
 
 
 def test_a_good_scene_is_read() -> None:
-    scene = load_scene.read(GOOD)
+    scene = read_and_check.read(GOOD)
     assert scene.hand is not None
     assert scene.hand.type == "constant"
     assert scene.ends_when == "haptic_device.workspace_margin < 0"
@@ -61,10 +61,10 @@ def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tm
     (tmp_path / "base.toml").write_text(GOOD[: GOOD.index("[hand]")] + rows)
     sine = "target = { amplitude = [0.1, 0.0, 0.0], frequency = [2.0, 1.0, 0.0] }\n"
     text = 'title = "t"\nextends = "base.toml"\n[hand]\n'
-    scene = load_scene.read(text + sine, folder=tmp_path)
+    scene = read_and_check.read(text + sine, folder=tmp_path)
     assert isinstance(scene.hand, SpringHand)
     assert scene.hand.target == PoseSine(amplitude=(0.1, 0.0, 0.0), frequency=(2.0, 1.0, 0.0))
-    scene = load_scene.read(text + 'interpolation = "spline"\n', folder=tmp_path)
+    scene = read_and_check.read(text + 'interpolation = "spline"\n', folder=tmp_path)
     assert isinstance(scene.hand, SpringHand)
     assert scene.hand.interpolation == "spline"
     found = findings(GOOD[: GOOD.index("[hand]")] + hand + sine.replace("2.0", "-2.0"))
@@ -115,7 +115,7 @@ def test_options_change_the_scene_and_are_named_in_faults() -> None:
         "linkage.body.bar.mass=2.5",
         "title=two words",
     ]
-    scene = load_scene.read(GOOD, options)
+    scene = read_and_check.read(GOOD, options)
     assert scene.controller is not None
     assert scene.controller.topology is False
     assert scene.graphics is not None
@@ -124,22 +124,24 @@ def test_options_change_the_scene_and_are_named_in_faults() -> None:
     assert scene.linkage.body[0].mass == 2.5
     assert scene.title == "two words"
     with pytest.raises(SceneFault) as refused:
-        load_scene.read(GOOD, ["linkage.body.0.mass=-1", "sensing=encoder"])
+        read_and_check.read(GOOD, ["linkage.body.0.mass=-1", "sensing=encoder"])
     told = str(refused.value)
     assert "--set linkage.body.0.mass=-1: linkage.body[0] (bar).mass" in told
     with pytest.raises(SceneFault, match=r"--set duration.x=1: duration: \{'x': 1\} should be"):
-        load_scene.read(GOOD, ["duration.x=1"])
+        read_and_check.read(GOOD, ["duration.x=1"])
     assert "--set sensing=encoder: sensing: 'encoder' should be 'ideal' or 'encoders'" in told
 
 
 @pytest.mark.parametrize("option", ["novalue", "=3", "linkage.body.bax.mass=1"])
 def test_options_that_cannot_be_applied(option: str) -> None:
     with pytest.raises(InputFault, match=f"--set {option}"):
-        load_scene.read(GOOD, [option])
+        read_and_check.read(GOOD, [option])
 
 
 def test_sensing_reaches_the_device() -> None:
-    built = {b.name: b.settings for b in blocks(load_scene.read(GOOD, ["sensing=encoders"])).built}
+    built = {
+        b.name: b.settings for b in blocks(read_and_check.read(GOOD, ["sensing=encoders"])).built
+    }
     assert built["haptic_device"]["encoders"]
 
 
@@ -153,7 +155,7 @@ def test_every_shipped_scene_is_good_and_found_by_name() -> None:
 
 def test_not_toml() -> None:
     with pytest.raises(SceneFault, match="line 1, column"):
-        load_scene.read("title = =")
+        read_and_check.read("title = =")
 
 
 def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.scene import load_scene, overrides
+from hapticlink.orchestrator.scene import overrides, read_and_check
 from hapticlink.orchestrator.ssp import names
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_fmus import scene as foreign_scene
@@ -22,7 +22,7 @@ CLOSED = 'title = "t"\nextends = "closed-loop"\n'
 
 def told(text: str, *options: str, folder: Path | None = None) -> str:
     with pytest.raises(SceneFault) as refused:
-        load_scene.read(text, options, "scene", folder)
+        read_and_check.read(text, options, "scene", folder)
     return str(refused.value)
 
 
@@ -35,13 +35,13 @@ def told(text: str, *options: str, folder: Path | None = None) -> str:
 )
 def test_a_name_with_dots_is_one_name_in_every_spelling(key: str, text: str) -> None:
     whole = text + GOOD if text.startswith("holds") else GOOD + text
-    scene = load_scene.read(whole, [f"holds.{key}=lead"])
+    scene = read_and_check.read(whole, [f"holds.{key}=lead"])
     assert scene.holds == {"e.P_c": "lead"}
 
 
 @pytest.mark.parametrize("option", ['delays."e.P_c".loss=0.5', "delays.e.P_c.loss=0.5"])
 def test_a_part_of_a_delay_is_set_beside_its_others(option: str) -> None:
-    late = load_scene.read(GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option])
+    late = read_and_check.read(GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option])
     found = late.delays["e.P_c"]
     assert (found.min, found.loss, found.seed) == (0.1, 0.5, 3)  # type: ignore[union-attr]
 

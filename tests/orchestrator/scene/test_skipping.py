@@ -10,8 +10,6 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.scene.blocks import FromGraphics, blocks
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 SHORT = "duration=0.2"
 
 

@@ -8,7 +8,6 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 
 import hapticlink as hl
-from hapticlink.commands import main
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
@@ -21,14 +20,11 @@ from tests.orchestrator.foreign_fmus import (
     scene,
     with_units,
 )
-
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
+from tests.shared_fixtures import sets, status
 
 
 def export(source: str, folder: Path, *options: str) -> Path:
-    with pytest.raises(SystemExit) as ended:
-        main(["export", source, "--out", str(folder), *options])
-    assert ended.value.code == 0
+    assert status("export", source, "--out", folder, *sets(options)) == 0
     return folder / f"{Path(source).stem}.ssp"
 
 
@@ -50,8 +46,7 @@ def test_a_shipped_scene_comes_back_to_the_bit(
     tmp_path: Path, name: str, options: tuple[str, ...]
 ) -> None:
     options = ("duration=0.2", *options)
-    flags = [text for option in options for text in ("--set", option)]
-    path = export(name, tmp_path, *flags)
+    path = export(name, tmp_path, *options)
     simulate(name, tmp_path / "a", options)
     again = simulate(str(path), tmp_path / "b")
     assert again.outcome.fault is None

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
-from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
 from hapticlink.orchestrator.system.latency import Link

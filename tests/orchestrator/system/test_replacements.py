@@ -10,7 +10,7 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 
 import hapticlink as hl
-from hapticlink.commands.options import options
+from hapticlink.commands.options import Changes
 from hapticlink.orchestrator.base.faults import SceneFault
 from tests.shared_fixtures import status
 
@@ -218,7 +218,7 @@ def test_what_replaces_no_block_is_refused(
 
 def test_faults_of_a_swap_are_told_as_it_was_typed() -> None:
     with pytest.raises(SceneFault) as raised:
-        hl.scene("closed-loop", options(None, ["controler=/missing.fmu"]))
+        hl.scene("closed-loop", Changes(swap=["controler=/missing.fmu"]).options)
     said = "--swap controler=/missing.fmu: fmu[0]"
     assert f"{said}.path: there is no file" in str(raised.value)
     assert f"{said}.replaces: no block 'controler'" in str(raised.value)

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
-from hapticlink.orchestrator.run.event_loop import run
+from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -30,8 +30,6 @@ from hapticlink.orchestrator.system.timeline import clocks, timeline
 from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
 from tests.orchestrator.timelines import CAUSAL, LOOP, scene_of, scenes
 from tests.shared_fixtures import status
-
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
 Make = Callable[[Timeline, str], System]
 

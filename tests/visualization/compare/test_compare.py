@@ -47,7 +47,7 @@ def titled(root: Path, name: str, title: str) -> Results:
 @pytest.fixture
 def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of a page's text: figures take most of its time."""
-    monkeypatch.setattr(page.of_a_run, "figures", lambda run: {})
+    monkeypatch.setattr(page.of_a_run, "drawings", lambda run: {})
 
 
 def test_settings_that_differ_are_all_of_them(root: Path) -> None:

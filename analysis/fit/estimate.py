@@ -1,0 +1,63 @@
+"""Estimates with their spread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.results.numbers import short
+
+LOOSE = 0.3
+"""The relative spread from which on a log does not determine a parameter."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter by its key in a scene, with its standard deviation; `assumed` is its value
+    before."""
+
+    key: str
+    unit: str
+    value: float
+    spread: float
+    assumed: float
+
+    @property
+    def determined(self) -> bool:
+        return self.spread < LOOSE * abs(self.value)
+
+    @property
+    def line(self) -> str:
+        spread = short(self.spread) if np.isfinite(self.spread) else "unknown"
+        text = f"{self.key} = {short(self.value)} +- {spread} {self.unit}"
+        text += f" (assumed {short(self.assumed)})"
+        return text if self.determined else f"{text}: not determined by this log"
+
+    def record(self) -> dict[str, Any]:
+        return {
+            "value": self.value,
+            "standard_deviation": self.spread,
+            "unit": self.unit,
+            "assumed": self.assumed,
+            "determined": self.determined,
+        }
+
+
+def standard_deviations(J: Matrix, residuals: Vector, blocks: int, common: int) -> Vector:
+    """Standard deviations of least-squares estimates whose residuals are correlated within, but not
+    between blocks of successive rows (Liang, Zeger, Biometrika 73 (1986), 13):
+
+        cov = (J'J)^-1 [sum over blocks of J_b' r_b r_b' J_b] (J'J)^-1
+
+    J (n, p) and residuals (n,) at the estimate; `common` of the parameters act on all blocks.
+    Infinite where J'J is singular.
+    """
+    inverse = np.linalg.pinv(J.T @ J)
+    rows = zip(np.array_split(J, blocks), np.array_split(residuals, blocks), strict=True)
+    scores = np.array([part.T @ r for part, r in rows])
+    covariance = inverse @ (scores.T @ scores) @ inverse * blocks / (blocks - common)
+    undetermined = np.diag(inverse @ (J.T @ J)) < 0.5
+    return np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))

@@ -1,0 +1,105 @@
+"""Fits the device and the arm of a scene to a log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hapticlink.analysis.fit import log as logs
+from hapticlink.analysis.fit.arm_fit import NAMES, fit_arm
+from hapticlink.analysis.fit.device_fit import FITTED, fit_device
+from hapticlink.analysis.fit.estimate import Estimate
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.hand import ArmHand
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.scene.overrides import Options, toml
+from hapticlink.orchestrator.scene.scene import Scene
+
+COUNTING = 0.29
+"""Root mean square (counts) of errors by counting alone, 1/sqrt(12)."""
+STILL = ((0.0, 0.0, 0.0, 0.0),)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Estimates of [device] and [hand]. counts: root mean square of the errors that remain at the
+    encoders; unexplained: by axis, the share of the variance of the hand's wrench that the arm does
+    not explain. None and empty where there was nothing to fit."""
+
+    estimates: tuple[Estimate, ...]
+    counts: float | None
+    unexplained: tuple[float, ...]
+    arm: ArmHand
+
+    def lines(self) -> Iterator[str]:
+        for estimate in self.estimates:
+            yield estimate.line
+        if self.counts is not None:
+            yield (
+                f"errors at the encoders: {self.counts:.3g} counts rms, where counting alone makes "
+                f"{COUNTING}"
+            )
+        if self.unexplained:
+            shares = ", ".join(f"{share:.2%}" for share in self.unexplained)
+            yield f"variance of the hand's wrench that the arm does not explain: {shares}"
+
+    def record(self) -> dict[str, Any]:
+        """The content of fit.json."""
+        return {
+            "parameters": {e.key: e.record() for e in self.estimates},
+            "encoder_errors_counts": self.counts,
+            "unexplained": list(self.unexplained),
+        }
+
+    def scene(self) -> str:
+        """The tables [device] and [hand] of a scene with what the log determines, as text."""
+        known = {e.key: e.value for e in self.estimates if e.determined}
+        device = [f"{key.removeprefix('device.')} = {toml(v, key)}" for key, v in known.items()
+                  if key.startswith("device.")]  # fmt: skip
+        hand = []
+        for name in NAMES:
+            assumed = getattr(self.arm, name)
+            values = [known.get(f"hand.{name}[{i}]", assumed[i]) for i in range(3)]
+            hand.append(f"{name} = {toml(values, name)}")
+        lines = ["[device]", *device, ""] if device else []
+        if self.unexplained:
+            lines += ["[hand]", 'type = "arm"', *hand, "target = [[0.0, 0.0, 0.0, 0.0]]"]
+        return "\n".join(lines) + "\n"
+
+
+def fit(
+    log: Path | str,
+    scene: str | Path | Scene = "closed-loop",
+    options: Options = (),
+    *,
+    device: Sequence[str] = FITTED,
+) -> Fitted:
+    """Fits parameters of a device, by their keys in [device], and of the arm that holds it, to a
+    log of its handle; all others are those of the scene, from whose values the search begins.
+
+    log: a CSV, an HDF5 file or the folder of a run with the columns `time`, `haptic_device.x`
+    (m, m, rad), and `controller.F_motor`, `hand.F` or both (N, N, N.m). Without the motors' wrench
+    the arm alone is fitted, without the hand's the device alone, which nobody may then hold.
+    Raises InputFault for a log that cannot be read or moves nothing, an unknown parameter, and a
+    scene without a device.
+    """
+    read, given = open_scene.load(scene, options), logs.read(log)
+    arm = read.hand if isinstance(read.hand, ArmHand) else ArmHand(target=STILL)
+    if read.device is None:
+        raise InputFault("fit: the scene has no [device]")
+    assert isinstance(read.device, Device)
+    estimates: list[Estimate] = []
+    counts: float | None = None
+    unexplained: list[float] = []
+    if given.motors is not None:
+        found, counts = fit_device(given, read.device, device)
+        estimates += found
+    if given.hand is not None:
+        found, unexplained = fit_arm(given, arm)
+        estimates += found
+    if not estimates:
+        raise InputFault(f"{log}: it has neither the motors' nor the hand's wrench")
+    return Fitted(tuple(estimates), counts, tuple(unexplained), arm)

@@ -1,0 +1,95 @@
+"""Logs of a device: the pose of its handle, the wrench that its motors were given, and that of the
+hand, as a run writes them to `haptics.csv`, or a lab under the same names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hapticlink.fmus.versions import install_command
+from hapticlink.orchestrator.base.arrays import Matrix
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.loop_names import HAND_WRENCH, MEASURED_HANDLE_POSE, MOTOR_WRENCH
+from hapticlink.orchestrator.results.tables import Table, read_table
+
+UNEVEN = 0.01
+"""Of the sampling period, up to which samples are evenly spaced."""
+LEAST = 256
+"""Samples."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """Samples that are `period` (s) apart.
+
+    pose: of the handle, (n, 3), m, m, rad. motors, hand: the wrenches that are held from each
+    sample on, (n, 3), N, N, N.m; None where the log has none.
+    """
+
+    period: float
+    pose: Matrix
+    motors: Matrix | None
+    hand: Matrix | None
+
+
+def read(path: Path | str) -> Log:
+    """The log in a CSV or HDF5 file (`.h5`, `.hdf5`), or that of a run in its folder. Raises
+    InputFault for a file without the pose, or whose samples are not evenly spaced or finite."""
+    path = Path(path)
+    path = path / "haptics.csv" if path.is_dir() else path
+    table = _hdf5(path) if path.suffix in (".h5", ".hdf5") else read_table(path)
+    names = {
+        name: name in table for name in ("time", MEASURED_HANDLE_POSE, MOTOR_WRENCH, HAND_WRENCH)
+    }
+    if not (names["time"] and names[MEASURED_HANDLE_POSE]):
+        raise InputFault(
+            f"{path}: a log needs the columns time (s) and {MEASURED_HANDLE_POSE}[1] to [3] "
+            f"(m, m, rad), and {MOTOR_WRENCH}[1] to [3] or {HAND_WRENCH}[1] to [3] (N, N, N.m); "
+            f"it has {', '.join(table.columns)}"
+        )
+    signals = {name: table[name] for name, there in names.items() if there}
+    for name, values in signals.items():
+        if name != "time" and values.shape[1:] != (3,):
+            raise InputFault(f"{path}: {name} has {values.shape[1:]} entries a sample, not 3")
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
+            raise InputFault(f"{path}: {name} is not finite in row {row + 1}")
+    steps = np.diff(signals["time"])
+    if len(steps) < LEAST:
+        raise InputFault(f"{path}: {len(steps) + 1} samples; {LEAST + 1} are needed")
+    period = float(np.mean(steps))
+    if np.abs(steps - period).max() > UNEVEN * period:
+        row = int(np.argmax(np.abs(steps - period))) + 1
+        raise InputFault(
+            f"{path}: row {row + 1} comes {steps[row - 1]:.4g} s after the one before, the others "
+            f"{period:.4g} s on average: resample the log evenly"
+        )
+    return Log(
+        period, signals[MEASURED_HANDLE_POSE], signals.get(MOTOR_WRENCH), signals.get(HAND_WRENCH)
+    )
+
+
+def _hdf5(path: Path) -> Table:
+    """The datasets of a file, (n,) or (n, 3), as the columns of a table."""
+    try:
+        import h5py
+    except ImportError:
+        raise InputFault(f"{path}: reading HDF5 needs h5py: {install_command('hdf5')}") from None
+    try:
+        with h5py.File(path) as file:
+            datasets = {name: np.asarray(file[name], float) for name in file}
+    except (OSError, ValueError, TypeError) as error:
+        raise InputFault(
+            f"{path}: cannot be read as HDF5 with datasets of numbers: {error}"
+        ) from None
+    columns: dict[str, np.ndarray] = {}
+    for name, values in datasets.items():
+        if values.ndim == 1:
+            columns[name] = values
+        elif values.ndim == 2:
+            columns |= {f"{name}[{i + 1}]": values[:, i] for i in range(values.shape[1])}
+    if len({len(values) for values in columns.values()}) != 1:
+        raise InputFault(f"{path}: its datasets have no common number of samples")
+    return Table(tuple(columns), np.column_stack([*columns.values()]))

@@ -1,0 +1,197 @@
+"""The modes of a scene in poses and hands: in each pose it is linearised once, at rest in a firm
+spring hand that stands still there, and held by every hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.stability.hand_slopes import hand_slopes
+from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD, free, holds
+from hapticlink.analysis.stability.linear_period import LinearPeriod
+from hapticlink.analysis.stability.mode_kinds import Bounds, kind
+from hapticlink.analysis.stability.modes import Mode, counted, leading, modes, verdict
+from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.components.specs.hand import Hand
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, user_of_block
+from hapticlink.orchestrator.scene.scene import Scene
+
+SHARES = 3
+SLIGHT = 0.01
+"""Growth rate (1/s) of a marginal case, which takes more than a minute to double."""
+DAMPINGS = 2.0 ** np.arange(-4, 7)
+"""Of a free handle (N.s/m), that are tried."""
+CALMED = 0.1
+"""The rate (1/s) at which a free handle that is damped enough at least comes to rest: large motions
+around a pose where the constrained directions change grow where small ones decay slower."""
+TURNING = 1e-3
+"""Their rotational damping (N.m.s/rad) over that of translations (N.s/m)."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hand in a pose: growth rate and its uncertainty (1/s), frequency (Hz) and participation of
+    the leading mode, neutral ones aside; verdict: stable, unstable or marginal; kind: what grows,
+    or would."""
+
+    pose: str
+    hand: str
+    growth: float
+    uncertainty: float
+    hertz: float
+    kind: str
+    verdict: str
+    participation: tuple[tuple[str, float], ...]
+    damping: float | None = None
+    """Of a free handle that grows: the damping to ground (N.s/m) that ends it; infinite where none
+    of DAMPINGS does."""
+
+    @property
+    def free(self) -> bool:
+        return self.hand in (FREE, OWN_FREE)
+
+    @property
+    def drifts(self) -> bool:
+        return self.verdict == "unstable" and self.kind == "drift"
+
+    @property
+    def severity(self) -> tuple[bool, bool, float]:
+        """What is worse is larger: in a hand rather than free, fast rather than drifting."""
+        return self.verdict == "unstable" and not self.drifts, not self.free, self.growth
+
+    def record(self) -> dict[str, Any]:
+        return {
+            "pose": self.pose,
+            "hand": self.hand,
+            "growth_rate": self.growth,
+            "uncertainty": self.uncertainty,
+            "frequency": self.hertz,
+            "kind": self.kind,
+            "verdict": self.verdict,
+            "participation": dict(self.participation),
+            "damping_needed": self.damping,
+        }
+
+
+class InHands:
+    """A scene at rest in a pose, with gains scaled by `scales`, and all that the controller reads
+    `late` steps of it later; in the hand None it is as it is. Raises InputFault or FmuFault where
+    it has no equilibrium."""
+
+    def __init__(self, place: RestingScene, scales: Scales | None = None, late: int = 0) -> None:
+        period = place.period(scales or {})
+        self._period = period.delayed(CONTROLLER, late) if late else period
+        self._T, self._seconds = place.T, place.map.period
+        names = (f.name for f in place.map.system.fmus)
+        self._users = [name for name in names if user_of_block(name, HAND) is not None]
+
+    def worst(self, hands: Mapping[str, Hand | None], bounds: Bounds) -> float:
+        """The largest growth rate (1/s) in all hands, or the first one that is positive;
+        drifts and marginal ones do not count."""
+        largest = -np.inf
+        for hand in hands.values():
+            mode, period = self._leading(hand)
+            growth = mode.growth
+            if self._verdict(mode) == "unstable":
+                hertz = period.traced(mode).omega / (2 * np.pi)
+                if kind(growth, hertz, bounds) != "drift":
+                    return growth
+            else:
+                largest = max(largest, min(growth, -SLIGHT))
+        return largest
+
+    def cases(self, pose: str, hands: Mapping[str, Hand | None], bounds: Bounds) -> list[Case]:
+        """The case of each hand."""
+        return [self._case(pose, name, hand, bounds) for name, hand in hands.items()]
+
+    def _case(self, pose: str, name: str, hand: Hand | None, bounds: Bounds) -> Case:
+        mode, period = self._leading(hand)
+        said = self._verdict(mode)
+        mode = period.traced(mode)
+        hertz = mode.omega / (2 * np.pi)
+        uncertainty = float(min(mode.uncertainty, 1.0)) / self._seconds
+        moving = tuple(leading(mode, period.names(), SHARES))
+        grows = kind(mode.growth, hertz, bounds)
+        case = Case(pose, name, mode.growth, uncertainty, hertz, grows, said, moving)
+        if case.free and said == "unstable":
+            return replace(case, damping=self._damping())
+        return case
+
+    def _leading(self, hand: Hand | None) -> tuple[Mode, LinearPeriod]:
+        period = self._period
+        if hand is not None:
+            period = period.held(dict.fromkeys(self._users, hand_slopes(hand, self._T)))
+        return counted(modes(period.linear, self._seconds))[0], period
+
+    def _verdict(self, mode: Mode) -> str:
+        slight = np.expm1(SLIGHT * self._seconds)
+        return verdict(abs(mode.z), max(mode.uncertainty, slight))
+
+    def _damping(self) -> float:
+        """The least damping of a free handle with which it comes to rest."""
+        for b in DAMPINGS:
+            if self._leading(free(b, TURNING * b))[0].growth < -CALMED:
+                return float(b)
+        return float(np.inf)
+
+
+def in_poses(
+    scene: str | Path | Scene,
+    given: Sequence[str],
+    poses: Sequence[Pose],
+    hands: Mapping[str, Hand | None],
+    bounds: Bounds,
+    progress: Callable[[int, int], object] = lambda done, of: None,
+) -> tuple[list[Case], dict[str, str]]:
+    """The cases in all poses, and by pose why it has none."""
+    cases: list[Case] = []
+    without: dict[str, str] = {}
+    for i, pose in enumerate(poses):
+        if any(case.pose == pose.name for case in cases):
+            continue
+        try:
+            with at_pose(scene, given, pose, held=hands.keys() != {UNHELD}) as place:
+                # A constant wrench slides off what it presses on, whatever the loop does.
+                lasting = {
+                    name: hand
+                    for name, hand in hands.items()
+                    if hand is None or holds(hand) or not pose.touches
+                }
+                cases += InHands(place).cases(pose.name, lasting, bounds)
+        except (InputFault, FmuFault) as fault:
+            without[pose.name] = str(fault)
+        else:
+            without.pop(pose.name, None)
+        progress(i + 1, len(poses))
+    return cases, without
+
+
+@contextmanager
+def at_pose(
+    scene: str | Path | Scene,
+    given: Sequence[str],
+    pose: Pose,
+    held: bool = True,
+) -> Iterator[RestingScene]:
+    """The scene at rest in a pose, `held` there by a firm spring or as it is. A hand that slides
+    off what it touches presses lightly. Raises InputFault or FmuFault where there is no
+    equilibrium."""
+    with ExitStack() as stack:
+        try:
+            place = stack.enter_context(resting(scene, pose.options(given, held)))
+            if pose.touches and not place.touches:
+                raise InputFault("it comes off what it touches")
+        except (InputFault, FmuFault):
+            if not pose.touches:
+                raise
+            options = pose.lighter.options(given)
+            place = stack.enter_context(resting(scene, options))
+        yield place

@@ -1,0 +1,245 @@
+"""How far the worst case is from the limit, and what takes an unstable one to the safe side.
+
+Both are searched in one pose and all hands, and what is advised is judged in all poses before; with
+frames of whole haptic periods next to the scene's, whose map is short.
+A mode that only drifts counts as stable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from hapticlink.analysis.stability.bisection import largest
+from hapticlink.analysis.stability.gains import LAWS
+from hapticlink.analysis.stability.hand_cases import Case, InHands, at_pose, in_poses
+from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
+from hapticlink.analysis.stability.mode_kinds import Bounds
+from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.rates import frame_length, whole_frames
+from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.components.specs.hand import Hand
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import CONTROLLER
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.scene import Scene
+
+FINE = 0.1
+"""Of the logarithm of the factor on all stiffnesses."""
+FINEST = 2
+"""Of a count, the part to which it is found."""
+LATEST, SLOWEST = 8, 64
+"""Haptic periods up to which a further delay, and a frame, are tried."""
+HOLDS = ("zoh", "foh", "lead", "mean")
+"""That are tried as a remedy."""
+SAFE = 1.25
+"""By how much gains that are advised stay below their limit."""
+DAMPINGS = (0.5, 2.0)
+"""Factors on the damping of the coupling that are tried."""
+FASTER = (2, 4)
+"""Factors on rates that are tried."""
+TRIED = 3
+"""Remedies that are judged in all poses."""
+DECAY = 0.05
+"""Rate (1/s) at which a scene with a remedy decays at least, lest what is frozen takes it back."""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far the worst pose is from the limit in all hands; None where it has no such quantity."""
+
+    stiffness: float | None
+    """The factor on all stiffnesses, dampings by its root, up to which it is stable; 0 where it is
+    unstable with any."""
+    delay: float | None
+    """The further delay (s) of all that the controller reads."""
+    rate: float | None
+    """The lowest graphics rate (Hz) down to which it is stable; infinite where it is with none."""
+
+    def record(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """Options with which all hands are stable in all poses, the growth rate (1/s) of the worst case
+    with them, and in how many of how many cases it is so."""
+
+    options: tuple[str, ...]
+    growth: float
+    stable: bool
+
+    def record(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def improvements(
+    scene: str | Path | Scene,
+    given: Sequence[str],
+    poses: Sequence[Pose],
+    hands: Mapping[str, Hand | None],
+    bounds: Bounds,
+    worst: Case,
+) -> tuple[Margin, Remedy | None]:
+    """The margin in the `worst` pose, and what ends its instability in all `poses`; None where it
+    is stable."""
+    pose = next(pose for pose in poses if pose.name == worst.pose)
+    first = sorted(hands, key=lambda name: name != worst.hand)
+    held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
+    search = _Search(scene, tuple(given), pose, held, bounds)
+    stable = worst.free or worst.verdict != "unstable" or worst.drifts
+    with search.place() as place:
+        margin = search.margin(place)
+        candidates = () if stable else [*search.candidates(place, margin)]
+    return margin, search.remedy(candidates, poses) if candidates else None
+
+
+class _Search:
+    def __init__(
+        self,
+        scene: str | Path | Scene,
+        given: tuple[str, ...],
+        pose: Pose,
+        hands: Mapping[str, Hand | None],
+        bounds: Bounds,
+    ) -> None:
+        self._scene, self._given, self._pose = scene, given, pose
+        self._hands, self._bounds = hands, bounds
+        self._read = open_scene.load(scene, given)
+        self._haptic = exact(self._read.haptics.rate)
+
+    def place(self, change: Sequence[str] = ()) -> AbstractContextManager[RestingScene]:
+        """The scene with a change at rest in the pose, with frames of whole haptic periods."""
+        held = self._hands.keys() != {UNHELD}
+        return at_pose(self._scene, self._quick(change), self._pose, held)
+
+    def _quick(self, change: Sequence[str]) -> tuple[str, ...]:
+        """The options of the scene with a change, with frames of whole haptic periods."""
+        given = (*self._given, *change)
+        return whole_frames(open_scene.load(self._scene, given), given)
+
+    def margin(self, place: RestingScene) -> Margin:
+        stiffness = None
+        if place.gains.laws:
+            try:
+                stiffness = largest(lambda s: self._stable(place, s), FINE)
+            except InputFault:
+                stiffness = 0.0
+        stable = (stiffness is not None and stiffness >= 1.0) or self._stable(place)
+        delay = None
+        if CONTROLLER in place.map.system.fmu:
+            late = _last(lambda n: self._stable(place, late=n), 1, LATEST) if stable else 0
+            delay = float(late / self._haptic)
+        return Margin(stiffness, delay, self._rate(stable))
+
+    def _rate(self, stable: bool) -> float | None:
+        """The lowest graphics rate of whole haptic periods that is stable, with all above it that
+        were tried, from the scene's own on, at which it is `stable` or not."""
+        if self._read.graphics is None:
+            return None
+        own = frame_length(self._read)
+
+        def holds(n: int) -> bool:
+            return stable if n == own else self._growth([self._framed(n)]) < 0.0
+
+        frames = _last(holds, own, SLOWEST)
+        return float(self._haptic / frames) if frames else float("inf")
+
+    def _framed(self, n: int) -> str:
+        return f'graphics.rate="{self._haptic / n}"'
+
+    def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
+        """Whether all hands are stable with gains scaled, and all that the controller reads some
+        haptic periods later."""
+        try:
+            scales = {} if scale == 1.0 else dict.fromkeys(place.gains.laws, scale)
+            return InHands(place, scales, late).worst(self._hands, self._bounds) < 0.0
+        except (InputFault, FmuFault):
+            return False
+
+    def _growth(self, change: Sequence[str]) -> float:
+        """With a change, the growth rate of a hand in the pose that is unstable, or of the worst
+        one where none is; infinite where there is no equilibrium."""
+        try:
+            with self.place(change) as place:
+                return InHands(place).worst(self._hands, self._bounds)
+        except (InputFault, FmuFault):
+            return float("inf")
+
+    def candidates(self, place: RestingScene, margin: Margin) -> Iterator[tuple[str, ...]]:
+        """Single changes of the scene, and the last resort, gains and rate together."""
+        read, gains = self._read, place.gains
+        for hold in HOLDS:
+            if read.graphics is not None and hold != read.hold and not read.holds:
+                yield (f"hold={hold}",)
+        gain: tuple[str, ...] = ()
+        if margin.stiffness:
+            scale = min(1.0, margin.stiffness) / SAFE
+            gain = tuple(overrides.written(gains.options(dict.fromkeys(gains.laws, scale))))
+            yield gain
+        table, _, _ = LAWS["drift"]
+        for factor in DAMPINGS:
+            for key, value in gains.options({"drift": factor**2}).items():
+                if key == f"{table}.damping":
+                    yield tuple(overrides.written({key: value}))
+        if read.graphics is not None:
+            assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
+            rate = float(exact(read.graphics.rate))
+            if margin.rate is not None and margin.rate > rate:
+                rate = min(margin.rate, float(self._haptic))
+            for factor in (1, *FASTER):
+                if rate < factor * rate <= float(self._haptic) or factor == 1:
+                    yield (f"graphics.rate={factor * rate:g}", *(gain if factor == 1 else ()))
+            if read.mechanism_at == "graphics":
+                yield ("mechanism_at=haptics",)
+        for factor in FASTER:
+            yield (f"haptics.rate={factor * float(self._haptic):g}",)
+            if gain:
+                yield (f"haptics.rate={factor * float(self._haptic):g}", *gain)
+
+    def remedy(self, candidates: Sequence[tuple[str, ...]], poses: Sequence[Pose]) -> Remedy | None:
+        """The candidate that is judged best in the worst pose and holds in all poses; the best of
+        TRIED of them where none does."""
+        growth = {change: self._growth(change) for change in candidates}
+        best: Remedy | None = None
+        for change in sorted(growth, key=lambda change: growth[change])[:TRIED]:
+            if growth[change] >= 0.0 and best:
+                break
+            quick = self._quick(change)
+            cases, without = in_poses(self._scene, quick, poses, self._hands, self._bounds)
+            worst = float("inf") if without else _worst(cases)
+            if best is None or worst < best.growth:
+                best = Remedy(change, worst, worst < -DECAY)
+            if best.stable:
+                break
+        return best
+
+
+def _worst(cases: Sequence[Case]) -> float:
+    """The largest growth rate of the cases that do not only drift, and are not marginal."""
+    rates = [case.growth for case in cases if case.verdict != "marginal" and not case.drifts]
+    return max(rates, default=-float("inf"))
+
+
+def _last(holds: Callable[[int], bool], first: int, most: int) -> int:
+    """The largest count up to `most` that holds, with all below it that were tried, by doubling or
+    halving the `first` one and bisection to a part FINEST of it; 0 where 1 does not."""
+    low, high = 0, first
+    if holds(first):
+        low, high = first, 2 * first
+        while high <= most and holds(high):
+            low, high = high, 2 * high
+        if high > most:
+            return low
+    else:
+        while (low := high // 2) and not holds(low):
+            high = low
+    while low and high - low > max(1, low // FINEST):
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low

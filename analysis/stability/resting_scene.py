@@ -1,0 +1,169 @@
+"""A scene at its equilibrium in a pose, in a hand: its linearised period under changed gains and in
+other hands, and its compliance with the hand cut off (port_response.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from hapticlink.analysis.stability.equilibrium import equilibrium
+from hapticlink.analysis.stability.gains import Gains, Scales
+from hapticlink.analysis.stability.hand_slopes import HandSlopes, hand_slopes
+from hapticlink.analysis.stability.hands import spring_hand
+from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.linear_period import LinearPeriod
+from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
+from hapticlink.analysis.stability.modes import Mode, modes
+from hapticlink.analysis.stability.port_response import hand_port, response
+from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import ENVIRONMENT_WRENCH, HAND
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
+
+SOFT = 0.25
+"""Scale of the scene's gains with which an equilibrium is searched where they throw the handle
+off."""
+SURE = 0.01
+"""Uncertainty of an eigenvalue below which it may count as 1."""
+
+
+def _felt(mode: Mode) -> bool:
+    """Whether a mode that grows is more than a drift."""
+    return kind(mode.growth, mode.omega / (2 * np.pi), DRIFT) != "drift"
+
+
+class RestingScene:
+    """A scene at its equilibrium in the hand that it has, searched from a `start`, such as the
+    `equilibrium` of the same scene at other rates. T: the haptic period (s). gains: those of its
+    laws, with which the map begins `scaled`. Raises InputFault where there is no equilibrium."""
+
+    def __init__(
+        self,
+        map_: LiftedMap,
+        gains: Gains,
+        T: float,
+        start: Vector | None = None,
+        scaled: float = 1.0,
+    ) -> None:
+        self.map, self.gains, self.T = map_, gains, T
+        if start is None or len(start) != len(map_.start):  # holds keep more or fewer samples
+            start = map_.start
+        self._home = equilibrium(map_, start)
+        own: Scales = {}
+        self._known: tuple[Scales | None, LinearPeriod] = own, self._home
+        if scaled != 1.0:
+            self._known = None, self._home
+            with suppress(InputFault, FmuFault):  # gains too stiff for an equilibrium
+                self._home = self.period(own)
+
+    @property
+    def equilibrium(self) -> Vector:
+        """The state at the equilibrium with the scene's gains, or with softer ones."""
+        return self._home.point
+
+    @property
+    def touches(self) -> bool:
+        """Whether a contact force acts at the `equilibrium`."""
+        return bool(self.signal(ENVIRONMENT_WRENCH).any())
+
+    def change(self, parameters: Sequence[tuple[str, Scalar, float]]) -> None:
+        """Sets tunable parameters, by FMU, and moves to the equilibrium with them. Raises
+        InputFault or FmuFault where there is none nearby."""
+        self.map.set_parameters(parameters)
+        self._home = equilibrium(self.map, self._home.point)
+        self._known = {}, self._home
+
+    def modes(self, scales: Scales, hands: Mapping[str, HandSlopes]) -> list[Mode]:
+        """The modes with gains scaled by `scales`, in other hands by the FMUs in whose place they
+        are, that of the largest |z| first. Raises InputFault or FmuFault without equilibrium."""
+        return modes(self.period(scales).held(hands).linear, self.map.period)
+
+    def stable(self, scales: Scales, hand: float) -> bool:
+        """Whether no mode grows, neutral ones and slow drift aside, with gains scaled by `scales`
+        in a spring hand of the stiffness `hand` (N/m)."""
+        try:
+            period = self.period(scales).held({HAND: hand_slopes(spring_hand(hand), self.T)})
+            all_modes = modes(period.linear, self.map.period)
+        except (FmuFault, InputFault):  # diverges at once
+            return False
+        # An error as large as z says nothing of z = 1.
+        counted = [mode for mode in all_modes if not (mode.neutral and mode.uncertainty < SURE)]
+        return bool(counted) and not any(
+            mode.growth > 0.0 and _felt(period.traced(mode)) for mode in counted
+        )
+
+    def signal(self, port: str) -> Matrix:
+        """The values of an output `fmu.port` at the `equilibrium`; none without such an output."""
+        return self._home.point[self._places(port)]
+
+    def _places(self, port: str) -> list[int]:
+        return [
+            i
+            for i, c in enumerate(self.map.coordinates)
+            if c.kind == "signal" and str(c).partition("[")[0] == port
+        ]
+
+    def compliance(self, scales: Scales, hertz: float) -> Complex:
+        """The compliance (3, 3) of the handle at a frequency. Raises InputFault where it has no
+        equilibrium with these gains."""
+        try:
+            linear = self.period(scales).in_map
+        except FmuFault as fault:
+            raise InputFault(str(fault)) from None
+        return response(self.map, linear, hand_port(self.map.system)).compliance(hertz, self.T)
+
+    def period(self, scales: Scales) -> LinearPeriod:
+        """The period at the equilibrium with these gains, searched from `equilibrium`, so that the
+        result does not depend on what was asked before."""
+        if scales != self._known[0]:
+            self.map.set_parameters([*self.gains.parameters(scales)])
+            period = equilibrium(self.map, self._home.point)
+            if self.touches and not period.point[self._places(ENVIRONMENT_WRENCH)].any():
+                raise InputFault("it comes off what it touches")
+            self._known = dict(scales), period
+        return self._known[1]
+
+
+@contextmanager
+def resting(
+    scene: str | Path | Scene, options: Options = (), start: Vector | None = None
+) -> Iterator[RestingScene]:
+    """A scene with `options` at its equilibrium next to its start, or to the state `start`, in the
+    hand that it has. Raises InputFault or FmuFault where it has none."""
+    with (
+        linearisable(scene, options) as (read, system, _),
+        resting_system(read, system, start) as place,
+    ):
+        yield place
+
+
+@contextmanager
+def resting_system(
+    read: Scene, system: System, start: Vector | None = None
+) -> Iterator[RestingScene]:
+    """`resting` of a system that is built."""
+    with ExitStack() as stack:
+        system = long_enough(read, system)
+        gains, T = Gains(system), float(1 / exact(read.haptics.rate))
+
+        def rested(scale: float) -> RestingScene:
+            softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
+            map_ = stack.enter_context(lifted_map(softer, read))
+            return RestingScene(map_, gains, T, start, scale)
+
+        try:
+            place = rested(1.0)
+        except (InputFault, FmuFault):
+            if not gains.laws:
+                raise
+            place = rested(SOFT)
+        yield place

@@ -1,0 +1,123 @@
+"""The spectral radius of many variants of a scene, in its own hand, with FMUs that stay loaded.
+
+Where the next variant differs in tunable parameters alone, they are set in the loaded FMUs, and the
+search for its equilibrium starts from that of the variant before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+
+from hapticlink.analysis.stability.hand_slopes import hand_slopes
+from hapticlink.analysis.stability.modes import counted, verdict
+from hapticlink.analysis.stability.poses import in_own_hand
+from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.components.specs.hand import Hand
+from hapticlink.orchestrator.base.faults import Fault, FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import HAND
+from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
+
+Starts = dict[tuple[str, str], tuple[Scalar, float]]
+
+
+@dataclass(frozen=True)
+class Radius:
+    """The spectral radius of a variant over its hyperperiod (s), and its uncertainty."""
+
+    radius: float
+    uncertainty: float
+    period: float
+
+    @property
+    def verdict(self) -> str:
+        return verdict(self.radius, self.uncertainty)
+
+    @property
+    def growth(self) -> float:
+        """Growth rate (1/s)."""
+        return float(np.log(max(self.radius, 1e-300))) / self.period
+
+
+class SceneVariants:
+    """Judges variants of `scene`, one after the other; as a context manager it unloads the FMUs."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._open = ExitStack()
+        self._place: RestingScene
+        self._hand: Hand | None = None
+        self._kind: Hashable = None
+        self._starts: Starts = {}
+        self.loads = 0
+
+    def __enter__(self) -> SceneVariants:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._open.close()
+
+    def judge(self, options: Options) -> Radius:
+        """The spectral radius of the scene with `options`, around its equilibrium in its own hand.
+        Raises InputFault and FmuFault where it has none."""
+        given = overrides.written(options)
+        with linearisable(self._scene, given) as (_, system, _):
+            kind, starts = _kind(system), _starts(system)
+        try:
+            if kind != self._kind or not self._moved(starts):
+                self._load(given, kind)
+        except Fault:
+            self._kind = None
+            raise
+        self._starts = starts
+        hands = {HAND: hand_slopes(self._hand, self._place.T)} if self._hand else {}
+        leading = counted(self._place.modes({}, hands))[:1]
+        radius, uncertainty = (abs(leading[0].z), leading[0].uncertainty) if leading else (0.0, 0.0)
+        return Radius(radius, uncertainty, self._place.map.period)
+
+    def _load(self, given: Sequence[str], kind: Hashable) -> None:
+        self._open.close()
+        self._place, self._hand = self._open.enter_context(in_own_hand(self._scene, given))
+        self._kind = kind
+        self.loads += 1
+
+    def _moved(self, starts: Starts) -> bool:
+        """Sets the parameters that differ; False where that takes another FMU, or ends at no
+        equilibrium nearby."""
+        if starts.keys() != self._starts.keys():
+            return False
+        changed = [(k, v) for k, v in starts.items() if v[1] != self._starts[k][1]]
+        if any(v[0].causality != "parameter" or v[0].variability != "tunable" for _, v in changed):
+            return False
+        if self._hand and any(fmu == HAND for (fmu, _), _ in changed):
+            return False
+        try:
+            self._place.change([(fmu, scalar, value) for (fmu, _), (scalar, value) in changed])
+        except (InputFault, FmuFault):
+            return False
+        return True
+
+
+def _kind(system: System) -> Hashable:
+    """What two systems share whose parameters alone differ."""
+    time = system.timeline
+    paces = tuple((c.name, c.first, c.longest, c.shortest, len(c.starts)) for c in time.clocks)
+    fmus = tuple((f.name, f.description.guid, f.clock) for f in system.fmus)
+    return time.base, paces, fmus, tuple(map(repr, system.connections)), system.coupling.scheme
+
+
+def _starts(system: System) -> Starts:
+    return {
+        (f.name, scalar.name): (scalar, value)
+        for f in system.fmus
+        for scalar, value in f.starts
+        if not isinstance(value, str)
+    }

@@ -1,0 +1,189 @@
+"""The verdict on a scene over poses and hands, as text and as a record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.stability.hands import FREE
+from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
+from hapticlink.analysis.stability.mode_kinds import Bounds
+from hapticlink.analysis.stability.poses import Pose
+from hapticlink.components.specs.hand import Hand
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The stability of a scene in poses and hands."""
+
+    title: str
+    bounds: Bounds
+    poses: tuple[Pose, ...]
+    hands: Mapping[str, Hand | None]
+    """By name, the scene's own among them; None: as it is."""
+    cases: tuple[Case, ...]
+    without: Mapping[str, str]
+    """By pose without equilibrium, the reason."""
+    worst: Case
+    margin: Margin
+    remedy: Remedy | None
+    """What makes all hands stable; None where they are, or where nothing that was tried does."""
+    frozen: tuple[str, ...]
+    """Lines of text on what is removed or stays as at rest."""
+    rounded: str = ""
+    """At which rate it was judged instead of its own, and why."""
+
+    @property
+    def in_hands(self) -> str:
+        """stable, marginal, drifts or unstable, in the worst of all hands."""
+        return _word([case for case in self.cases if not case.free])
+
+    @property
+    def in_free_air(self) -> str:
+        """The same where nobody holds the handle; "" where the scene's hand does."""
+        loose = [case for case in self.cases if case.free]
+        return _word(loose) if loose else ""
+
+    @property
+    def verdict(self) -> str:
+        """stable, marginal, drifts or unstable: in hands; "not held" where it is stable in these,
+        and the scene has no hand that brings it to rest."""
+        loose = FREE in self.hands or self.in_free_air not in ("", "stable")
+        if self.in_hands in ("stable", "marginal") and loose:
+            return "not held"
+        return self.in_hands
+
+    @property
+    def growth(self) -> float:
+        """The growth rate (1/s) of the worst case."""
+        return self.worst.growth
+
+    @property
+    def damping(self) -> float | None:
+        """The damping to ground (N.s/m) that a handle lacks that nobody holds, infinite where none
+        that was tried suffices; None where it lacks none."""
+        return max((c.damping for c in self.cases if c.damping is not None), default=None)
+
+    def record(self) -> dict[str, Any]:
+        """The content of stability.json."""
+        return {
+            "title": self.title,
+            "verdict": self.verdict,
+            "in_hands": self.in_hands,
+            "in_free_air": self.in_free_air or None,
+            "growth_rate": self.growth,
+            "worst": self.worst.record(),
+            "margin": self.margin.record(),
+            "remedy": self.remedy.record() if self.remedy else None,
+            "damping_needed_in_free_air": self.damping,
+            "drift": asdict(self.bounds),
+            "poses": [asdict(pose) for pose in self.poses],
+            "poses_without_equilibrium": dict(self.without),
+            "hands": {name: asdict(hand) if hand else None for name, hand in self.hands.items()},
+            "cases": [case.record() for case in self.cases],
+            "frozen": list(self.frozen),
+            "rounded": self.rounded,
+        }
+
+    @property
+    def finding(self) -> str:
+        """The verdict in one line."""
+        poses = len({case.pose for case in self.cases})
+        held = {case.hand for case in self.cases if not case.free}
+        edge = {c.hand for c in self.cases if c.hand in held and c.verdict == "marginal"}
+        hands = f"{len(held)} hands" if len(held) > 1 else next(iter(held), "")
+        everywhere = f"in {hands} and {poses} pose{'s' if poses > 1 else ''}"
+        if edge:
+            everywhere += f", marginal in {len(edge)} of the hands"
+        worst = self.worst
+        if self.verdict == "unstable":
+            return f"unstable: {_named(worst)}"
+        if self.verdict == "drifts":
+            return f"drifts slowly, and does not vibrate, {everywhere}: {_named(worst)}"
+        if self.verdict == "not held":
+            loose = max((c for c in self.cases if c.free), key=lambda c: c.severity)
+            if loose.verdict != "unstable":
+                return (
+                    f"not held: in free air it does not grow, nor come to rest; stable {everywhere}"
+                )
+            does = "drifts" if loose.drifts else f"shows a growing {loose.kind}"
+            ends = "small motions decay with no damping that was tried"
+            if self.damping is not None and math.isfinite(self.damping):
+                ends = f"small motions decay with about {self.damping:.2g} N.s/m of damping"
+            return (
+                f"not held: in free air it {does} at {loose.growth:.2g} 1/s, and {ends}; "
+                f"stable {everywhere}"
+            )
+        if self.verdict == "marginal":
+            return f"marginal in {len(edge)} of {hands}, stable in the others: {_named(worst)}"
+        return f"stable {everywhere}; slowest to decay at {-worst.growth:.3g} 1/s, {_where(worst)}"
+
+    def lines(self) -> Iterator[str]:
+        """The result as text, below the finding."""
+        yield f"{'hand':28s} {'worst pose':24s} {'growth 1/s':>11s} {'Hz':>7s}  what"
+        for hand in _hands(self.cases):
+            worst = max((c for c in self.cases if c.hand == hand.hand), key=lambda c: c.severity)
+            what = worst.kind if worst.verdict == "unstable" else worst.verdict
+            yield (
+                f"{worst.hand:28s} {worst.pose:24s} {worst.growth:11.3g} {worst.hertz:7.3g}  {what}"
+            )
+        yield f"margin at {self.worst.pose}: {', '.join(self._margins())}"
+        if self.remedy:
+            options = " ".join(f"--set '{option}'" for option in self.remedy.options)
+            how = f"decays at {-self.remedy.growth:.2g} 1/s"
+            if math.isinf(self.remedy.growth):
+                how = "nothing grows by more than a drift"
+            if not self.remedy.stable:
+                how = f"improves most, to {self.remedy.growth:.2g} 1/s, which is not enough"
+            yield f"remedy: {options}: {how}"
+        elif self.verdict == "unstable":
+            yield "remedy: no single change of hold, rate, gain or damping that was tried"
+        if self.worst.participation and self.verdict != "stable":
+            parts = ", ".join(f"{name} {share:.2f}" for name, share in self.worst.participation)
+            yield f"who moves: {parts}"
+        if self.rounded:
+            yield self.rounded
+        for pose, why in self.without.items():
+            yield f"pose at {pose} left out: {why}"
+
+    def _margins(self) -> Iterator[str]:
+        margin = self.margin
+        if margin.stiffness is not None:
+            yield (
+                f"stiffnesses times {margin.stiffness:.2g}"
+                if margin.stiffness
+                else "unstable with any stiffness"
+            )
+        if margin.delay is not None:
+            yield f"{1e3 * margin.delay:.3g} ms of further delay"
+        if margin.rate is not None:
+            yield (
+                f"graphics down to {margin.rate:.3g} Hz"
+                if math.isfinite(margin.rate)
+                else "no graphics rate"
+            )
+        if margin.stiffness is None and margin.delay is None and margin.rate is None:
+            yield "no coupling and no second rate"
+
+
+def _hands(cases: tuple[Case, ...]) -> list[Case]:
+    """A case of each hand."""
+    return list({case.hand: case for case in cases}.values())
+
+
+def _word(cases: list[Case]) -> str:
+    growing = [case for case in cases if case.verdict == "unstable"]
+    if not growing:
+        return "marginal" if any(case.verdict == "marginal" for case in cases) else "stable"
+    return "drifts" if all(case.drifts for case in growing) else "unstable"
+
+
+def _where(case: Case) -> str:
+    return f"in {case.hand} at {case.pose}"
+
+
+def _named(case: Case) -> str:
+    return f"{case.kind} of {case.hertz:.3g} Hz grows at {case.growth:.3g} 1/s {_where(case)}"

@@ -1,0 +1,55 @@
+"""`hapticlink fit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.commands.options import Json, Out, Quiet, Set, default_folder, print_result
+from hapticlink.commands.progress import waiting
+
+Log = Annotated[Path, Parameter(help="CSV or HDF5 file, or the folder of a run.")]
+OfScene = Annotated[str, Parameter(help="Scene whose device and hand are assumed.")]
+Fitted = Annotated[
+    str | None,
+    Parameter(help="Keys of [device] to fit, name,name,...; by default handle and friction."),
+]
+
+
+def fit(
+    log: Log,
+    /,
+    *,
+    scene: OfScene = "closed-loop",
+    device: Fitted = None,
+    out: Out = None,
+    set: Set = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Fit a device, and the arm that holds it, to a log of its encoders and forces.
+
+    Prints each parameter with its standard deviation. Writes fit.json, and fitted.toml with the
+    tables [device] and [hand] of a scene, to OUT (default `fits/LOG`). What the log must have:
+    docs/fit.md.
+
+    For example:
+
+        hapticlink fit shaken.csv --device handle_mass,motor_friction
+    """
+    from hapticlink.analysis.fit.device_fit import FITTED
+    from hapticlink.analysis.fit.fit import fit as fitted
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.results.files import write_json
+
+    names = tuple(device.split(",")) if device else FITTED
+    with waiting(f"{log.name}: fitting, which takes seconds for each second of it", quiet):
+        result = fitted(log, scene, tuple(set or ()), device=names)
+    folder = folders.ensure(out or default_folder("fits", log.stem))
+    write_json(folder / "fit.json", result.record())
+    (folder / "fitted.toml").write_text(result.scene(), encoding="utf-8")
+    lines = (*result.lines(), f"{folder}/: fitted.toml, fit.json")
+    print_result((f"{log.name}:", *(f"  {line}" for line in lines)), result.record(), quiet, json)
+    return 0

@@ -1,0 +1,338 @@
+"""An FMU loaded into this process, with its values in shared arrays: FMI 2.0 here, the differences
+of FMI 3.0 in `in_process_fmi3`.
+
+FMPy loads the library and instantiates; during the run the C functions are called directly, with
+pointers that are created once. Every status is checked, every output must be finite, and the
+messages that the FMU logged are part of the error.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import sys
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from fmpy import fmi2
+
+from hapticlink.orchestrator.base import current_directory
+from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
+from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries, rounding_mode
+from hapticlink.orchestrator.fmi.capabilities import restores_state
+from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
+from hapticlink.orchestrator.fmi.input_derivatives import Varying
+from hapticlink.orchestrator.fmi.instance import Vector
+from hapticlink.orchestrator.fmi.load_library import loaded
+from hapticlink.orchestrator.fmi.retry import Retry
+from hapticlink.orchestrator.fmi.setter import Places, Setter
+from hapticlink.orchestrator.fmi.start_values import Starts, wide
+from hapticlink.orchestrator.fmi.states import WithStates
+from hapticlink.orchestrator.fmi.status import (
+    DISCARD,
+    ERROR,
+    FATAL,
+    STATUS,
+    succeeded,
+    worse,
+)
+from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
+from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
+from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
+
+
+class InProcess(WithStates):
+    """An FMU of FMI 2.0 whose library is loaded into this process. `slave`, `gets`, `fewer` and
+    `retry` are for the compiled loop."""
+
+    _library: Callable[..., Any] = fmi2.FMU2Slave
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.retry: Retry | None = None
+        self._initialized = False
+        self._setters = 0
+        """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
+        self.holds_python = False
+        self._key = messages.opened()
+
+    def _load(self) -> None:
+        try:
+            self._folder = process_cache.unpack(self.description, self._folder)
+            with current_directory.restored(self.name):
+                self.slave = self._instantiate()
+            self._keep_arithmetic()
+        except Exception as error:  # FMPy raises bare Exception
+            reason = str(error)
+            if reason.startswith("Failed to instantiate"):
+                reason = "its instantiation failed; its guid may not be that of its binary"
+            raise self._fault(f"could not be loaded: {reason}", 0.0) from error
+        outputs = self.description.outputs
+        self.gets = self.fewer = self._transfers("Get", outputs, self.outputs)
+        if self.seldom:
+            often = [s for s in outputs if s.name not in self.seldom]
+            places = [*map(outputs.index, often)]
+            self.fewer = self._transfers("Get", often, self.outputs, {}, places)
+        do_step = self._stepper()
+
+        def advance(time: float, size: float) -> int:
+            self.place.steps += 1
+            try:
+                status = do_step(time, size)
+            except SystemError as error:
+                raise self.raised(self.do_step, error) from error
+            finally:
+                self._keep_arithmetic()
+            return self._settled(status, time)
+
+        self._advance: Callable[[float, float], int] = advance
+        if self.policy.discard == "retry" and Retry.possible(self.description):
+            self.retry = Retry(self.slave, self.description.fmi, self.place, advance)
+            self._advance = self.retry.step
+
+    def _instantiate(self) -> Any:
+        about = self.description
+        slave = loaded(
+            self._library, about.fmi, about.guid, about.identifier, self._folder, self.name
+        )
+        self.holds_python = python_libraries.prepare(slave.dll, self._folder)
+        slave.instantiate(loggingOn=True, **self._logging())
+        return slave
+
+    def _logging(self) -> dict[str, Any]:
+        """The arguments of FMPy's `instantiate` that bring messages here."""
+        return {"callbacks": messages.callbacks(self._key)}
+
+    def _stepper(self) -> Callable[[float, float], int]:
+        """(time, size) -> status of a doStep."""
+        do_step, component = self.slave.dll["fmi2DoStep"], self.slave.component
+        do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+        self._ended = ended_in_discard(self.slave)
+        forward = int(self.forward)
+        return lambda time, size: do_step(component, time, size, forward)
+
+    @property
+    def do_step(self) -> str:
+        """The name of its step function."""
+        return f"fmi{self.description.fmi}DoStep"
+
+    @property
+    def forward(self) -> bool:
+        """noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to."""
+        return not restores_state(self.description)
+
+    def _settled(self, status: int, time: float) -> int:
+        """The status of a step from `time` (s) that returned `status`: ok where the FMU requests
+        the end of the simulation by it."""
+        if status == DISCARD and (end := self._ended(time)) is not None:
+            self._end(end)
+            return 0
+        return status
+
+    def _end(self, end: float) -> None:
+        """The FMU requests the end of the simulation at `end` (s). Raises AsksToEnd if that lies
+        within its step."""
+        time, size = self.place.begin, self.place.size
+        if end < time + (1 - SHARE) * size:
+            what = f"asks to end the simulation at {end:.6g} s, within its step"
+            raise AsksToEnd(self.name, what, time, passing=True)
+        self.place.ended = 1
+
+    def _transfers(self, verb: str, *what: Any) -> list[Transfer]:
+        return transfers(self.slave, self.description.fmi, verb, *what)
+
+    # --- initialisation -------------------------------------------------------------------
+
+    def connect(
+        self,
+        scalars: Sequence[Scalar],
+        places: Sequence[int],
+        exact: Mapping[str, int] = MappingProxyType({}),
+    ) -> Setter:
+        """exact: integers, by name, to be set instead of the values."""
+        order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
+        where, conversions = [places[i] for i in order], [scalars[i].conversion for i in order]
+        setting = self._setting([scalars[i] for i in order], exact)
+        self._setters += self.description.block is not None
+        set_all = partial(self._carry_out, counted="sets")
+        return Setter(where, conversions, *setting, set_all, self.place, self._setters)
+
+    def _carry_out(
+        self, transfers: Sequence[Transfer], counted: str, passing: bool = False
+    ) -> None:
+        try:
+            for transfer in transfers:
+                setattr(self.place, counted, getattr(self.place, counted) + 1)
+                status = transfer.call()
+                self._keep_arithmetic()
+                if not succeeded(status):
+                    raise self.failed(transfer.name, status)
+        except SystemError as error:
+            raise self.raised(transfer.name, error) from error
+        except Unfit as why:
+            raise self._fault(str(why), self.time, passing, repeatable=True) from None
+
+    def connect_derivatives(
+        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
+    ) -> Callable[[Vector], None]:
+        varying = Varying(self.slave, scalars, orders, places)
+        if self.retry:
+            self.retry.renew = varying.renew
+
+        def set_from(board: Vector) -> None:
+            self.place.setter = 0  # the inputs move on from what was set
+            if not self.ended and not succeeded(status := varying.set(board)):
+                raise self.failed(varying.name, status)
+
+        return set_from
+
+    def _setting(
+        self, scalars: Sequence[Scalar], exact: Mapping[str, int]
+    ) -> tuple[Vector, Places | None, list[Transfer]]:
+        """`whole`, `into` and `transfers` of a Setter of `scalars`."""
+        values = np.zeros(len(scalars))
+        return values, None, self._transfers("Set", scalars, values, exact)
+
+    def _set_starts(self) -> None:
+        self._set_numbers(tuple(row for row in self.starts if not row[0].structural))
+        for scalar, text in self.starts:
+            if isinstance(text, str):
+                self._set_text(scalar, text)
+
+    def _set_numbers(self, starts: Starts) -> None:
+        numbers = [(s, v) for s, v in starts if not isinstance(v, str)]
+        if numbers:
+            places = range(len(numbers))
+            set_from = self.connect([s for s, _ in numbers], places, wide(starts))
+            set_from(np.array([float(v) for _, v in numbers]))
+
+    def _set_text(self, scalar: Scalar, text: str) -> None:
+        one = (ctypes.c_uint * 1)(scalar.reference), 1, (ctypes.c_char_p * 1)(text.encode())
+        self._call("fmi2SetString", *one)
+
+    def enter_initialization(self, stop_time: float) -> None:
+        self._call("fmi2SetupExperiment", False, 0.0, 0.0, True, stop_time)
+        self._set_starts()
+        self._call("fmi2EnterInitializationMode")
+
+    def exit_initialization(self) -> None:
+        self._call(f"fmi{self.description.fmi}ExitInitializationMode")
+        self._initialized = True
+        self._start_loop()
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        try:
+            getattr(self.slave, name)(self.slave.component, *arguments)
+        except Exception as error:
+            raise self.failed(name, getattr(error, "status", ERROR)) from error
+        finally:
+            self._keep_arithmetic()
+
+    def _keep_arithmetic(self) -> None:
+        """Restores how this process rounds numbers where an FMU of others has changed it."""
+        if self.description.block is None and rounding_mode.restored():
+            self.place.altered += 1
+
+    # --- the loop -------------------------------------------------------------------------
+
+    @property
+    def asked(self) -> list[Transfer]:
+        """The calls that `read` makes."""
+        return self.gets if self.due.value else self.fewer
+
+    def read(self) -> None:
+        self._carry_out(self.asked, "gets", passing=True)
+
+    @property
+    def smaller_steps(self) -> int:
+        return self.retry.smaller if self.retry else 0
+
+    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
+        return derivatives(self.slave, self.description, outputs, inputs)
+
+    def step(self, time: float, end: float, size: float) -> None:
+        place = self.place
+        place.time = place.begin = time
+        place.size, place.end = size, end
+        if place.ended:
+            raise AsksToEnd(self.name, "has asked to end the simulation", time)
+        begin = clock.perf_counter()
+        status = self._advance(time, size)
+        place.step_time += clock.perf_counter() - begin
+        self.stepped(status)
+
+    def stepped(self, status: int) -> None:
+        """Ends a step that returned `status`."""
+        if not succeeded(status):
+            raise self.failed(self.do_step, status, passing=status in (DISCARD, ERROR))
+        self.place.time = self.place.end
+
+    def after_step(self, status: int) -> None:
+        """Ends a step whose doStep, called by the compiled loop, returned `status`."""
+        begin, size = self.place.begin, self.place.size
+        status = self._settled(status, begin)
+        if self.retry:
+            self.retry.begin = begin
+            status = self.retry.after(status, begin, size)
+        self.stepped(status)
+
+    def finish(self) -> None:
+        """Nothing to wait for: `step` returns after doStep."""
+
+    # --- ends -----------------------------------------------------------------------------
+
+    def failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
+        self._status = worse(self._status, status)
+        named = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
+        if status == DISCARD and self.policy.discard == "retry":
+            why = "in steps of 1/1024 too" if self.retry else Retry.why_not(self.description)
+            named += f" ({why})"
+        what = f"{call} returned {named}"
+        return self._fault(what, self.time, passing, repeatable=status == DISCARD)
+
+    def raised(self, call: str, error: SystemError) -> FmuFault:
+        """The fault of a Python FMU whose library went on after an exception, which ctypes finds
+        when the call returns."""
+        self._status = worse(self._status, ERROR)
+        cause = error.__cause__ or error
+        what = f"{call} left {type(cause).__name__} behind: {cause}"
+        return self._fault(what, self.time)
+
+    def dismiss(self) -> None:
+        """Nothing to do in advance: `close` is quick."""
+
+    def abandon(self) -> None:
+        self._status = FATAL
+
+    def _logged(self) -> list[str]:
+        return messages.newest(self._key)
+
+    def close(self) -> FmuFault | None:
+        """After fmi2Fatal the FMU is not called again."""
+        slave, self.slave = self.slave, None
+        fault = None
+        try:
+            if slave is not None and self._status < FATAL:
+                if self.retry is not None:
+                    self.retry.free()
+                self.free_states()
+                if self._status < ERROR and self._initialized:
+                    terminate = f"fmi{self.description.fmi}Terminate"
+                    status = slave.dll[terminate](ctypes.c_void_p(slave.component))
+                    fault = None if succeeded(status) else self.failed(terminate, status)
+                if self._status < FATAL:
+                    slave.freeInstance()
+            return fault
+        finally:
+            messages.closed(self._key)
+            self._keep_arithmetic()
+            if self.place.altered:
+                warning = "%s changed how this process rounds numbers, in %d calls; it is restored"
+                logging.getLogger(__name__).warning(warning, self.name, self.place.altered)
+            if self._folder and not process_cache.leave(self._folder):
+                # pythonfmu puts resources/ on sys.path for good.
+                sys.path[:] = [p for p in sys.path if not p.startswith(self._folder)]

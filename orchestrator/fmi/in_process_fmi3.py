@@ -1,0 +1,92 @@
+"""The differences of an FMI 3.0 co-simulation FMU from one of FMI 2.0.
+
+Event mode, early return and intermediate update are not used, so a step is never cut short and its
+inputs are constant (FMI 3.0 section 4.2.1)."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from fmpy import fmi3
+
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.instance import Vector
+from hapticlink.orchestrator.fmi.messages import keep
+from hapticlink.orchestrator.fmi.setter import Places
+from hapticlink.orchestrator.fmi.start_values import wide
+from hapticlink.orchestrator.fmi.status import succeeded
+from hapticlink.orchestrator.fmi.transfer import Transfer
+from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
+
+
+class InProcess3(InProcess):
+    """An FMU of FMI 3.0 whose library is loaded into this process."""
+
+    _library = fmi3.FMU3Slave
+
+    def _logging(self) -> dict[str, Any]:
+        def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:
+            keep(self._key, status, message)
+
+        return {"logMessage": log}
+
+    def _stepper(self) -> Callable[[float, float], int]:
+        do_step, component = self.slave.dll["fmi3DoStep"], self.slave.component
+        self.step_flags = [ctypes.c_bool() for _ in range(3)]  # event, terminate, early return
+        self.reached = ctypes.c_double()
+        flags, last = [ctypes.byref(flag) for flag in self.step_flags], ctypes.byref(self.reached)
+        forward, instance = ctypes.c_bool(self.forward), ctypes.c_void_p(component)
+
+        def advance(time: float, size: float) -> int:
+            begin, over = ctypes.c_double(time), ctypes.c_double(size)
+            status: int = do_step(instance, begin, over, forward, *flags, last)
+            return status
+
+        return advance
+
+    def _settled(self, status: int, time: float) -> int:
+        if self.step_flags[1] and succeeded(status):
+            self._end(self.reached.value)
+        return status
+
+    def _setting(
+        self, scalars: Sequence[Scalar], exact: Mapping[str, int]
+    ) -> tuple[Vector, Places | None, list[Transfer]]:
+        """Arrays are set as a whole: entries that are not connected keep their start values. Raises
+        FmuFault if such an entry has none, because its array was resized."""
+        references = {s.reference for s in scalars}
+        whole = [s for s in self.description.scalars if s.reference in references]
+        whole.sort(key=lambda s: TYPES.index(s.type))
+        place = {s.name: i for i, s in enumerate(whole)}
+        into = np.array([place[s.name] for s in scalars], dtype=np.intp)
+        known = {s.name: float(v) for s, v in self.starts if not isinstance(v, str)}
+        everything = np.array([known.get(s.name, s.start) for s in whole])
+        unconnected = set(place) - {s.name for s in scalars}
+        for name in unconnected:
+            if np.isnan(everything[place[name]]):
+                what = f"{name} has no start value in an array of this size; give start.{name}"
+                raise self._fault(what, 0.0)
+        exact = {n: v for n, v in wide(self.starts).items() if n in unconnected} | dict(exact)
+        return everything, into, self._transfers("Set", whole, everything, exact)
+
+    def _set_text(self, scalar: Scalar, text: str) -> None:
+        reference = (ctypes.c_uint * 1)(scalar.reference)
+        if scalar.type == "Binary":
+            content = bytes.fromhex(text)
+            sizes = (ctypes.c_size_t * 1)(len(content))
+            pointer = ctypes.POINTER(ctypes.c_uint8)
+            values = (pointer * 1)(ctypes.cast(ctypes.c_char_p(content), pointer))
+            self._call("fmi3SetBinary", reference, 1, sizes, values, 1)
+        else:
+            self._call("fmi3SetString", reference, 1, (ctypes.c_char_p * 1)(text.encode()), 1)
+
+    def enter_initialization(self, stop_time: float) -> None:
+        if sizes := tuple(row for row in self.starts if row[0].structural):
+            self._call("fmi3EnterConfigurationMode")
+            self._set_numbers(sizes)
+            self._call("fmi3ExitConfigurationMode")
+        self._set_starts()
+        self._call("fmi3EnterInitializationMode", False, 0.0, 0.0, True, stop_time)

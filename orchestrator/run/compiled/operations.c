@@ -1,0 +1,130 @@
+/* Carries out the operations of a plan at an event, and calls the FMUs.
+ *
+ * It returns to Python for whatever it cannot do (see the codes in loop.h); Python does that and
+ * calls it again where it stopped. Times are ticks; a tick is numerator/denominator s, and the
+ * products below are below 2^53, so that each quotient is rounded once.
+ */
+
+#include "loop.h"
+
+#include <string.h>
+
+static int compares(double value, int64_t comparison, double limit) {
+    switch (comparison) {
+    case 0: return value < limit;
+    case 1: return value <= limit;
+    case 2: return value > limit;
+    case 3: return value >= limit;
+    }
+    return 0;
+}
+
+static int evaluate(const Loop *l, Hold *h, int64_t tick, double ahead) {
+    return hold_value(h, l, tick + l->late, ahead - (double)l->late, h->held);
+}
+
+static int blend(const Loop *l, const Op *op, int64_t tick) {
+    Hold *h = l->holds[op->a];
+    double *value = hold_scratch(h), *sum = h->held;
+    for (int64_t k = 0; k < h->n; k++) sum[k] = 0.0;
+    for (int64_t i = op->b; i < op->c; i++) {
+        const double ahead = l->points[i][1] - (double)l->late;
+        const int code = hold_value(h, l, tick + l->late, ahead, value);
+        if (code) return code;
+        for (int64_t k = 0; k < h->n; k++) sum[k] += l->points[i][0] * value[k];
+    }
+    return 0;
+}
+
+static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
+    double *sample = hold_scratch(h);
+    if (h->far) *h->credit = account_credit(h->far, l);
+    for (int64_t k = 0; k < h->width; k++) sample[k] = l->values[h->sources[k]];
+    return hold_push(h, sample, stamp, arrival);
+}
+
+/* CALL before the first row, and where the block is full. */
+static int record(const Loop *l, Table *t, int64_t tick) {
+    if (!*t->room) return CALL;
+    const double time = tick_time(l, tick);
+    if (*t->due && t->block) {
+        if (*t->rows >= *t->room) return CALL;
+        double *row = t->block + *t->rows * (1 + t->n);
+        row[0] = time;
+        if (t->where)
+            for (int64_t i = 0; i < t->n; i++) row[1 + i] = l->values[t->where[i]];
+        else
+            memcpy(row + 1, t->view, t->n * sizeof *row);
+        ++*t->rows;
+    }
+    *t->reached = time;
+    ++*t->count;
+    *t->due = t->every == 1 || *t->count % t->every == 0;
+    return 0;
+}
+
+/* Carries out the operations from at->op to at->last. Returns DONE, or a code for operation
+ * at->op. */
+int loop_carry_out(Loop *l, int64_t tick, At *at) {
+    int64_t known[3] = {INT64_MIN, 0, 0}; /* start, end and parts of the step before */
+    double begins = 0.0, ends = 0.0;
+    for (; at->op < at->last; at->op++) {
+        const Op *op = l->ops + at->op;
+        int code = 0;
+        switch (op->code) {
+        case PYTHON: return CALL;
+        case GET: code = fmu_get(l->fmus + op->a, op->b, at); break;
+        case SET: code = fmu_set(l->setters + op->a, l->values, at); break;
+        case STEP: {
+            const int64_t start = tick * op->c + op->b, end = start + op->d;
+            if (start != known[0] || end != known[1] || op->c != known[2]) {
+                const double whole = l->denominator * (double)op->c;
+                begins = (double)start * l->numerator / whole;
+                ends = (double)end * l->numerator / whole;
+                known[0] = start, known[1] = end, known[2] = op->c;
+            }
+            Fmu *f = l->fmus + op->a;
+            code = (op->c == 1 && f->check ? fmu_checked_step : fmu_step)(f, begins, ends, op->x, at);
+            break;
+        }
+        case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick + l->late); break;
+        case EVALUATE: code = evaluate(l, l->holds[op->a], tick, op->x); break;
+        case BLEND: code = blend(l, op, tick); break;
+        case SAMPLE: code = meter_sample(l->meters[op->a], l->values, tick + op->b); break;
+        case MOVE: code = meter_move(l->meters[op->a], l->values, tick + op->b); break;
+        case FEED: meter_feed(l->meters[op->a], l->values, op->x); break;
+        case RECORD: code = record(l, l->tables + op->a, tick); break;
+        case STOP_WHEN:
+            if (compares(l->values[op->a], op->b, op->x)) code = STOP;
+            break;
+        }
+        if (code) return code;
+    }
+    return DONE;
+}
+
+EXPORT int64_t hapticlink_now(void) { return now(); }
+
+EXPORT void hapticlink_wait(int64_t until) { wait_until(until); }
+
+/* Whether to notice signals; Windows has none that Python would not notice. */
+EXPORT void hapticlink_watch(int on) { watch_signals(on); }
+
+/* Whether a run is going on, which no FMU may end with the status of a success. */
+EXPORT void hapticlink_guard(int on) { guard_exit(on); }
+
+/* PyGILState_Ensure, PyErr_Occurred and PyGILState_Release. */
+EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
+    use_python(ensure, occurred, release);
+}
+
+/* Runs one sequence of operations at a tick, within an operation that Python carries out. */
+EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick) { return loop_carry_out(l, tick, at); }
+
+EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival) {
+    return hold_push(h, sample, stamp, arrival);
+}
+
+EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
+    return hold_value(h, l, tick, ahead, value);
+}

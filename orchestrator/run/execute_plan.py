@@ -1,0 +1,226 @@
+"""Executes a plan, and says how the run ended."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+
+from hapticlink.orchestrator.base import interrupt, plugins
+from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
+from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import causal, delays
+from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
+from hapticlink.orchestrator.run.bind_operations import Stop
+from hapticlink.orchestrator.run.compiled.library import Unavailable, load
+from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
+from hapticlink.orchestrator.run.compiled.operation_records import too_long
+from hapticlink.orchestrator.run.energy.balance import unstable
+from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
+from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.system.ports import power_across_rates
+from hapticlink.orchestrator.system.system import System
+
+Progress = Callable[[float], None]
+PAUSE = 0.02
+"""Time (s) between two reports of progress."""
+
+
+@dataclass
+class Outcome:
+    """How a run ended.
+
+    end_time: time of the last row (s). fault: None for a regular end. asked: the FMU that requested
+    the end, and how. published: whether the folder has rows of this run. wall_time, table_time (s):
+    of the loop, of writing its tables as CSV. details: what is recorded of it besides.
+    """
+
+    end_time: float = 0.0
+    reason: str = "duration"
+    fault: Fault | None = None
+    asked: str = ""
+    published: bool = False
+    wall_time: float = 0.0
+    table_time: float = 0.0
+    details: RunEnding = field(default_factory=RunEnding)
+
+    def set_reason(self, error: BaseException, results: RunFolder) -> None:
+        """Set why the run ended by `error`. Raises `error` again where it is a mistake of this
+        package, of neither the scene nor the machine nor a plugin."""
+        match error:
+            case Stop():
+                self.reason = "stop_when"
+            case Ended():
+                self.reason = str(error)
+            case AsksToEnd(fmu=fmu, what=what):
+                self.reason, self.asked = "terminated", f"{fmu} {what}"
+            case Interrupted():
+                self.reason, self.fault = "interrupted", error
+            case Diverged():
+                self.reason, self.fault = "diverged", error
+            case Fault():
+                self.reason, self.fault = "fault", error
+            case OSError():  # a full disk, most of all
+                self.reason = "fault"
+                self.fault = Fault(f"{results.folder}: {error.strerror or error}")
+            case KeyboardInterrupt():  # a second signal does not wait for the end of the event
+                self.reason, self.fault = "interrupted", Interrupted(results.last)
+            case _:
+                if (message := plugins.blamed(error)) is None:
+                    raise error
+                self.reason, self.fault = "fault", Fault(message)
+
+    def ending(self, build_time: float) -> RunEnding:
+        """What run.json says of it; `build_time` (s) is that of the scene's FMUs."""
+        fault = None
+        if error := self.fault:
+            time = getattr(error, "time", None)
+            fault = RecordedFault(type(error).__name__, time, str(error))
+        return replace(
+            self.details,
+            end=End(self.reason, self.end_time, self.asked),
+            fault=fault,
+            timings=replace(
+                self.details.timings, build=build_time, run=self.wall_time, tables=self.table_time
+            ),
+        )
+
+
+def run(
+    plan: Plan,
+    results: RunFolder,
+    progress: Progress | None = None,
+    real_time: RealTimeRun | None = None,
+) -> Outcome:
+    """Execute the plan to its end or to the first fault; rows up to then are in `results`.
+
+    progress is called with the simulated time (s) from time to time. real_time: see RealTimeRun.
+    """
+    outcome = Outcome()
+    simulation: Simulation | None = None
+    loop: PythonLoop | None = None
+    try:
+        # Non-finite values are detected by 0 x NaN, for which numpy would warn.
+        with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
+            interrupt.check()
+            library, why = _library(plan.system)
+            if real_time and not library:
+                raise Fault(f"a run in real time needs the compiled loop: {why}")
+            simulation = Simulation(plan.system, results, stack)
+            if real_time:
+                stack.enter_context(real_time.of(plan, simulation))
+            loop = (
+                CompiledLoop(plan, simulation, library)
+                if library
+                else PythonLoop(plan, simulation, {"everything": why})
+            )
+            simulation.start()
+            if isinstance(loop, CompiledLoop):
+                coming = loop.events.coming()
+                loop.events.prepare(with_ends(coming) if real_time else coming)
+            if real_time:
+                stack.enter_context(real_time.pace.undisturbed())
+            _run_events(plan, loop, results, outcome, progress, real_time)
+    except (Exception, KeyboardInterrupt) as error:
+        outcome.set_reason(error, results)
+    outcome.published = results.published
+    if simulation:
+        outcome.end_time = results.last
+    if simulation and loop:
+        outcome.details = _details(plan, simulation, loop, real_time)
+        if outcome.fault is None and (diverged := _judged(outcome, simulation)):
+            outcome.reason, outcome.fault = "diverged", diverged
+    if progress:
+        progress(outcome.end_time)
+    return outcome
+
+
+def _run_events(
+    plan: Plan,
+    loop: PythonLoop,
+    results: RunFolder,
+    outcome: Outcome,
+    progress: Progress | None,
+    real_time: RealTimeRun | None,
+) -> None:
+    """Run all events, write the tables, however the events end, and measure the time of both."""
+    begin = shown = perf_counter()
+
+    def turn(tick: int) -> None:
+        nonlocal shown
+        time = plan.system.timeline.seconds(tick)
+        interrupt.check(time)
+        if real_time and isinstance(loop, CompiledLoop):
+            real_time.turn(loop)
+        if progress and perf_counter() - shown > PAUSE:
+            shown = perf_counter()
+            progress(time)
+
+    try:
+        loop.run(turn)
+    finally:
+        results.flush()
+        outcome.wall_time = perf_counter() - begin
+        results.finish()
+        outcome.table_time = perf_counter() - begin - outcome.wall_time
+
+
+def _details(
+    plan: Plan, simulation: Simulation, loop: PythonLoop, real_time: RealTimeRun | None
+) -> RunEnding:
+    """What the objects of a run have counted and measured."""
+    system, instances = plan.system, simulation.instances
+    ages, energies = delays(plan, loop.complete), simulation.meters.energies()
+    errors = {name: check.errors() for name, check in simulation.step_checks.items()}
+    across = power_across_rates(system)
+    return RunEnding(
+        calls={name: i.calls for name, i in instances.items()},
+        delays=ages,
+        causal=causal(ages),
+        links=simulation.links(),
+        premises=simulation.premises(),
+        overdrawn=simulation.overdrawn(),
+        isolated=simulation.isolated,
+        held_outputs={name: i.held for name, i in instances.items() if i.held},
+        smaller_steps={name: i.smaller_steps for name, i in instances.items() if i.smaller_steps},
+        in_python=loop.in_python,
+        real_time=real_time.report() if real_time else None,
+        timings=Timings(steps={name: i.step_time for name, i in instances.items()}),
+        iterations=loop.iterations(),
+        unstable=unstable(system, energies),
+        step_errors={name: estimate for name, estimate in errors.items() if estimate},
+        energies={name: e for name, e in energies.items() if name in across} or "none",
+        energies_within_a_rate={name: e for name, e in energies.items() if name not in across},
+    )
+
+
+def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
+    """The fault of a run that reached its end but has diverged; None if it has not."""
+    system, condition = simulation.system, simulation.system.ends_when
+    if (
+        outcome.reason == "stop_when"
+        and condition
+        and f"{system.block(condition.fmu)}.{condition.variable}" == WORKSPACE_MARGIN
+        and (why := outcome.details.unstable)
+    ):
+        what = f"left its workspace, and {why}: the loop is unstable"
+        remedy = "take higher rates, weaker gains, another coupling or hold"
+        return Diverged(condition.fmu, f"{what} ({remedy})", outcome.end_time, repeatable=True)
+    return simulation.balance.judge(outcome.details.meters, outcome.end_time)
+
+
+def _library(system: System) -> tuple[ctypes.CDLL | None, str]:
+    """The compiled loop; None where it cannot run the system, with the reason."""
+    if why := too_long(system):
+        return None, why
+    try:
+        return load(), ""
+    except Unavailable as reason:
+        return None, str(reason)

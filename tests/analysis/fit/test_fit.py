@@ -1,0 +1,168 @@
+"""Identification from logs of this project's own device and hand, whose parameters are known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis.fit.arm_fit import fit_arm
+from hapticlink.analysis.fit.device_fit import fit_device
+from hapticlink.analysis.fit.estimate import Estimate, standard_deviations
+from hapticlink.analysis.fit.log import Log
+from hapticlink.commands import main
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.hand import ArmHand
+from tests.analysis.fit.device_log import recorded
+
+STILL = ((0.0, 0.0, 0.0, 0.0),)
+DEVICE = Device(handle_mass=0.19, handle_inertia=1.5e-4, motor_damping=2e-3, motor_friction=6e-3)
+ARM = ArmHand(
+    mass=(1.4, 0.9, 0.003),
+    stiffness=(150.0, 420.0, 0.8),
+    damping=(6.0, 14.0, 0.015),
+    grip_stiffness=(900.0, 1500.0, 4.0),
+    grip_damping=(8.0, 15.0, 0.03),
+    target=STILL,
+)
+NOISE = 0.05
+"""Of the force sensor (N)."""
+
+
+@pytest.fixture(scope="module")
+def log() -> Log:
+    return recorded(DEVICE, ARM, seconds=3.0, seed=3, noise=NOISE)
+
+
+def truth(estimate: Estimate) -> float:
+    block, _, key = estimate.key.partition(".")
+    name, _, axis = key.rstrip("]").partition("[")
+    value = getattr(DEVICE if block == "device" else ARM, name)
+    return value[int(axis)] if axis else value
+
+
+def csv(log: Log, path: Path) -> Path:
+    columns = {"time": np.arange(len(log.pose)) * log.period}
+    for name, values in (
+        ("haptic_device.x", log.pose), ("controller.F_motor", log.motors), ("hand.F", log.hand)
+    ):  # fmt: skip
+        if values is not None:
+            columns |= {f"{name}[{i + 1}]": values[:, i] for i in range(3)}
+    rows = np.column_stack([*columns.values()])
+    np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
+    return path
+
+
+def test_a_device_of_which_every_start_is_wrong(log: Log) -> None:
+    """Handle half or twice as heavy and no friction; encoders that count, a noisy force sensor."""
+    wrong = Device(handle_mass=0.4, handle_inertia=6e-5)
+    estimates, counts = fit_device(log, wrong)
+    for estimate in estimates:
+        assert abs(estimate.value - truth(estimate)) < max(
+            5 * estimate.spread, 0.02 * truth(estimate)
+        ), estimate.line
+        assert estimate.spread < 0.2 * estimate.value, estimate.line
+    assert 0.25 < counts < 0.33
+
+
+def test_an_arm_of_which_every_start_is_wrong(log: Log) -> None:
+    estimates, unexplained = fit_arm(log, ArmHand(target=STILL))
+    assert len(estimates) == 15
+    for estimate in estimates:
+        assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.line
+    assert max(unexplained) < 0.02
+
+
+def test_an_arm_that_is_assumed_without_damping_is_fitted_as_any(log: Log) -> None:
+    estimates, _ = fit_arm(log, ArmHand(damping=(0.0, 0.0, 0.0), target=STILL))
+    for estimate in estimates:
+        assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.line
+
+
+def test_the_spread_is_that_of_repeated_logs(log: Log) -> None:
+    """The standard deviations of 12 logs with a noise of their own of 0.3 N, against the scatter of
+    their estimates."""
+    random, values, spreads = np.random.default_rng(5), [], []
+    for _ in range(12):
+        noise = random.normal(0, 0.3, log.hand.shape) * [1, 1, 0.01]
+        estimates, _ = fit_arm(replace(log, hand=log.hand + noise), ARM)
+        values.append([np.log(e.value) for e in estimates])
+        spreads.append([e.spread / e.value for e in estimates])
+    scatter, spread = np.std(values, axis=0, ddof=1), np.mean(spreads, axis=0)
+    assert np.median(scatter / spread) == pytest.approx(1.0, abs=0.4)
+    assert np.all(scatter < 2.5 * spread)
+
+
+def test_standard_deviations_of_a_line_through_noise() -> None:
+    """Independent errors: those of ordinary least squares; errors that repeat: larger by the root
+    of how often."""
+    random = np.random.default_rng(1)
+    J = np.column_stack([np.ones(4000), np.linspace(-1, 1, 4000)])
+    noise = random.normal(0, 0.5, 4000)
+    known = 0.5 * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    assert standard_deviations(J, noise, 200, 2) == pytest.approx(known, rel=0.15)
+    repeated = np.repeat(noise[::20], 20)
+    assert standard_deviations(J, repeated, 200, 2) == pytest.approx(known * 20**0.5, rel=0.15)
+    assert standard_deviations(J * [1, 0], noise, 200, 2)[1] == np.inf
+
+
+def test_a_log_without_motion_in_an_axis_has_no_estimates_there(log: Log) -> None:
+    still = replace(log, pose=log.pose * [1, 1, 0])
+    estimates, _ = fit_arm(still, ARM)
+    assert {e.key.partition("[")[2] for e in estimates} == {"0]", "1]"}
+
+
+def test_the_command_writes_what_a_scene_takes(log: Log, tmp_path: Path, capsys) -> None:
+    path = csv(log, tmp_path / "shaken.csv")
+    out = tmp_path / "fit"
+    with pytest.raises(SystemExit, match="0"):
+        main(["fit", str(path), "--device", "handle_mass", "--out", str(out), "--json"])
+    record = json.loads(capsys.readouterr().out)
+    assert record["parameters"] == json.loads((out / "fit.json").read_text())["parameters"]
+    scene = tmp_path / "mine.toml"
+    scene.write_text('extends = "closed-loop"\n' + (out / "fitted.toml").read_text())
+    read = hl.scene(scene)
+    fitted = record["parameters"]["device.handle_mass"]["value"]
+    assert read.device.handle_mass == pytest.approx(fitted, rel=1e-12)
+    assert read.hand.type == "arm"
+
+
+def test_hdf5_and_csv_are_one_log(log: Log, tmp_path: Path) -> None:
+    from hapticlink.analysis.fit.log import read
+
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["time"] = np.arange(len(log.pose)) * log.period
+        file["haptic_device.x"], file["hand.F"] = log.pose, log.hand
+    one, other = read(tmp_path / "log.h5"), read(csv(log, tmp_path / "log.csv"))
+    assert np.array_equal(one.pose, other.pose)
+    assert np.array_equal(one.hand, other.hand)
+    assert one.motors is None
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda log: replace(log, motors=None, hand=None), "neither the motors' nor the hand's"),
+        (lambda log: replace(log, pose=log.pose[:40], motors=None, hand=log.hand[:40]), "257"),
+        (lambda log: replace(log, pose=log.pose * 0 + 0.01, hand=None), "does not move"),
+        (lambda log: replace(log, pose=np.where(log.pose > 0.02, np.nan, log.pose)), "row"),
+    ],
+)
+def test_a_log_that_determines_nothing_is_refused(change, message, log: Log, tmp_path) -> None:
+    with pytest.raises(hl.InputFault, match=message):
+        hl.fit(csv(change(log), tmp_path / "log.csv"))
+
+
+def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> None:
+    path = csv(log, tmp_path / "log.csv")
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(lines[:300] + lines[303:]))
+    with pytest.raises(hl.InputFault, match=r"row 300 comes 0\.0078"):
+        hl.fit(path)
+    with pytest.raises(hl.InputFault, match="'crank' cannot be fitted; rotor_inertia"):
+        hl.fit(csv(log, path), device=["crank"])

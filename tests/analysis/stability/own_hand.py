@@ -1,0 +1,81 @@
+"""A scene linearised at its equilibrium in its own hand, for comparison with closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import hapticlink as hl
+from hapticlink.analysis.stability.forward_sensitivity import SAME
+from hapticlink.analysis.stability.hand_slopes import hand_slopes
+from hapticlink.analysis.stability.lifted_map import LiftedMap
+from hapticlink.analysis.stability.linearisation import Linearisation, constant
+from hapticlink.analysis.stability.modes import Mode, counted, leading, modes, verdict
+from hapticlink.analysis.stability.poses import in_own_hand
+from hapticlink.orchestrator.scene import overrides
+
+LOST = 1e-6
+"""Modes with a smaller |z| have vanished within a period."""
+
+
+@dataclass(frozen=True)
+class OwnHand:
+    """Modes by decreasing |z|, without and with z = 1; numbers of the state at the equilibrium."""
+
+    period: float
+    modes: list[Mode]
+    neutral: list[Mode]
+    point: dict[str, float]
+    slopes: dict[str, str]
+    kinks: np.ndarray
+    participation: dict[str, float]
+
+    @property
+    def first(self) -> Mode:
+        return counted([*self.neutral, *self.modes])[0]
+
+    @property
+    def radius(self) -> float:
+        return abs(self.first.z)
+
+    @property
+    def growth(self) -> float:
+        return float(np.log(self.radius)) / self.period
+
+    @property
+    def verdict(self) -> str:
+        return verdict(self.radius, self.first.uncertainty)
+
+
+def linearised(map_: LiftedMap, point: np.ndarray, same: float = SAME) -> Linearisation:
+    """The Jacobian of a map at a point by another road than that of linear_period.py: by
+    perturbations of all numbers, carried through each operation in its turn."""
+    V = np.stack(list(map_.directions(point)), axis=1)
+    image, M, D = map_.slopes(point, V, same)
+    taken = M.any(axis=0) | D.any(axis=0)
+    V, M, D = V[:, taken], M[:, taken], D[:, taken]
+    A, E = V.T @ M, V.T @ D
+    kept = ~constant(A, V.T @ (image - point) == 0.0)
+    return Linearisation(point, image, V[:, kept], A[kept][:, kept], E[kept][:, kept])
+
+
+def own_hand(scene: str | Path | hl.Scene, options: Any = ()) -> OwnHand:
+    with in_own_hand(scene, overrides.written(options)) as (place, hand):
+        period = place.period({})
+        point = dict(zip(map(str, place.map.coordinates), period.point.tolist(), strict=True))
+        slopes = place.map.slopes_by()
+        period = period.held({"hand": hand_slopes(hand, place.T)} if hand else {})
+        every = [m for m in modes(period.linear, place.map.period) if abs(m.z) > LOST]
+        some = [period.traced(mode) for mode in every if not mode.neutral]
+        return OwnHand(
+            place.map.period,
+            some,
+            [mode for mode in every if mode.neutral],
+            point,
+            slopes,
+            period.linear.kink,
+            dict(leading(every[0], period.names(), 6)),
+        )

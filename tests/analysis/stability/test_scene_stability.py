@@ -1,0 +1,161 @@
+"""The verdict over poses and hands, against closed forms, against maps that are linearised whole,
+and against FMUs that are loaded in place of what is substituted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis.stability.hand_cases import InHands
+from hapticlink.analysis.stability.hand_slopes import hand_slopes
+from hapticlink.analysis.stability.hands import HANDS, OWN, free
+from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
+from hapticlink.analysis.stability.linear_period import LinearPeriod
+from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
+from hapticlink.analysis.stability.modes import modes
+from hapticlink.analysis.stability.poses import evenly_spaced, simulated
+from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.components.specs.hand import ArmHand, SpringHand
+from tests.analysis.stability.own_hand import linearised
+
+POINT = (0.044493, 0.014823, -0.788148)
+FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5.0, 0.01]}
+SCENE = {"graphics.rate": 64, "hand": {**FIRM, "target": [[0.0, *POINT]]}}
+LEADING = 6
+
+
+@pytest.fixture(scope="module")
+def place() -> Iterator[RestingScene]:
+    with resting("closed-loop-direct", SCENE) as found:
+        yield found
+
+
+def leading(period: LinearPeriod) -> list[complex]:
+    return [mode.z for mode in modes(period.linear, period.map_.period)[:LEADING]]
+
+
+def test_events_that_repeat_have_the_map_that_is_carried_through_the_period(
+    place: RestingScene,
+) -> None:
+    """By another road: perturbations of all coordinates through each operation in its turn."""
+    period = place.period({})
+    whole = linearised(place.map, period.point)
+    expected = [mode.z for mode in modes(whole, place.map.period)[:LEADING]]
+    assert leading(period) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_hand_in_place_of_another_has_the_map_of_its_own_fmu(place: RestingScene) -> None:
+    arm: dict[str, Any] = {"type": "arm", "target": [[0.0, *POINT]]}
+    spec = ArmHand(target=((0.0, 0.0, 0.0, 0.0),))
+    in_arm = place.period({}).held({"hand": hand_slopes(spec, 1 / 512)})
+    options = {**SCENE, "hand": arm}
+    with (
+        linearisable("closed-loop-direct", options) as (read, system, _),
+        lifted_map(long_enough(read, system), read) as map_,
+    ):
+        loaded = modes(linearised(map_, map_.start, 1e-3), map_.period)[:LEADING]
+    assert leading(in_arm) == pytest.approx([mode.z for mode in loaded], abs=1e-4)
+
+
+@pytest.mark.parametrize("late", [1, 3])
+def test_a_delay_in_place_of_none_has_the_map_of_late_samples(
+    place: RestingScene, late: int
+) -> None:
+    connections = place.map.system.connections
+    into = (c.name for c in connections if c.target == "controller")
+    with resting(
+        "closed-loop-direct", SCENE | {"delays": dict.fromkeys(into, late / 512)}
+    ) as loaded:
+        expected = leading(loaded.period({}))
+    assert leading(place.period({}).delayed("controller", late)) == pytest.approx(
+        expected, abs=1e-5
+    )
+
+
+def test_the_scenes_own_hand_has_the_eigenvalues_of_its_sampled_spring() -> None:
+    """m = 1, K = 100, T = 0.05: z^2 - (2 - alpha/2) z + 1 + alpha/2 with alpha = K T^2/m."""
+    with resting("sampled-spring", {"hand": {**FIRM, "target": [[0.0, 0.0, 0.0, 0.0]]}}) as found:
+        own = SpringHand(stiffness=(100.0, 0.0, 0.0))
+        (case,) = InHands(found).cases("start", {OWN: own}, DRIFT)
+    z = max(np.roots([1.0, -(2 - 0.125), 1.125]), key=lambda root: root.imag)
+    assert case.growth == pytest.approx(math.log(abs(z)) / 0.05, rel=1e-6)
+    assert case.hertz == pytest.approx(np.angle(z) / 0.05 / (2 * np.pi), rel=1e-6)
+    assert (case.verdict, case.kind) == ("unstable", "oscillation")
+
+
+def test_a_free_slider_decays_by_its_damper_alone() -> None:
+    """m v' = -b v, exact over T with the force b v held: v_{k+1} = (1 - b T/m) v_k."""
+    rate, b, m = 512.0, 4.0, 1.0
+    options = {"haptics.rate": rate, "hand": {**FIRM, "target": [[0.0, 0.0, 0.0, 0.0]]}}
+    with resting("sampled-spring", options) as found:
+        (case,) = InHands(found).cases("start", {"damper": free(b)}, DRIFT)
+    assert case.growth == pytest.approx(rate * math.log(1 - b / m / rate), rel=1e-6)
+    assert case.verdict == "stable"
+
+
+@pytest.mark.parametrize(
+    ("growth", "hertz", "said"),
+    [(0.1, 0.5, "drift"), (0.3, 0.5, "divergence"), (0.1, 2.0, "oscillation"),
+     (0.1, 60.0, "vibration")],
+)  # fmt: skip
+def test_modes_are_told_apart(growth: float, hertz: float, said: str) -> None:
+    assert kind(growth, hertz, DRIFT) == said
+
+
+def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
+    """A wall of K on b = 5 N.s/m is passive up to K T/2 < b (Colgate, Schenkel 1997): 5120 N/m at
+    512 Hz; four times as stiff it shakes, and the remedy is stable in all hands when it is judged
+    anew."""
+    beyond = {"fmu.wall.start.stiffness": 20000.0}
+    found = hl.stability("virtual-wall", beyond, poses=1)
+    assert found.verdict == "unstable"
+    assert found.worst.kind == "vibration"
+    assert found.remedy is not None
+    assert found.remedy.stable
+    options = dict(option.split("=", 1) for option in found.remedy.options)
+    again = hl.stability("virtual-wall", beyond | options, poses=1)
+    edge = [replace(c, verdict="marginal") if not c.free else c for c in again.cases]
+    hands = len({c.hand for c in edge if not c.free})
+    assert f"marginal in {hands} of the hands" in replace(again, cases=tuple(edge)).finding
+    assert "marginal" not in again.finding or any(c.verdict == "marginal" for c in again.cases)
+    assert again.in_hands == "stable"
+    assert len(found.cases) >= len(HANDS)
+
+
+def test_what_cannot_be_held_is_refused() -> None:
+    with pytest.raises(hl.InputFault, match="--equilibrium"):
+        hl.stability("closed-loop", {"graphics.rate": {"min": 20, "max": 60, "seed": 1}})
+    with pytest.raises(hl.InputFault, match="poses = 0: give 1 or more"):
+        hl.stability("closed-loop", poses=0)
+
+
+def test_rates_that_hardly_repeat_are_judged_with_frames_of_whole_periods() -> None:
+    """29.97 Hz at 512 Hz: 17 periods, 30.118 Hz, instead of a period of 100 s."""
+    odd = hl.stability("closed-loop", {"graphics.rate": 29.97}, poses=1)
+    whole = hl.stability("closed-loop", {"graphics.rate": "512/17"}, poses=1)
+    assert odd.rounded == (
+        "judged with graphics at 30.118 Hz: with its own rates all repeats only after 100 s"
+    )
+    assert not whole.rounded
+    stiff = [
+        next(c.growth for c in judged.cases if c.hand == "stiff arm, firm grip")
+        for judged in (odd, whole)
+    ]
+    assert stiff[0] == pytest.approx(stiff[1], rel=1e-6)
+
+
+def test_a_hand_beside_a_pose_leaves_it_where_it_pulls_away() -> None:
+    """What is a divergence to the linearisation is judged by such a run."""
+    run = simulated("closed-loop", ("duration=0.1",))
+    (pose,) = evenly_spaced(run, hl.scene("closed-loop").linkage, 1)
+    assert not pose.leaves("closed-loop", (), HANDS["stiff arm, firm grip"])
+    elsewhere = replace(pose, point=(pose.point[0] + 0.02, *pose.point[1:]))
+    assert elsewhere.leaves("closed-loop", (), HANDS["light touch"])
+    assert pose.leaves("closed-loop", (), None)

@@ -1,0 +1,19 @@
+"""One page for all tests of a module."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.visualization.page.served_page import Served
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    page = Served(tmp_path_factory.mktemp("view"))
+    try:
+        yield page
+    finally:
+        page.process.kill()
+        page.process.communicate()

@@ -1,0 +1,72 @@
+"""A headless Chromium on a page; without one the tests that need it are skipped."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+AT = """() => {
+  const box = view.stage.canvas.getBoundingClientRect();
+  const [x, y] = view.stage.toScreen(view.frame.x);
+  return [box.left + x, box.top + y, view.stage.scale];
+}"""
+"""Of the operational point on the screen (px), and px to a metre."""
+
+
+@contextmanager
+def chromium(bypass_csp: bool = True) -> Iterator[Any]:
+    """A browser with a profile of its own; bypass_csp: tests may do what pages forbid."""
+    if not CHROMIUM:
+        pytest.skip("chromium is not installed")
+    with tempfile.TemporaryDirectory() as profile, playwright.sync_playwright() as started:
+        yield started.chromium.launch_persistent_context(
+            profile, executable_path=CHROMIUM, args=FLAGS, bypass_csp=bypass_csp
+        )
+
+
+class Page:
+    """A page in a window of a size, with what went wrong in it."""
+
+    def __init__(self, browser: Any, url: str, width: int = 1280, height: int = 800) -> None:
+        self.faults: list[str] = []
+        self.page = browser.new_page()
+        self.page.set_viewport_size({"width": width, "height": height})
+        self.page.on("console", lambda said: self.faults.append(said.text))
+        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.page.on("requestfailed", lambda request: self.faults.append(request.url))
+        self.page.goto(url)
+        self.until("view.frame && view.stage.limits")
+
+    def until(self, condition: str) -> None:
+        """Wait for a condition in JavaScript."""
+        try:
+            self.page.wait_for_function(f"() => {condition}", timeout=20_000)
+        except playwright.TimeoutError:
+            shown = self.get("JSON.stringify([view.state, view.refused, view.frames, view.frame])")
+            raise AssertionError(f"{condition} did not come; the page has {shown}") from None
+
+    def get(self, expression: str) -> Any:
+        """The value of an expression in JavaScript."""
+        return self.page.evaluate(f"() => {expression}")
+
+    def run_for(self, seconds: float) -> None:
+        """Wait for simulated time."""
+        self.until(f"view.frame?.t > {self.get('view.frame.t') + seconds}")
+
+    def pull(self, dx: float, dy: float) -> None:
+        """Press at the operational point and drag by (dx, dy) m; the button stays down."""
+        x, y, scale = self.page.evaluate(AT)
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x + scale * dx, y - scale * dy, steps=10)

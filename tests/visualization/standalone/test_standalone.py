@@ -1,0 +1,181 @@
+"""The page that needs no server, opened from the disk in Chromium."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.commands import main
+from tests.visualization.page.chromium import AT, Page, chromium
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium(bypass_csp=False) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("standalone") / "demo.html"
+    with pytest.raises(SystemExit) as ended:
+        main(["view", "closed-loop", "--standalone", str(path)])
+    assert ended.value.code == 0
+    return path
+
+
+def dragged(page: Page, folder: Path) -> tuple[list[str], np.ndarray]:
+    """What the page saves of a run of a second with a drag: the names and the rows."""
+    page.page.click("#pause")
+    page.page.click("#record")
+    page.until("view.state.recording && view.frame.t === 0 && view.stage.limits")
+    page.pull(0.02, -0.02)
+    page.page.keyboard.press("Space")
+    page.until("view.frame.t > 0.4")
+    x, y, scale = page.page.evaluate(AT)
+    page.page.mouse.move(x + 0.03 * scale, y - 0.01 * scale, steps=5)
+    page.until("view.frame.t > 1.1")
+    page.page.mouse.up()
+    with page.page.expect_download() as download:
+        page.page.click("#record")
+    path = folder / "saved.csv"
+    download.value.save_as(path)
+    with path.open() as text:
+        names, *rows = csv.reader(text)
+    return names, np.array(rows, float)
+
+
+def test_a_drag_gives_the_numbers_of_a_run_with_the_same_forces(
+    file: Path, browser: Any, tmp_path: Path
+) -> None:
+    """The run's hand is the force that was recorded, at each tick."""
+    page = Page(browser, f"file://{file}")
+    names, rows = dragged(page, tmp_path)
+    assert page.faults == []
+    page.page.close()
+    rows = rows[: 1 + 512]
+    force = [names.index(f"hand.F[{i}]") for i in (1, 2, 3)]
+    assert np.abs(rows[:, force]).max() > 1
+    hand = {"type": "profile", "table": rows[:, [0, *force]].tolist()}
+    changes = {"hand": hand, "duration": 1.0, "stop_when": "", "record": {"signals": "all"}}
+    table = hl.run("closed-loop", changes)["haptics"]
+    assert np.array_equal(rows[:, 0], table["time"])
+    columns = [name for name in table.columns[1:] if not name.startswith("hand.")]
+    assert len(columns) > 40
+    for name in columns:
+        assert rows[:, names.index(name)] == pytest.approx(table[name], rel=1e-9, abs=1e-9), name
+
+
+def test_no_request_leaves_the_page(file: Path, browser: Any) -> None:
+    """Nor is anything asked for that its content security policy forbids, which is in force."""
+    asked: list[str] = []
+    browser.on("request", lambda request: asked.append(request.url))
+    page = Page(browser, f"file://{file}")
+    page.pull(0.01, -0.01)
+    page.run_for(0.3)
+    page.page.mouse.up()
+    page.page.close()
+    assert page.faults == []
+    assert len(asked) == 2
+    assert {url.partition(":")[0] for url in asked} == {"file", "blob"}
+
+
+@pytest.mark.parametrize("size", [(1600, 900), (390, 844)])
+def test_nothing_is_cut_off_in_wide_and_narrow_windows(
+    file: Path, browser: Any, size: tuple[int, int]
+) -> None:
+    page = Page(browser, f"file://{file}", *size)
+    page.run_for(0.2)
+    assert page.get("document.documentElement.scrollWidth") <= size[0]
+    for name in ("#stage", "#charts", "#controls", "#compare", "#hear"):
+        box = page.page.locator(name).bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+    page.page.close()
+
+
+def test_a_link_carries_the_settings(file: Path, browser: Any) -> None:
+    page = Page(browser, f"file://{file}#graphics.rate=10&hold=foh&delay=0.02&weather=fine")
+    rate = "document.querySelector('[data-control=rate]').parentNode.textContent"
+    page.until(f"{rate}.includes('10.0 Hz')")
+    holds = page.get("[...document.querySelectorAll('#controls select')].map((each) => each.value)")
+    assert len(holds) > 1
+    assert {*holds} == {"foh"}
+    assert "weather=fine: this scene has no such control" in page.get("view.refused")
+    page.page.uncheck("[data-control=topology]")
+    page.until("location.hash.includes('controller.topology=false')")
+    link = page.get("location.href")
+    page.page.close()
+    assert "weather" not in link
+    again = Page(browser, link)
+    again.until("!document.querySelector('[data-control=topology]').checked")
+    again.until("document.querySelector('#controls select').value === 'foh'")
+    assert again.faults == []
+    again.page.close()
+
+
+def test_two_settings_run_under_one_mouse(file: Path, browser: Any) -> None:
+    """With the same settings both have the same bits; without its topology controller B follows the
+    mouse further, and has energies of its own."""
+    page = Page(browser, f"file://{file}")
+    page.page.click("#compare")
+    page.until("view.frame?.b && view.stage.limits")
+    page.pull(0.03, 0.03)
+    page.run_for(0.5)
+    alike = "JSON.stringify(view.frame.x) === JSON.stringify(view.frame.b.x)"
+    assert page.get(alike)
+    page.page.mouse.up()
+    page.page.click("#acts")
+    page.page.uncheck("[data-control=topology]")
+    page.until("location.hash === '#b.controller.topology=false'")
+    page.pull(0.03, 0.03)
+    page.run_for(1.0)
+    assert not page.get(alike)
+    error = "Math.hypot(f.x[0] - f.handle[0], f.x[1] - f.handle[1])"
+    a, b = page.get(f"[view.frame, view.frame.b].map((f) => {error})")
+    assert b > 3 * a
+    energies = page.get("[view.frame.energy, view.frame.b.energy].map((e) => Object.values(e))")
+    assert len(energies[0]) > 3
+    assert energies[0] != energies[1]
+    said = page.page.locator("[data-chart='energy generated'] figcaption b").first.inner_text()
+    assert " | " in said
+    page.page.mouse.up()
+    assert page.faults == []
+    page.page.close()
+
+
+LISTEN = """(() => {
+  const analyser = new AnalyserNode(view.sound.context), heard = new Float32Array(2048);
+  view.sound.node.connect(analyser);
+  view.loudest = 0;
+  setInterval(() => {
+    analyser.getFloatTimeDomainData(heard);
+    view.loudest = Math.max(view.loudest, ...heard.map(Math.abs));
+  }, 20);
+})()"""
+
+
+def test_a_drag_is_heard_once_it_is_asked_for(file: Path, browser: Any) -> None:
+    page = Page(browser, f"file://{file}")
+    assert page.get("view.sound.context ?? null") is None
+    page.page.select_option("#hear", "force")
+    page.until("view.sound.node && view.sound.context.state === 'running'")
+    page.get(LISTEN)
+    page.run_for(0.2)
+    assert page.get("view.loudest") < 1e-3
+    for _ in range(20):
+        page.pull(0.03, -0.02)
+        page.page.mouse.up()
+        if page.get("view.loudest") > 0.01:
+            break
+    page.until("view.loudest > 0.01")
+    page.page.select_option("#hear", "")
+    page.until("!view.sound.context")
+    assert page.faults == []
+    page.page.close()

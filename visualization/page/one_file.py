@@ -1,0 +1,100 @@
+"""A page as one HTML file, which opens without a network: styles, scripts and data within it."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+from collections.abc import Iterator, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+PAGE = Path(__file__).parent
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+"""Content security policy of the file: what is in it, and nothing from elsewhere."""
+IMPORT = re.compile(r'^import \{ (.+?) \} from "\./(\w+\.js)";$', re.MULTILINE)
+EXPORT = re.compile(r"^export (?=(?:class|function|const) (\w+))", re.MULTILINE)
+
+
+def page(name: str, texts: Mapping[str, str], policy: str = POLICY) -> str:
+    """The page `name` of the folder `page`, with `texts` in elements by these names."""
+    html = (PAGE / name).read_text(encoding="utf-8")
+    tag = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">'
+    html = html.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{tag}', 1)
+    html = re.sub(r'<link rel="icon" href="(.+?)">', _icon, html)
+    html = re.sub(r'<link rel="stylesheet" href="(.+?)">', _style, html)
+    kept = "".join(
+        f'<script type="application/json" id="{element}">{text}</script>\n'
+        for element, text in texts.items()
+    )
+    return re.sub(
+        r'<script type="module" src="(.+?)"></script>',
+        lambda found: f'{kept}<script type="module">\n{bundle(found[1])}</script>',
+        html,
+    )
+
+
+def as_json(data: Any) -> str:
+    """Text that an element can have: "<" could end it, or begin a comment in it."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")
+
+
+def packed(content: bytes) -> str:
+    """Compressed bytes as text; packed.js unpacks them."""
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+def unpacked(html: str, element: str) -> bytes:
+    """The packed bytes in an element of a page."""
+    _, _, rest = html.partition(f'id="{element}">')
+    return gzip.decompress(base64.b64decode(rest.partition("</script>")[0]))
+
+
+def bundle(name: str) -> str:
+    """A module of the page with those that it imports, each a function that returns what it
+    exports, in the order in which they need each other; it comes last, and as it is."""
+    *needed, last = _ordered(name, [])
+    wrapped = (f"const {_variable(n)} = (() => {{\n{_module(n)}{_end(n)}}})();\n" for n in needed)
+    return "".join([*wrapped, _module(last)])
+
+
+def _ordered(name: str, before: list[str]) -> list[str]:
+    """The modules `before`, then those that a module needs and they lack, then the module."""
+    for needed in _needs(name):
+        before = before if needed in before else _ordered(needed, before)
+    return [*before, name]
+
+
+def _needs(name: str) -> Iterator[str]:
+    yield from (found[2] for found in IMPORT.finditer(_text(name)))
+
+
+def _module(name: str) -> str:
+    text = _text(name)
+    text = IMPORT.sub(lambda found: f"const {{ {found[1]} }} = {_variable(found[2])};", text)
+    return EXPORT.sub("", text)
+
+
+def _end(name: str) -> str:
+    """The statement by which a module returns what it exports."""
+    return f"return {{ {', '.join(EXPORT.findall(_text(name)))} }};\n"
+
+
+def _variable(name: str) -> str:
+    return f"${name.removesuffix('.js')}"
+
+
+def _text(name: str) -> str:
+    return (PAGE / name).read_text(encoding="utf-8")
+
+
+def _style(match: re.Match[str]) -> str:
+    return f"<style>\n{_text(match[1])}</style>"
+
+
+def _icon(match: re.Match[str]) -> str:
+    return f'<link rel="icon" href="data:image/svg+xml,{quote(_text(match[1]))}">'
