@@ -39,6 +39,8 @@ UNITS = {
 }
 FROM_ZERO = 1e-3
 """Where the search for a parameter begins that is 0 in the scene (SI units)."""
+RANGE = (1e-7, 1e7)
+"""Between these it ends (SI units): no arm is beyond, and the model's numbers stay finite."""
 STILL = 1e-5
 """The motion (m, rad) of an axis below which nothing is fitted there."""
 
@@ -63,7 +65,11 @@ def fit_arm(log: Log, arm: ArmHand) -> tuple[list[Estimate], list[float]]:
         given = np.array([getattr(arm, name)[axis] for name in NAMES])
         model = _Axis(pose[inside, axis], velocity[inside, axis], F, log.period)
         found = least_squares(
-            model.errors, np.log(np.where(given > 0.0, given, FROM_ZERO)), xtol=1e-12, x_scale="jac"
+            model.errors,
+            np.log(np.clip(np.where(given > 0.0, given, FROM_ZERO), *RANGE)),
+            bounds=tuple(np.log(RANGE)),
+            xtol=1e-12,
+            x_scale="jac",
         )
         spread = standard_deviations(found.jac, found.fun, BLOCKS, len(NAMES))
         for i, name in enumerate(NAMES):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -81,9 +82,16 @@ def test_a_program_in_c_plus_plus_gets_the_pose_of_our_own_run(tmp_path: Path) -
     shutil.copy(ROOT / "docs" / "drive.cpp", tmp_path)
     page = ROOT / "docs" / "fmus-elsewhere.md"
     (commands,) = (b.text for b in blocks(page, "sh") if "drive.cpp" in b.text)
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
-        ["sh", "-e", "-c", commands], cwd=tmp_path, check=True, capture_output=True, text=True
+        ["sh", "-e", "-c", commands],
+        cwd=tmp_path,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
     )
+    assert done.returncode == 0, done.stderr
     ours = hl.run("closed-loop", {"hand.wrench": [0.5, 0.0, 0.0], "packaging": "native"})
     pose = done.stdout.splitlines()[-1].split()
     assert [*map(float, pose)] == ours["virtual_mechanism.x"][-1].tolist()
