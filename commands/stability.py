@@ -89,8 +89,6 @@ def stability(
     from hapticlink.analysis.stability.mode_kinds import Bounds
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
-    from hapticlink.visualization import figure_axes
-    from hapticlink.visualization.figures import stability_figure
 
     folder, bounds = out or changes.folder("runs", scene), Bounds(*drift)
     with steps(f"{name}: stability", hidden=quiet) as progress:
@@ -106,6 +104,9 @@ def stability(
         record |= {"port": passivity.record()}
         lines += passivity.lines()
     if figure and isinstance(judged, hl.Stability):
+        from hapticlink.visualization import figure_axes  # Matplotlib is slow to load
+        from hapticlink.visualization.figures import stability_figure
+
         figure_axes.save({"stability": stability_figure.draw(judged)}, folders.ensure(folder))
     write_json(folders.ensure(folder) / "stability.json", record)
     report = (*lines, f"{folder}/stability.json")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import matrix_balance
 from scipy.sparse.linalg import LinearOperator, eigs
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from hapticlink.orchestrator.base.arrays import Matrix
 
@@ -91,5 +91,5 @@ def lyapunov(edges: Sequence[Edge], seed: int = 0, steps: int = 20_000) -> tuple
         x, node = x / size, edge.end
     rates = logs[1:] / times[1:]  # the first batch finds the direction
     mean = float(logs[1:].sum() / times[1:].sum())
-    width = float(student.ppf((1 + CONFIDENCE) / 2, BATCHES - 1) * rates.std(ddof=1))
+    width = float(stdtrit(BATCHES - 1, (1 + CONFIDENCE) / 2) * rates.std(ddof=1))
     return mean, width / BATCHES**0.5
