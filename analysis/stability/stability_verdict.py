@@ -95,31 +95,30 @@ class Stability:
         held = {case.hand for case in self.cases if not case.free}
         edge = {c.hand for c in self.cases if c.hand in held and c.verdict == "marginal"}
         hands = f"{len(held)} hands" if len(held) > 1 else next(iter(held), "")
-        everywhere = f"in {hands} and {poses} pose{'s' if poses > 1 else ''}"
-        if edge:
-            everywhere += f", marginal in {len(edge)} of the hands"
+        in_poses = f"{poses} pose{'s' if poses > 1 else ''}"
+        calm = f"stable in {hands} and {in_poses}"
+        if len(edge) == len(held) > 0:
+            calm = f"marginal in {hands} and {in_poses}"
+        elif edge:
+            calm = f"stable in {len(held - edge)} of {hands} and marginal in the others, {in_poses}"
         worst = self.worst
         if self.verdict == "unstable":
             return f"unstable: {_named(worst)}"
         if self.verdict == "drifts":
-            return f"drifts slowly, and does not vibrate, {everywhere}: {_named(worst)}"
+            where = f"in {hands} and {in_poses}"
+            return f"drifts slowly, and does not vibrate, {where}: {_named(worst)}"
         if self.verdict == "not held":
             loose = max((c for c in self.cases if c.free), key=lambda c: c.severity)
             if loose.verdict != "unstable":
-                return (
-                    f"not held: in free air it does not grow, nor come to rest; stable {everywhere}"
-                )
+                return f"not held: in free air it does not grow, nor come to rest; {calm}"
             does = "drifts" if loose.drifts else f"shows a growing {loose.kind}"
             ends = "small motions decay with no damping that was tried"
             if self.damping is not None and math.isfinite(self.damping):
                 ends = f"small motions decay with about {self.damping:.2g} N.s/m of damping"
-            return (
-                f"not held: in free air it {does} at {loose.growth:.2g} 1/s, and {ends}; "
-                f"stable {everywhere}"
-            )
+            return f"not held: in free air it {does} at {loose.growth:.2g} 1/s, and {ends}; {calm}"
         if self.verdict == "marginal":
-            return f"marginal in {len(edge)} of {hands}, stable in the others: {_named(worst)}"
-        return f"stable {everywhere}; slowest to decay at {-worst.growth:.3g} 1/s, {_where(worst)}"
+            return f"{calm}: {_named(worst)}"
+        return f"{calm}; slowest to decay at {-worst.growth:.3g} 1/s, {_where(worst)}"
 
     def lines(self) -> Iterator[str]:
         """The result as text, below the finding."""
@@ -186,4 +185,5 @@ def _where(case: Case) -> str:
 
 
 def _named(case: Case) -> str:
-    return f"{case.kind} of {case.hertz:.3g} Hz grows at {case.growth:.3g} 1/s {_where(case)}"
+    how = "grows" if case.growth > 0.0 else "decays"
+    return f"{case.kind} of {case.hertz:.3g} Hz {how} at {abs(case.growth):.3g} 1/s {_where(case)}"
