@@ -132,10 +132,10 @@ class Stability:
         yield f"margin at {self.worst.pose}: {', '.join(self._margins())}"
         if self.remedy:
             options = " ".join(f"--set '{option}'" for option in self.remedy.options)
-            how = f"decays at {-self.remedy.growth:.2g} 1/s"
+            how = f"decays at {'' if self.remedy.stable else 'only '}{-self.remedy.growth:.2g} 1/s"
             if math.isinf(self.remedy.growth):
                 how = "nothing grows by more than a drift"
-            if not self.remedy.stable:
+            elif not self.remedy.stable and self.remedy.growth >= 0.0:
                 how = f"improves most, to {self.remedy.growth:.2g} 1/s, which is not enough"
             yield f"remedy: {options}: {how}"
         elif self.verdict == "unstable":
