@@ -32,9 +32,10 @@ export class Legend {
     item.innerHTML = shape ? '<svg viewBox="-9 -7 18 14"><polygon/></svg>' : '<svg viewBox="0 -4 18 14"><path d="M1 3H17"/></svg>';
     const drawn = item.firstChild.firstChild;
     if (shape) drawn.setAttribute("points", shape.map(([x, y]) => `${x},${-y}`).join(" "));
-    const look = { stroke: mark.stroke ?? "none", fill: (shape && mark.fill) || "none", "stroke-width": shape ? mark.width : 2.5 };
-    if (mark.dash.length) look["stroke-dasharray"] = "4 2";
-    for (const [key, color] of Object.entries(look)) drawn.setAttribute(key, inTheme(color));
+    drawn.setAttribute("stroke", inTheme(mark.stroke ?? "none"));
+    drawn.setAttribute("fill", inTheme((shape && mark.fill) || "none"));
+    drawn.setAttribute("stroke-width", shape ? mark.width : 2.5);
+    if (mark.dash.length) drawn.setAttribute("stroke-dasharray", "4 2");
     item.append(` ${mark.label} `, value);
     return value;
   }

@@ -36,11 +36,14 @@ def chromium(bypass_csp: bool = True) -> Iterator[Any]:
 
 
 class Page:
-    """A page in a window of a size, with what went wrong in it."""
+    """A page in a window of a size, by day or in the dark, with what went wrong in it."""
 
-    def __init__(self, browser: Any, url: str, width: int = 1280, height: int = 800) -> None:
+    def __init__(
+        self, browser: Any, url: str, width: int = 1280, height: int = 800, dark: bool = False
+    ) -> None:
         self.faults: list[str] = []
         self.page = browser.new_page()
+        self.page.emulate_media(color_scheme="dark" if dark else "light")
         self.page.set_viewport_size({"width": width, "height": height})
         self.page.on("console", lambda said: self.faults.append(said.text))
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))

@@ -51,7 +51,7 @@ def browser() -> Iterator[Any]:
 def page(browser: Any, runs: tuple[Path, Path], tmp_path: Path) -> Iterator[Page]:
     file = tmp_path / "replay.html"
     replay_page.write([Recorded(str(folder)) for folder in runs], file)
-    opened = Page(browser, file.as_uri())
+    opened = Page(browser, file.as_uri(), dark=True)
     yield opened
     assert opened.faults == []
     opened.page.close()

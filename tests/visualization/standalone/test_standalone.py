@@ -55,7 +55,7 @@ def test_a_drag_gives_the_numbers_of_a_run_with_the_same_forces(
     file: Path, browser: Any, tmp_path: Path
 ) -> None:
     """The run's hand is the force that was recorded, at each tick."""
-    page = Page(browser, f"file://{file}")
+    page = Page(browser, f"file://{file}", dark=True)
     names, rows = dragged(page, tmp_path)
     assert page.faults == []
     page.page.close()
