@@ -28,7 +28,7 @@ SIGNALS = {
     "F_env": "contact force",
     "F_constraint": "topology force",
     "Lambda_inv": "mobility",
-    "P_c": "blocked directions",
+    "P_c": "constrained directions",
     "x": "pose",
     "v": "velocity",
     "q": "joint coordinates",

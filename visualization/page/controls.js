@@ -4,10 +4,10 @@ import { text } from "./canvas.js";
 const NAMES = {
   "hand.stiffness": "Hand: stiffness", "hand.damping": "Hand: damping",
   "controller.K_pc": "Virtual coupling: stiffness", "controller.B_pc": "Virtual coupling: damping",
-  "controller.k_j": "Rendered constraints: stiffness", "controller.b_j": "Rendered constraints: damping",
+  "controller.k_j": "Topology controller: stiffness", "controller.b_j": "Topology controller: damping",
   "controller.K_d": "Desired stiffness", "controller.B_d": "Desired damping",
   "virtual_mechanism.k_contact": "Contact: stiffness", "virtual_mechanism.b_contact": "Contact: damping",
-  "virtual_mechanism.hysteresis": "Blocked directions: hysteresis", "virtual_environment.hysteresis": "Blocked directions: hysteresis",
+  "virtual_mechanism.hysteresis": "Constrained directions: hysteresis", "virtual_environment.hysteresis": "Constrained directions: hysteresis",
 };
 // Rates (Hz) with a short common period with the haptic rate, for which stability is computed fast.
 const RATES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 25, 26, 28, 30, 32, 36, 40, 44, 48, 50, 56,
@@ -45,7 +45,7 @@ export class Controls {
     }
     if (found.topology !== null) {
       this.group("Controller");
-      this.checkbox("topology", "Render the joint constraints", (on) => ({ type: "topology", on }), (f) => f.topology);
+      this.checkbox("topology", "Topology controller: render the constrained directions", (on) => ({ type: "topology", on }), (f) => f.topology);
     }
     found.holds.forEach((hold, i) => {
       if (!i) this.group("Holds, between the rates");

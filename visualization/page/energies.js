@@ -13,17 +13,20 @@ export class Energies {
   }
 
   // Gives a frame its `energy` (J): generated at the user's port, which is what the mechanism has stored beyond the work
-  // of the hands, and by connection; and where it has new sums, the `light`.
+  // of the hands, and by connection, both since the start; where it has new sums, the `light`, and the state "energy"
+  // while the port generates: both judge the last second.
   add(frame) {
     if (frame.booked) {
       this.sum(frame);
-      this.past.push({ t: frame.t, generated: this.generated, put_in: this.put_in });
+      const port = this.energy[this.port];
+      this.past.push({ t: frame.t, generated: this.generated, put_in: this.put_in, port });
       while (frame.t - this.past[0].t > WINDOW) this.past.shift();
       const [before] = this.past;
       frame.light = light(this.generated - before.generated, this.put_in - before.put_in, this.noticeable);
+      this.generates = port - Math.min(...this.past.map((each) => each.port)) > this.noticeable && port > this.noticeable;
     }
     frame.energy = this.energy;
-    if (this.energy[this.port] > this.noticeable) frame.states.push("energy");
+    if (this.generates) frame.states.push("energy");
   }
 
   sum({ booked, stored }) {

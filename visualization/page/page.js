@@ -21,7 +21,7 @@ const stage = new Stage($("scene"), $("legend"), (at, user) => {
 });
 const ending = new Ending($("ended"), () => act("reset"));
 const charts = new Charts($("charts"));
-const controls = new Controls($("controls"), send);
+const controls = new Controls($("controls"), (message) => { choose(null); send(message); });
 const view = { frame: null, levels: [], state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
 let refusedUntil = 0, energies = [], sound = null;
@@ -50,7 +50,7 @@ const HANDLERS = {
     if (begins) offer();
     shown = message;
     acts_on_b &&= Boolean(message.b);
-    $("acts").textContent = acts_on_b ? "Controls: B" : "Controls: A";
+    $("acts").textContent = `Controls act on ${acts_on_b ? "B" : "A"}`;
     $("acts").hidden = !message.b;
     $("compare").ariaPressed = Boolean(message.b);
     controls.show(acts_on_b ? message.b : message);
@@ -95,12 +95,24 @@ const HANDLERS = {
 // The light, with the level of the sampling energy and the stability verdict.
 function show(change) {
   Object.assign(view, change);
-  const levels = view.levels.map((light) => ({ green: "none", amber: "low", red: "high" })[light]);
+  const levels = view.levels.map((light) => ({ green: "small", amber: "some", red: "high" })[light]);
   const level = levels.length > 1 ? `A ${levels[0]}, B ${levels[1]}` : levels[0];
-  $("light").className = `light ${view.map?.verdict === "unstable" ? "red" : view.energy ?? ""}`;
+  $("light").className = `light ${view.energy ?? ""}`;
   $("energy").textContent = level ? `sampling energy: ${level}` : "sampling energy";
-  $("map").textContent = view.map ? `stability: ${view.map.said}` : "";
-  $("map").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${view.map?.why ?? ""}`;
+  $("verdict").className = `light ${{ stable: "green", marginal: "amber", unstable: "red" }[view.map?.verdict] ?? ""}`;
+  $("verdict").hidden = !view.map;
+  computing();
+  $("verdict").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${view.map?.why ?? ""}`;
+}
+
+// The verdict, or for how long it has been computed.
+let asked_at = null;
+function computing() {
+  const said = view.map?.said ?? "";
+  asked_at = said === "computing" ? asked_at ?? performance.now() : null;
+  const since = asked_at === null ? 0 : Math.floor((performance.now() - asked_at) / 1e3);
+  $("map").textContent = said && `stability: ${said}${since > 1 ? `, ${since} s` : ""}`;
+  if (asked_at !== null) setTimeout(computing, 1000);
 }
 
 function note() {
@@ -113,6 +125,7 @@ function note() {
 function received(message) { HANDLERS[message.type]?.(message); }
 
 function lost(why) { $("note").textContent = why; }
+window.addEventListener("error", ({ message }) => lost(`This page has failed: ${message}`));
 
 // The presets of the scene, each a button that says what it changes.
 function offer() {
@@ -122,12 +135,15 @@ function offer() {
     const button = document.createElement("button"), small = document.createElement("small");
     button.append(name, small);
     small.textContent = about;
-    button.onclick = () => { restore(); messages.forEach(send); };
+    button.onclick = () => { restore(); messages.forEach(send); choose(button); };
     return button;
   }));
 }
 
-function restore() { restored(acts_on_b ? shown.b : shown, start).forEach(send); }
+// Marks the preset that was pressed, until something else is changed.
+function choose(preset) { for (const button of $("presets").children) button.ariaPressed = button === preset; }
+
+function restore() { choose(null); restored(acts_on_b ? shown.b : shown, start).forEach(send); }
 
 // Does what the page's address asks for, of run A and, where it has settings of B, of both.
 function follow() {
@@ -179,7 +195,7 @@ function label(state) {
 // Run B, which is drawn over A, and how its controls differ.
 function second() {
   const other = shown.b ? differing(shown.b, shown).map((pair) => pair.join(" ")) : [];
-  return `B, in orange: ${other.join(", ") || "as A; choose Controls: B and change something"}`;
+  return `B, in orange: ${other.join(", ") || "as A; let the controls act on B and change something"}`;
 }
 
 function draw() {

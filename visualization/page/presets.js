@@ -1,27 +1,33 @@
 // Settings of a scene that show something, each with what it changes; and all settings as at the start.
 import { changes } from "./changes.js";
 
-const BUZZ_RATE = 18, STIFF = 5; // Hz, and the factor of the coupling's damping
+const CALM_RATE = 64, BUZZ_RATE = 18, STIFF = 5; // Hz, and the factor of the coupling's damping
 
 // The messages that set all controls as they were at the `start`.
 export const restored = (controls, start) => changes(start, controls).map(({ message }) => message);
 
 // Name, what it changes, and the messages of each preset, to be sent after those of `restored`.
 export function presets({ rate, holds, gains }) {
-  const calm = { name: "Calm", about: "everything as the scene has it", messages: [] };
   const passive = holds.filter(({ choices }) => choices.includes("passive"));
   const poses = holds.filter(({ connection, choices }) => /\.[xv] -> /.test(connection) && choices.includes("foh"));
   const damping = gains.filter(({ name }) => name.endsWith(".B_pc"));
   const held = (some, hold) => some.map(({ connection }) => ({ type: "hold", connection, hold }));
-  if (rate && passive.length) {
-    const slow = { type: "rate", value: Math.min(BUZZ_RATE, rate.max) };
+  if (rate && poses.length) {
+    const slow = { type: "rate", value: Math.min(BUZZ_RATE, rate.max) }, fast = { type: "rate", value: Math.min(CALM_RATE, rate.max) };
+    // A page in one file has no passive hold of the forces; zero-order holds shake less than first-order ones.
+    const [mended, holds] = passive.length
+      ? ["the forces on the mechanism in a passive hold", held(passive, "passive")]
+      : ["pose and velocity held (zoh)", held(poses, "zoh")];
     return [
-      calm,
+      { name: "Calm", about: `mechanism at ${fast.value} Hz`, messages: [fast] },
       { name: "Buzz", about: `mechanism at ${slow.value} Hz, its pose and velocity extrapolated (foh)`, messages: [slow, ...held(poses, "foh")] },
-      { name: "Mend it", about: `still ${slow.value} Hz, but the forces on the mechanism in a passive hold`, messages: [slow, ...held(passive, "passive")] },
+      { name: "Mend it", about: `still ${slow.value} Hz, but ${mended}`, messages: [slow, ...holds] },
     ];
   }
   if (!damping.length) return [];
   const stiffer = damping.map(({ name }) => ({ type: "gain", name, factor: STIFF }));
-  return [calm, { name: "Buzz", about: `coupling damping times ${STIFF}: more than its rate allows`, messages: stiffer }];
+  return [
+    { name: "Calm", about: "everything as the scene has it", messages: [] },
+    { name: "Buzz", about: `coupling damping times ${STIFF}: more than its rate allows; Calm ends it`, messages: stiffer },
+  ];
 }

@@ -48,7 +48,7 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
             window.page.select_option(f'[data-control="{name}"]', "foh")
         window.until("view.map.said === 'computing'")
         window.page.wait_for_function("view.map.verdict === 'unstable'", timeout=1e3 * QUICK)
-        assert window.page.get_attribute("#light", "class") == "light red"
+        assert window.page.get_attribute("#verdict", "class") == "light red"
         assert window.get("view.energy") != "red"
         told, handle = window.get("view.map.why"), window.get("view.frame.handle")
         assert window.faults == []

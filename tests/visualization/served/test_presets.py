@@ -43,7 +43,7 @@ def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str,
     """Measured of the same spring hand, 25 mm to the right: the second generates at least ten times
     what the third does."""
     calm, buzz, mend = javascript("presets.js", "answer = presets(given);", controls)
-    assert calm["messages"] == []
+    assert calm["messages"] == [{"type": "rate", "value": 64}]
     options = []
     for preset in (buzz, mend):
         rate, *holds = preset["messages"]

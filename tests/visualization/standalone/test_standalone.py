@@ -143,7 +143,9 @@ def test_two_settings_run_under_one_mouse(file: Path, browser: Any) -> None:
     energies = page.get("[view.frame.energy, view.frame.b.energy].map((e) => Object.values(e))")
     assert len(energies[0]) > 3
     assert energies[0] != energies[1]
-    said = page.page.locator("[data-chart='energy generated'] figcaption b").first.inner_text()
+    said = page.page.locator(
+        "[data-chart='energy generated since the start'] figcaption b"
+    ).first.inner_text()
     assert " | " in said
     page.page.mouse.up()
     assert page.faults == []
