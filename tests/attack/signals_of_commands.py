@@ -29,7 +29,7 @@ RUN = ["run", "closed-loop", "--set", "duration=0.5"]
 COMMANDS = {
     "run": [*RUN, "--out", "out"],
     "view": ["view", "closed-loop", "--no-browser", "--port", "0", "--out", "view"],
-    "new": ["new", "mine", "--out", "mine.toml"],
+    "new": ["new", "mine"],
     "compare": ["compare", READ, READ],
     "report": ["report", READ, "--out", "report.html"],
     "build": ["build", "closed-loop", "--out", "fmus"],
