@@ -122,9 +122,13 @@ def _watched(end: Action) -> Iterator[None]:
 
 
 def end_process() -> None:
-    """Ends the process of a command at a second signal; removes its temporary folders."""
-    from hapticlink.orchestrator.base import temporary_folders  # loaded within `held`
+    """Ends the process of a command at a second signal; removes its unfinished files and temporary
+    folders."""
+    from hapticlink.fmus import atomic_file  # loaded within `held`
+    from hapticlink.orchestrator.base import temporary_folders
 
+    with suppress(Exception):
+        atomic_file.remove_unfinished()
     with suppress(Exception):
         temporary_folders.clear(os.getpid())
     with suppress(OSError):
