@@ -22,6 +22,9 @@ Action = Callable[[], object]
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE = 1.0
 """Time (s) for the main thread to handle a second signal; never enough in an endless loop."""
+ENOUGH = 20.0
+"""Time (s) for the actions of a second signal, some of which may wait for ever for what the main
+thread holds."""
 
 _actions: list[Action] = []
 _count = 0
@@ -110,6 +113,9 @@ def _watched(end: Action) -> Iterator[None]:
             count += number[0] in SIGNALS
             if count > 1:
                 time.sleep(GRACE)
+                last = threading.Timer(ENOUGH, os._exit, (1,))
+                last.daemon = True
+                last.start()
                 _end(end)
         os.close(reading)
 

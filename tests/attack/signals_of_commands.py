@@ -79,17 +79,17 @@ def _case(name: str, folder: Path, read: dict[str, bytes], draw: random.Random) 
         start_new_session=True,
     )  # fmt: skip
     time.sleep(draw.uniform(0.0, draw.choice(LATEST)))
-    heard = _heard(process.pid)
     for _ in range(draw.choice((1, 1, 2))):
+        heard = _heard(process.pid)
         if process.poll() is None:
             os.killpg(process.pid, number) if number == signal.SIGINT else process.terminate()
         time.sleep(draw.uniform(0.0, 0.3))
+    hung = False
     try:
         said = process.communicate(timeout=PATIENCE)[0].decode(errors="replace")
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-        return "hung", f"no end after {PATIENCE:g} s"
+        said, hung = process.communicate()[0].decode(errors="replace"), True
     until = time.monotonic() + 10.0
     while (processes := _marked(str(folder))) and time.monotonic() < until:
         time.sleep(0.05)
@@ -102,6 +102,8 @@ def _case(name: str, folder: Path, read: dict[str, bytes], draw: random.Random) 
         shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
     if _contents(here / READ) != read:
         return "lost", f"the folder of the earlier run has changed: {said[-300:]}"
+    if hung:  # Python's own start may lose a signal, such as in a callback of its imports
+        return ("hung" if heard else "before"), f"no end after {PATIENCE:g} s: {said[-300:]}"
     if not heard and (process.returncode == -number or _python_itself(process.returncode, said)):
         return "before", ""
     broken = any(mark in said for mark in ("Traceback", "Exception ignored", "leaked", "Fatal"))
