@@ -24,7 +24,10 @@ VALUES: tuple[Any, ...] = (
     *({"duration": float("nan")}, {"hold": None}, {"graphics.rate": 1j}, range(3), iter([])),
 )
 GOOD: dict[str, Any] = {"scene": "pendulum", "options": {"duration": 0.02}}
-FUNCTIONS = ("run", "scene", "load", "explain", "export", "build", "sweep", "shipped", "schema")
+FUNCTIONS = (
+    *("run", "scene", "load", "explain", "export", "build", "sweep", "shipped"),
+    *("compare", "fit", "stability", "equilibrium_stability", "passivity", "transparency"),
+)
 PATIENCE = 25
 """Seconds of a processor for a call."""
 
