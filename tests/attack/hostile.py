@@ -26,7 +26,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import Made, command
+from tests.attack.cases import MARK, PATIENCE, Made, command, marked
 from tests.orchestrator import hostile_slave
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 
@@ -75,12 +75,9 @@ ENDS_THE_PROCESS = (
 """thread: where it outlives the library that it runs; queue: pythonfmu's libraries read the fields
 of what is no message."""
 NEVER_RETURNS = ("loop", "sleep")
-PATIENCE = 90.0
-"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
 BEFORE_SIGNALS = 6.0
 """Seconds after which a run that an FMU may hang is interrupted, and twice that a second time."""
 ROWS = 33
-MARK = "HAPTICLINK_HOSTILE"
 
 
 class Attack:
@@ -183,7 +180,7 @@ class Attack:
 
     def _left(self) -> Iterator[str]:
         until = time.monotonic() + 15.0
-        while (processes := self._processes()) and time.monotonic() < until:
+        while (processes := marked(self.folder)) and time.monotonic() < until:
             time.sleep(0.05)
         if processes:
             yield f"processes {', '.join(processes)}"
@@ -194,16 +191,6 @@ class Attack:
             subprocess.run(["rm", "-rf", *map(str, self._temporary.iterdir())], check=True)
         if self.out.exists() and (hidden := [p.name for p in self.out.glob(".*")]):
             yield f"files {', '.join(hidden)}"
-
-    def _processes(self) -> list[str]:
-        found = []
-        for path in Path("/proc").glob("[0-9]*/environ"):
-            try:
-                if f"{MARK}={self.folder}".encode() in path.read_bytes().split(b"\0"):
-                    found.append(path.parent.name)
-            except OSError:  # gone, or somebody else's
-                continue
-        return found
 
     def _believed(self, fmi: str, packed: str, place: str, act: str, status: int) -> Iterator[str]:
         called = place in ("make", "enter", "leave", "set", "get", "step", "end")

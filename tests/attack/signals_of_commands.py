@@ -16,11 +16,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.attack.cases import Made, command
-from tests.attack.signals import MARK, _marked, _python_itself
+from tests.attack.cases import MARK, PATIENCE, Made, command, marked
+from tests.attack.signals import _python_itself
 
-PATIENCE = 120.0
-"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
 LATEST = (1.0, 3.0, 12.0)
 """Seconds after the start at which the first signal comes at the latest, in turn by chance."""
 READ = "first"
@@ -91,7 +89,7 @@ def _case(name: str, folder: Path, read: dict[str, bytes], draw: random.Random) 
         os.killpg(process.pid, signal.SIGKILL)
         said, hung = process.communicate()[0].decode(errors="replace"), True
     until = time.monotonic() + 10.0
-    while (processes := _marked(str(folder))) and time.monotonic() < until:
+    while (processes := marked(folder)) and time.monotonic() < until:
         time.sleep(0.05)
     left = [p.name for p in temporary.iterdir()]
     hidden = [*here.rglob(".*")]
