@@ -9,7 +9,6 @@ port, and how the run ends.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import hapticlink as hl
+from hapticlink.orchestrator.base import temporary_folders
 
 Told = Callable[[str, int, int], None]
 SCENES = ("closed-loop", "two-users", "serial")
@@ -168,7 +168,7 @@ def figure(path: Path, found: dict[tuple[str, int, str], tuple[float, Ran]]) -> 
 
 def bench(out: Path, quick: bool, told: Told, command: str) -> None:
     """Write README.md and error.png to `out`."""
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folders.room() as folder:
         found = copies(quick, told, Path(folder))
         touched = touching(quick, told, Path(folder))
     page = [

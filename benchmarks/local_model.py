@@ -7,7 +7,6 @@ of 2000 steps.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import perf_counter
@@ -20,6 +19,7 @@ from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
 
 STEP = 1 / 512
@@ -74,13 +74,13 @@ def gaps(
     the mechanism with its own matrices at each tick of 1 s, and the largest gap of the loop (m)."""
     cases = [(i, r) for i in ("semi-implicit-euler", "rk4") for r in rates]
     found = {}
-    with tempfile.TemporaryDirectory() as room:
-        own, _ = tip(Path(room) / "own", "duration=1.0")
+    with temporary_folders.room() as room:
+        own, _ = tip(room / "own", "duration=1.0")
         for k, (integrator, rate) in enumerate(cases):
             told(f"local model: {integrator} at {rate} Hz", k, len(cases))
             options = [*HELD, "duration=1.0", f"mechanism.integrator={integrator}"]
             options.append(f"graphics={{rate={rate}, sync='joint'}}")
-            held, opened = tip(Path(room) / f"{k}", *options)
+            held, opened = tip(room / f"{k}", *options)
             found[integrator, rate] = np.linalg.norm(held - own[: len(held)], axis=1) * 1e3, opened
     return found
 

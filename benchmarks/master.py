@@ -11,7 +11,6 @@ import os
 import platform
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +19,7 @@ import hapticlink.orchestrator
 from benchmarks import closed_loop, code_version, master_page, rings
 from benchmarks.peers.masters import MASTERS
 from benchmarks.rows import Rows
+from hapticlink.orchestrator.base import temporary_folders
 
 Told = Callable[[str, int, int], object]
 
@@ -69,7 +69,7 @@ def bench(folder: Path, quick: bool, told: Told, command: str) -> None:
     cases, rounds = (QUICK, 1) if quick else (CASES, ROUNDS)
     rows = Rows(folder / ROWS[0], COLUMNS, 5)
     whole = Rows(folder / ROWS[1], closed_loop.COLUMNS, 3)
-    with tempfile.TemporaryDirectory() as room:
+    with temporary_folders.room() as room:
         for i, case in enumerate(cases):
             ring = Path(room, "-".join(map(str, case)))
             for master in (m for _ in range(rounds) for m in MASTERS):
@@ -82,6 +82,6 @@ def bench(folder: Path, quick: bool, told: Told, command: str) -> None:
                     rings.make(*case, ring)
                 rows.add(*case, master, turn, *measured(master, ring))
         told("closed-loop", len(cases), len(cases) + 1)
-        closed_loop.measure(whole, rounds, Path(room))
+        closed_loop.measure(whole, rounds, room)
     on = f"{platform.machine()}, {os.cpu_count()} cores"
     master_page.write(folder, [*rows.rows.values()], [*whole.rows.values()], command, on)

@@ -10,7 +10,6 @@ bits of the run (tests/programs).
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from time import process_time
@@ -19,6 +18,7 @@ from unittest.mock import patch
 from benchmarks.rows import Rows
 from hapticlink.fmus.check import initialize, session
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.run import execute_plan
 from hapticlink.orchestrator.run.compiled.library import load
@@ -54,7 +54,7 @@ def bench(folder: Path, quick: bool, told: Told, command: str) -> Path:
 def _measured(scene: str, options: tuple[str, ...], rounds: int) -> list[tuple[object, ...]]:
     given = ("packaging=native", *options)
     times: dict[str, list[float]] = {form: [] for form in FORMS}
-    with tempfile.TemporaryDirectory() as name:
+    with temporary_folders.room() as name:
         room = Path(name)
         load()
         begin = sum(os.times()[:4])

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import platform
-import tempfile
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.numbers import short
@@ -68,7 +68,7 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], None], comm
     empty = EmptyLoop(seconds)
     load_average = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     options = ["packaging=native", f"duration={seconds}", f"haptics.rate={RATE}"]
-    with tempfile.TemporaryDirectory() as room:
+    with temporary_folders.room() as room:
         results = simulate(
             SCENE,
             room,

@@ -15,7 +15,6 @@ the run with nothing skipped.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -30,6 +29,7 @@ from benchmarks import code_version
 from benchmarks.rows import Rows
 from hapticlink.analysis.findings import block_costs
 from hapticlink.orchestrator import experiment
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.fmi import in_process_fmi2, process_cache
 from hapticlink.orchestrator.fmi.setter import Setter
@@ -128,18 +128,18 @@ def measure(out: Path, scenes: Sequence[str], rounds: int, told: Told) -> tuple[
     """The rows of runs and of comparisons, of which those on disk are not made again."""
     rows, same = Rows(out / "runs.csv", COLUMNS, keys=3), Rows(out / "same.csv", SAME, keys=1)
     total = len(scenes) * (rounds + 1)
-    with process_cache.unpacked_once(), tempfile.TemporaryDirectory() as room:
+    with process_cache.unpacked_once(), temporary_folders.room() as room:
         for k, scene in enumerate(scenes):
             told(f"{scene}: the same results", k, total)
             if (scene,) not in same:
-                made = {s: run(scene, Path(room) / s, s) for s in (ON, OFF)}
+                made = {s: run(scene, room / s, s) for s in (ON, OFF)}
                 same.add(scene, *compared(made[ON], made[OFF]))
         for number in range(rounds):
             for k, scene in enumerate(scenes):
                 told(f"{scene}: run time", (number + 1) * len(scenes) + k, total)
                 for skipping in (ON, OFF):
                     if (scene, skipping, number) not in rows:
-                        made_now = run(scene, Path(room) / skipping, skipping, READ)
+                        made_now = run(scene, room / skipping, skipping, READ)
                         counted = counts(made_now, skipping)
                         rows.add(scene, skipping, number, *counted, made_now.outcome.wall_time)
     return rows, same

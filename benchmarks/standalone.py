@@ -14,7 +14,6 @@ import json
 import os
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any
 from unittest.mock import patch
 
 from benchmarks.rows import Rows
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.run import execute_plan
 from hapticlink.orchestrator.run.compiled.library import load
@@ -113,7 +113,7 @@ def _measured(
 ) -> tuple[int, float, float, float, float]:
     """Size (bytes), processor time to make (s), and times real time of run, node and Chromium."""
     shown = viewed(scene, (*options, "packaging=native"), DURATION)
-    with tempfile.TemporaryDirectory() as name:
+    with temporary_folders.room() as name:
         room = Path(name)
         load()
         begin = sum(os.times()[:4])

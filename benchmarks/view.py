@@ -16,7 +16,6 @@ import os
 import platform
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -27,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import hapticlink as hl
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.numbers import short
@@ -86,7 +86,7 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], co
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     scene = viewed(SCENE, [f"haptics.rate={RATE}"])
     told(f"{SCENE}, dragged", 0, seconds)
-    with tempfile.TemporaryDirectory() as room, Link(SERVER, "127.0.0.1", "0", "bench") as link:
+    with temporary_folders.room() as room, Link(SERVER, "127.0.0.1", "0", "bench") as link:
         url = f"http://127.0.0.1:{link.first['port']}/bench/"
         log = Path(room, "log.json")
         with log.open("w") as out:

@@ -89,6 +89,7 @@ def _runs() -> dict[str, str]:
     from importlib.util import find_spec
 
     import hapticlink as hl
+    from hapticlink.orchestrator.base import interrupt
     from hapticlink.orchestrator.base.faults import Fault
 
     states = {}
@@ -98,6 +99,7 @@ def _runs() -> dict[str, str]:
             states[packaging] = str(made.fault) if made.fault else "works"
         except Fault as fault:
             states[packaging] = str(fault)
+        interrupt.check()  # Ctrl-C is no fault of the FMU
     return states
 
 

@@ -24,16 +24,17 @@ Trace = list[bytes]
 
 
 class Session:
-    """An extracted FMU and its instances, all of which `close` frees."""
+    """An FMU that is extracted to `folder`, by default a new temporary one, and its instances, all
+    of which `close` frees."""
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, folder: Path | None = None) -> None:
         self.description = fmpy.read_model_description(str(path), validate=False)
         variables = self.description.modelVariables
         self.reals = [v.valueReference for v in variables if v.type == "Real"]
         self.inputs = [v for v in variables if v.causality == "input" and v.type == "Real"]
         experiment = self.description.defaultExperiment
         self.step_size = float(experiment.stepSize or 1e-3) if experiment else 1e-3
-        self.folder = fmpy.extract(str(path))
+        self.folder = fmpy.extract(str(path), folder)
         self.messages: list[str] = []
         self._instances: list[FMU2Slave] = []
 
@@ -68,9 +69,9 @@ class Session:
 
 
 @contextmanager
-def session(path: Path | str) -> Iterator[Session]:
+def session(path: Path | str, folder: Path | None = None) -> Iterator[Session]:
     """A Session that is closed at the end of the context."""
-    opened = Session(path)
+    opened = Session(path, folder)
     try:
         yield opened
     finally:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import current_directory, interrupt
+from hapticlink.orchestrator.base import current_directory, interpreter_state, interrupt
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.plan.plan import Plan
@@ -126,6 +126,7 @@ def simulate(
             with (
                 crash_monitor.watched(folder) if foreign else nullcontext(),
                 current_directory.restored(*foreign),
+                interpreter_state.restored(),
             ):
                 outcome = run(plan, results, progress, real_time)
             try:

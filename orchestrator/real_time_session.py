@@ -25,7 +25,7 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.scene.arguments import require
+from hapticlink.orchestrator.scene.arguments import require, require_name
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.live_changes import changed, choices, require_other_rate
@@ -87,7 +87,7 @@ class LiveRun:
         """The newest sample of an output, `fmu.port`, that the haptic loop has: its entries in the
         order of their indices. Raises InputFault for an unknown name."""
         self._require_running()
-        if name not in self._places:
+        if require_name("output", name) not in self._places:
             fmu, place = name.partition(".")[0], self._simulation.signals.scalar
             self._places[name] = [place(fmu, s.name) for s in self._scalars(name, "output")]
         return self._simulation.signals.values[self._places[name]]
@@ -110,7 +110,7 @@ class LiveRun:
         other names, for gains of a spring whose energy `pspm` limits, and for values of another
         number or that are not finite."""
         self._require_running()
-        fmu = name.partition(".")[0]
+        fmu = require_name("input or parameter", name).partition(".")[0]
         if name not in self._settings:
             scalars = [*self._scalars(name, "input", "parameter")]
             self._require_free(name, scalars)
@@ -133,8 +133,9 @@ class LiveRun:
         InputFault where it does not fit, or cannot be changed while the scene runs, and for a delay
         that no scene may have."""
         self._require_running()
-        if hold is not None and hold not in HOLDS:
-            raise InputFault(unknown("hold", str(hold), HOLDS))
+        require_name("connection", name)
+        if hold is not None and require_name("hold", hold) not in HOLDS:
+            raise InputFault(unknown("hold", hold, HOLDS))
         if delay is not None:
             delay = require(f"delay of {name}", delay, Elapsed)
         system = self._simulation.system
@@ -169,7 +170,7 @@ class LiveRun:
         self._require_running()
         timeline = self._simulation.system.timeline
         haptics, *others = timeline.clocks
-        if clock not in [c.name for c in others]:
+        if require_name("clock", clock) not in [c.name for c in others]:
             raise InputFault(unknown("clock", clock, [c.name for c in others]))
         require_other_rate(self.system, clock)
         rate = require(f"rate of {clock}", rate, Annotated[float, Quantity("Hz", gt=0)])

@@ -3,12 +3,14 @@ hand, as a run writes them to `haptics.csv`, or a lab under the same names."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from hapticlink.fmus.versions import install_command
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import HAND_WRENCH, MEASURED_HANDLE_POSE, MOTOR_WRENCH
@@ -38,7 +40,10 @@ def read(path: Path | str) -> Log:
     """The log in a CSV or HDF5 file (`.h5`, `.hdf5`), or that of a run in its folder. Raises
     InputFault for a file without the pose, or whose samples are not evenly spaced or finite."""
     path = Path(path)
-    path = path / "haptics.csv" if path.is_dir() else path
+    if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
+        path = path / "haptics.csv"
+    elif not text_files.exists(path):
+        raise InputFault(f"{path}: cannot be read as a log: it is no file")
     table = _hdf5(path) if path.suffix in (".h5", ".hdf5") else read_table(path)
     names = {
         name: name in table for name in ("time", MEASURED_HANDLE_POSE, MOTOR_WRENCH, HAND_WRENCH)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -36,11 +37,13 @@ from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.components.specs.hand import Hand
+from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.faults import InputFault, shortened
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.timeline import timeline
@@ -68,12 +71,8 @@ def stability(
     are those of a drift. Raises InputFault for a scene without linkage, one whose run or map has no
     period (rates and latencies that vary), and one without equilibrium in any pose.
     """
-    if poses < 1:
-        raise InputFault(f"poses = {poses}: give 1 or more")
-    if not (bounds.hertz >= 0.0 and bounds.growth >= 0.0):
-        raise InputFault(
-            f"drift up to {bounds.hertz:g} Hz and {bounds.growth:g} 1/s: give 0 or more"
-        )
+    poses = int(require("poses", poses, Annotated[int, Quantity("1", ge=1)]))
+    _require_bounds(bounds)
     given = overrides.written(options)
     read = open_scene.load(scene, given)
     if varies(read):
@@ -110,6 +109,7 @@ def equilibrium_stability(
     `bounds` and `progress` as in `stability`. Raises InputFault as that does, and where the run
     keeps moving.
     """
+    _require_bounds(bounds)
     given = overrides.written(options)
     read = open_scene.load(scene, given)
     if varies(read):
@@ -120,6 +120,15 @@ def equilibrium_stability(
         hands = {OWN: own_hand(read.hand)}
     given, rounded = _short(read, given)
     return _judged(scene, given, [_rest(scene, given, read)], hands, bounds, progress, rounded)
+
+
+def _require_bounds(bounds: Bounds) -> None:
+    if not isinstance(bounds, Bounds):
+        raise InputFault(f"bounds = {shortened(repr(bounds))}: give Bounds(hertz, growth)")
+    if not (bounds.hertz >= 0.0 and bounds.growth >= 0.0):
+        raise InputFault(
+            f"drift up to {bounds.hertz:g} Hz and {bounds.growth:g} 1/s: give 0 or more"
+        )
 
 
 def _short(read: Scene, given: tuple[str, ...]) -> tuple[tuple[str, ...], str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from benchmarks.continuous import GRID, Reference
 from benchmarks.cosimulation.points import Point
 from benchmarks.rows import Rows
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
@@ -53,7 +53,7 @@ def measure(
     """Run what `path` lacks. All points of a round come before the next round, so that a busy
     machine slows all of them alike; a refused point is not asked again."""
     rows = Rows(path, COLUMNS, keys=len(SETTINGS) + 1)
-    with process_cache.unpacked_once(), tempfile.TemporaryDirectory() as room:
+    with process_cache.unpacked_once(), temporary_folders.room() as room:
         for number in range(rounds):
             for k, point in enumerate(points):
                 told(str(point), number * len(points) + k, rounds * len(points))
@@ -61,5 +61,5 @@ def measure(
                 if (*point.key, number) in rows or (first and first["end"] == "refused"):
                     continue
                 reference = references[point.scene].relative
-                rows.add(*point.key, number, *run(point, reference, Path(room)))
+                rows.add(*point.key, number, *run(point, reference, room))
     return rows

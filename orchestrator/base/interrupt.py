@@ -22,6 +22,9 @@ Action = Callable[[], object]
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE = 1.0
 """Time (s) for the main thread to handle a second signal; never enough in an endless loop."""
+ENOUGH = 20.0
+"""Time (s) for the actions of a second signal, some of which may wait for ever for what the main
+thread holds."""
 
 _actions: list[Action] = []
 _count = 0
@@ -110,6 +113,9 @@ def _watched(end: Action) -> Iterator[None]:
             count += number[0] in SIGNALS
             if count > 1:
                 time.sleep(GRACE)
+                last = threading.Timer(ENOUGH, os._exit, (1,))
+                last.daemon = True
+                last.start()
                 _end(end)
         os.close(reading)
 
@@ -122,9 +128,13 @@ def _watched(end: Action) -> Iterator[None]:
 
 
 def end_process() -> None:
-    """Ends the process of a command at a second signal; removes its temporary folders."""
-    from hapticlink.orchestrator.base import temporary_folders  # loaded within `held`
+    """Ends the process of a command at a second signal; removes its unfinished files and temporary
+    folders."""
+    from hapticlink.fmus import atomic_file  # loaded within `held`
+    from hapticlink.orchestrator.base import temporary_folders
 
+    with suppress(Exception):
+        atomic_file.remove_unfinished()
     with suppress(Exception):
         temporary_folders.clear(os.getpid())
     with suppress(OSError):

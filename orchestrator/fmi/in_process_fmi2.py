@@ -137,7 +137,7 @@ class InProcess(WithStates):
         """The FMU requests the end of the simulation at `end` (s). Raises AsksToEnd if that lies
         within its step."""
         time, size = self.place.begin, self.place.size
-        if end < time + (1 - SHARE) * size:
+        if not end >= time + (1 - SHARE) * size:  # or is no number
             what = f"asks to end the simulation at {end:.6g} s, within its step"
             raise AsksToEnd(self.name, what, time, passing=True)
         self.place.ended = 1

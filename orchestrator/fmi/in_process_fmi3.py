@@ -48,8 +48,13 @@ class InProcess3(InProcess):
         return advance
 
     def _settled(self, status: int, time: float) -> int:
-        if self.step_flags[1] and succeeded(status):
-            self._end(self.reached.value)
+        if succeeded(status):
+            _, ends, early = self.step_flags
+            if ends:
+                self._end(self.reached.value)
+            elif early:
+                what = f"{self.do_step} returned early, at {self.reached.value:.6g} s, unasked"
+                raise self._fault(what, time)
         return status
 
     def _setting(

@@ -154,15 +154,8 @@ def make_csv(path: Path) -> int:
     """Make the CSV `path` of its rows, which stay; their number. Raises OSError, as on a full
     disk."""
     source = path.with_suffix(rows.SUFFIX)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    unfinished.unlink(missing_ok=True)
-    try:
-        with unfinished.open("xb") as file:
-            count = rows.write_csv(source, file)
-        os.replace(unfinished, path)
-    except OSError:
-        unfinished.unlink(missing_ok=True)
-        raise
+    with atomic_file(path) as unfinished, unfinished.open("xb") as file:
+        count = rows.write_csv(source, file)
     return count
 
 

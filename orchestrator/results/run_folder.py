@@ -124,8 +124,6 @@ class RunFolder:
                 write_over(self.folder / RUN, self._setup | whole, self._setup | least)
 
     def _interrupted(self) -> None:
-        for left in self.folder.glob(".run.*.json"):  # unfinished files
-            left.unlink()
         self._broken_off("interrupted", Interrupted(self.last))
         for recorder in self._recorders:
             with suppress(OSError):

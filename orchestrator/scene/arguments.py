@@ -7,7 +7,7 @@ from numbers import Real
 from typing import Any, get_args
 
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.faults import InputFault, shortened
 
 
 def require(name: str, value: object, kind: Any) -> float:
@@ -27,3 +27,10 @@ def require(name: str, value: object, kind: Any) -> float:
         if math.isfinite(number) and number in quantity and not (whole and number % 1):
             return number_type(value)
     raise InputFault(f"{name} = {value!r}{unit}: give {what} {quantity.range}{unit}")
+
+
+def require_name(what: str, value: object) -> str:
+    """`value` as a name. Raises InputFault where it is no text."""
+    if isinstance(value, str):
+        return value
+    raise InputFault(f"{what} = {shortened(repr(value))}: give its name")

@@ -31,7 +31,7 @@ def images(rule: str, poles: np.ndarray) -> np.ndarray:
     settings = {"rule": rule}
     with temporary_folders.room() as room:
         path = build_block("discrete_equivalent", settings, room)
-        with session(path) as opened:
+        with session(path, room / "fmu") as opened:
             reference = {v.name: v.valueReference for v in opened.description.modelVariables}
             gains = [reference["re"], reference["im"]]
             state = [reference["x[1]"], reference["x[2]"]]

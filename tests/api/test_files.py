@@ -42,3 +42,13 @@ def test_an_exported_scene_explains_itself_as_the_scene_does(bar: Path, tmp_path
 def test_an_ssp_takes_no_place_of_a_folder(bar: Path, tmp_path: Path) -> None:
     with pytest.raises(hl.InputFault, match=r"is a folder; name a file in it, .*scene\.ssp"):
         hl.export(bar, out=tmp_path)
+
+
+@pytest.mark.parametrize(("rate", "told"), [(30, "17.07"), (32, ""), ("512/16", "")])
+def test_an_export_of_rates_that_do_not_divide_says_so(
+    rate: float | str, told: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """512 / 30 = 17.07: masters with whole decimation factors step the graphics copy elsewhere."""
+    hl.export("closed-loop", {"graphics.rate": rate}, out=tmp_path / "loop.ssp")
+    warned = [line for line in caplog.messages if "whole multiples of the fastest rate" in line]
+    assert [told in line for line in warned] == [True] * bool(told)

@@ -77,6 +77,24 @@ def test_what_no_scene_may_have_is_refused_while_it_runs(value: Any) -> None:
     assert made.run["real_time"]["changes"] == []
 
 
+@pytest.mark.parametrize("value", [None, 7, b"x", {"x": 1}, ["hand.F"], "x"], ids=repr)
+def test_names_that_are_none_are_refused_while_it_runs(value: Any) -> None:
+    def turn(live: hl.RealTime) -> None:
+        asked: tuple[Callable[[], object], ...] = (
+            lambda: live[value],
+            lambda: live.set(value, 1.0),
+            lambda: live.hold(value, "zoh"),
+            lambda: live.hold("virtual_environment.Lambda_inv", value or 0),  # None leaves it
+            lambda: live.rate(value, 20.0),
+        )
+        for ask in asked:
+            with pytest.raises(InputFault):
+                ask()
+        live.stop()
+
+    ran("closed-loop", turn, "duration=0.1")
+
+
 @pytest.mark.parametrize("every", [float("nan"), -1.0, "x"])
 def test_turns_come_after_a_time(every: Any) -> None:
     with pytest.raises(InputFault, match="every"):

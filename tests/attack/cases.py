@@ -19,6 +19,10 @@ to then kept; lost: results of an earlier run are gone, or something stays behin
 signal, a traceback, an error of ours; hung: beyond a stated bound."""
 BAD = ("lost", "crashed", "hung", "believed")
 FOLDER = Path("results/faults")
+PATIENCE = 120.0
+"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
+MARK = "HAPTICLINK_ATTACK"
+"""Variable of the environment by which the processes of an attack are known: its folder."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,16 @@ def hear_interrupts() -> None:
     """Processes that this one starts hear SIGINT, which a shell ignores in the background."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def marked(folder: Path) -> list[str]:
+    """The processes of the attack in `folder`."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        with suppress(OSError):  # gone, or somebody else's
+            if f"{MARK}={folder}".encode() in path.read_bytes().split(b"\0"):
+                found.append(path.parent.name)
+    return found
 
 
 def command(

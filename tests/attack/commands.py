@@ -24,6 +24,7 @@ from pathlib import Path
 
 from hapticlink import commands
 from hapticlink.commands import internal_error
+from tests.attack.cases import PATIENCE
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""
@@ -31,8 +32,6 @@ WORK = 5.0
 """Seconds after which a sweep is ended, whose runs may be 100,000 or long."""
 PROCESSOR_TIME = 30
 """Seconds of a processor after which a command is hung."""
-PATIENCE = 120.0
-"""Seconds after which it is hung, on a machine that is busy with other things."""
 MEMORY = 6 << 30
 """Bytes of address space."""
 CRASHED = ("Traceback", "Fatal Python error", internal_error.PREFIX)
@@ -57,6 +56,16 @@ class Place:
         shutil.rmtree(self.out, ignore_errors=True)
         shutil.copytree(self._earlier, self.out)
         status, said = self.forked(arguments)
+        if bad := self.broken(status, said):
+            return bad
+        assert status is not None
+        if wrong := [*self._lost(status)]:
+            return "lost", f"status {status}: {'; '.join(wrong)}: {said[-500:]}"
+        ended = status == 0 or "interrupted" in said
+        return ("done" if ended else "told" if status == 1 else "refused"), ""
+
+    def broken(self, status: int | None, said: str) -> tuple[str, str] | None:
+        """hung or crashed, and what was wrong; None for a command that has ended as it should."""
         if status is None or -status in (signal.SIGXCPU, signal.SIGKILL):
             return "hung", said[-500:]
         if status not in (0, 1, 2) or any(mark in said for mark in CRASHED):
@@ -65,10 +74,7 @@ class Place:
             return "crashed", f"status {status} without a word: {said[-500:]}"
         if len(said) > MESSAGE:
             return "crashed", f"a message of {len(said)} characters: {said[:500]}"
-        if wrong := [*self._lost(status)]:
-            return "lost", f"status {status}: {'; '.join(wrong)}: {said[-500:]}"
-        ended = status == 0 or "interrupted" in said
-        return ("done" if ended else "told" if status == 1 else "refused"), ""
+        return None
 
     def reports(self) -> str:
         """The ends of the reports of errors of ours."""

@@ -15,11 +15,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import Made, command
+from tests.attack.cases import PATIENCE, Made, command
 
 SCENES = ("pendulum", "closed-loop", "four-bar")
-PATIENCE = 120.0
-"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
 REFUSED = "another run writes there"
 
 

@@ -22,10 +22,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import Made, command
+from tests.attack.cases import MARK, PATIENCE, Made, command, marked
 from tests.orchestrator import hostile_slave
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 
@@ -34,25 +35,49 @@ STATUSES = (
     *("warning", "discard", "error", "fatal", "pending"),
     *("minus", "least", "most", "thirtytwo"),
 )
+ENDS_THE_RUN = ("finish", "middle", "never", "beyond")
+"""Requests to end the simulation: at the end of a step, within it, at NaN, at 1e300 s."""
 ACTS = (
     *STATUSES,
     *("nan", "inf", "huge", "root", "gone", "upward", "zero", "flush"),
     *("exit", "exit3", "leave", "abort", "null", "stack", "loop", "sleep", "slow"),
-    *("stdout", "deaf", "locale", "prints", "nothing", "format", "long", "bytes"),
+    *(
+        "stdout",
+        "stderr",
+        "stdin",
+        "deaf",
+        "locale",
+        "prints",
+        "nothing",
+        "format",
+        "long",
+        "bytes",
+    ),
     *("thread", "child", "term", "int", "umask", "environ"),
+    *("traps", "alarm", "default", "memory", "outside", "early", *ENDS_THE_RUN),
 )
+CUT_SHORT = {("step", "early"), ("step", "middle"), ("step", "never")}
 PACKED = {"C": ACTS, "Python": tuple(hostile_slave.ACTS)}
 FILES = {"C": "hostile.fmu", "Python": "Hostile{fmi}.fmu"}
-ENDS_THE_PROCESS = ("exit", "exit3", "leave", "abort", "null", "stack", "thread", "queue")
+ENDS_THE_PROCESS = (
+    "exit",
+    "exit3",
+    "leave",
+    "abort",
+    "null",
+    "stack",
+    "thread",
+    "queue",
+    "alarm",
+    "default",
+    "memory",
+)
 """thread: where it outlives the library that it runs; queue: pythonfmu's libraries read the fields
 of what is no message."""
 NEVER_RETURNS = ("loop", "sleep")
-PATIENCE = 90.0
-"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
 BEFORE_SIGNALS = 6.0
 """Seconds after which a run that an FMU may hang is interrupted, and twice that a second time."""
 ROWS = 33
-MARK = "HAPTICLINK_HOSTILE"
 
 
 class Attack:
@@ -66,6 +91,9 @@ class Attack:
             (folder / fmi).mkdir()
             hostile_fmu(folder / fmi, fmi)
             hostile_slave.hostile_slave(folder / fmi, fmi)
+        locale = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(folder / "de_DE.UTF-8")]
+        with suppress(FileNotFoundError):  # where it is not, the act `locale` changes nothing
+            subprocess.run(locale, check=False, capture_output=True)
         good = hostile_scene(folder / "2", "good_none_0")
         status, said = self._ended(good, "compiled", patience=PATIENCE)
         assert status == 0, said
@@ -91,7 +119,7 @@ class Attack:
             return ["believed", "exit(0) of an FMU was a success"]
         if wrong := [*self._untrue(status, said, crash), *self._left()]:
             return ["lost", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
-        if wrong := [*self._believed(packed, place, act, status)]:
+        if wrong := [*self._believed(fmi, packed, place, act, status)]:
             return ["believed", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
         return ["done" if status == 0 else "told", ""]
 
@@ -101,6 +129,7 @@ class Attack:
         environment = os.environ | {
             "TMPDIR": str(self._temporary),
             "HAPTICLINK_LOOP": "python" if loop == "python" else "",
+            "LOCPATH": str(self.folder),
             MARK: str(self.folder),
         }
         arguments = ["run", str(scene), "--out", str(self.out), "--no-figures"]
@@ -140,17 +169,18 @@ class Attack:
             return
         # By an FMU that has closed the output, or one that interrupts after the run has ended.
         late = "Bad file descriptor" in said or "not all of its figures" in said
-        if (status == 0) != (run["end"]["reason"] == "duration") and not crash and not late:
+        regular = run["end"]["reason"] in ("duration", "terminated")
+        if (status == 0) != regular and not crash and not late:
             yield f"run.json says {run['end']['reason']}"
         times = tables.load(self.out).haptics["time"]
         if len(times) and abs(times[-1] - run["end"]["time"]) > 1e-12:
             yield f"rows until {times[-1]} s, run.json until {run['end']['time']} s"
-        if status == 0 and len(times) != ROWS:
+        if run["end"]["reason"] == "duration" and len(times) != ROWS:
             yield f"{len(times)} rows"
 
     def _left(self) -> Iterator[str]:
         until = time.monotonic() + 15.0
-        while (processes := self._processes()) and time.monotonic() < until:
+        while (processes := marked(self.folder)) and time.monotonic() < until:
             time.sleep(0.05)
         if processes:
             yield f"processes {', '.join(processes)}"
@@ -162,23 +192,16 @@ class Attack:
         if self.out.exists() and (hidden := [p.name for p in self.out.glob(".*")]):
             yield f"files {', '.join(hidden)}"
 
-    def _processes(self) -> list[str]:
-        found = []
-        for path in Path("/proc").glob("[0-9]*/environ"):
-            try:
-                if f"{MARK}={self.folder}".encode() in path.read_bytes().split(b"\0"):
-                    found.append(path.parent.name)
-            except OSError:  # gone, or somebody else's
-                continue
-        return found
-
-    def _believed(self, packed: str, place: str, act: str, status: int) -> Iterator[str]:
+    def _believed(self, fmi: str, packed: str, place: str, act: str, status: int) -> Iterator[str]:
         called = place in ("make", "enter", "leave", "set", "get", "step", "end")
         failed = hostile_slave.RAISES if packed == "Python" else {*STATUSES} - {"warning"}
         if called and act in failed and status == 0:
             yield f"{act} from {place} was a success"
         if not (self.out / "run.json").exists():
             return
+        whole = json.loads((self.out / "run.json").read_text())["end"]["reason"] == "duration"
+        if (place, act) in CUT_SHORT and (fmi, act) != ("2", "early") and whole:
+            yield f"a step that ended {act} was a whole one"
         table = tables.load(self.out).haptics
         for port, good in zip(("y", "slope"), self._source, strict=True):
             numbers = table[f"source.{port}"].tolist()

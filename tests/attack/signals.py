@@ -22,9 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import Made, command, hear_interrupts
+from tests.attack.cases import MARK, PATIENCE, Made, command, hear_interrupts, marked
 
-MARK = "HAPTICLINK_ATTACK"
 COMMAND = [sys.executable, "-m", "hapticlink", "run", "closed-loop"]
 KINDS = {
     "in process": [],
@@ -33,8 +32,6 @@ KINDS = {
 }
 OUTCOMES = ("before", "done", "told", "lost", "crashed", "hung")
 """before: Python's own start; done: after the last thing that asks; told: status 1, interrupted."""
-PATIENCE = 120.0
-"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +131,7 @@ class Attack:
 
     def _left_behind(self) -> Iterator[str]:
         until = time.monotonic() + 10.0
-        while (found := _marked(str(self._folder))) and time.monotonic() < until:
+        while (found := marked(self._folder)) and time.monotonic() < until:
             time.sleep(0.05)
         if found:
             yield f"processes {', '.join(found)}"
@@ -149,18 +146,6 @@ class Attack:
 def _python_itself(status: int, said: str) -> bool:
     """Whether the signal came before the first line of this project was read."""
     return status == -signal.SIGINT or ("KeyboardInterrupt" in said and "hapticlink" not in said)
-
-
-def _marked(mark: str) -> list[str]:
-    """The processes of an attack, by their environment."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/environ"):
-        try:
-            if f"{MARK}={mark}".encode() in path.read_bytes().split(b"\0"):
-                found.append(path.parent.name)
-        except OSError:  # gone, or somebody else's
-            continue
-    return found
 
 
 def attack(number: int, seed: int, duration: float = 0.2) -> Iterator[Made]:

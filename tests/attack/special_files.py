@@ -7,14 +7,13 @@ import json
 import os
 import random
 import shutil
-import signal
 import socket
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from tests.attack.cases import Made, command
-from tests.attack.commands import CRASHED, Place
+from tests.attack.commands import Place
 
 NAMES = ("run.json", "haptics.csv", "plan.txt", "haptics.rows", "new")
 COMMANDS = ("run", "report", "compare", "recover", "export", "sweep")
@@ -87,15 +86,13 @@ def attack(number: int, seed: int) -> Iterator[Made]:
 
 
 def _judged(place: Place, status: int | None, said: str) -> tuple[str, str]:
-    if status is None or -status in (signal.SIGXCPU, signal.SIGKILL):
-        return "hung", said[-300:]
-    if status not in (0, 1, 2) or any(mark in said for mark in CRASHED):
-        return "crashed", f"status {status}: {said[-400:]}{place.reports()}"
-    if status and "hapticlink: " not in said:
-        return "crashed", f"status {status} without a word: {said[-300:]}"
+    if bad := place.broken(status, said):
+        return bad
+    if "╭" in said:
+        return "crashed", f"the attack's own command: {said[-300:]}"
     if left := place.left():
         return "lost", f"temporary {', '.join(left)}: {said[-300:]}"
-    return ("done", "told", "refused")[status], ""
+    return ("done", "told", "refused")[status or 0], ""
 
 
 if __name__ == "__main__":

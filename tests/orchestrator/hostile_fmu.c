@@ -26,7 +26,7 @@
 
 typedef void (*Log2)(void *, const char *, int, const char *, const char *, ...);
 typedef void (*Log3)(void *, int, const char *, const char *);
-typedef struct { double u, y, slope; int step, from; char place[16], act[16]; void *log, *environment; char name[64]; } Model;
+typedef struct { double u, y, slope; int step, from; char place[16], act[16]; void *log, *environment; char name[64]; bool ends, early; double reached; } Model;
 
 static void says(Model *m, const char *text) {
     if (!m->log) return;
@@ -85,6 +85,24 @@ static int acts(Model *m, const char *place) {
     if (IS("sleep")) sleep(3600);
     if (IS("slow")) usleep(2000);
     if (IS("stdout")) close(1);
+    if (IS("stderr")) close(2);
+    if (IS("stdin")) close(0);
+    if (IS("traps")) feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
+    if (IS("alarm")) ualarm(1000, 0);
+    if (IS("default")) signal(SIGINT, SIG_DFL), raise(SIGINT);
+    if (IS("memory")) {
+        const struct rlimit room = {(rlim_t)2 << 30, RLIM_INFINITY};
+        if (setrlimit(RLIMIT_AS, &room)) return 3;
+        for (size_t size = (size_t)1 << 30; size >= 4096; size /= 2) while (malloc(size)) ;
+    }
+    /* Ends of a step that only FMI 3 has, and the request to end that FMI 2 makes by a discard. */
+    if (IS("early")) m->early = true;
+    if (IS("finish") || IS("never") || IS("beyond") || IS("middle")) {
+        m->ends = true;
+        if (IS("never")) m->reached = NAN;
+        if (IS("beyond")) m->reached = 1e300;
+        return FMI == 2 ? 2 : 0;
+    }
     if (IS("closed")) for (int i = 3; i < 64; i++) close(i);
     if (IS("deaf")) signal(SIGINT, SIG_IGN), signal(SIGTERM, SIG_IGN);
     if (IS("locale")) setlocale(LC_ALL, "de_DE.UTF-8");
@@ -136,13 +154,19 @@ static int initial(Model *m, const char *place) {
     return status;
 }
 
-static int stepped(Model *m, double h) {
+static int stepped(Model *m, double t, double h) {
     m->step++;
+    m->reached = strcmp(m->act, "middle") && strcmp(m->act, "early") ? t + h : t + h / 2;
     m->y = m->step + m->u;
     /* Whose bits depend on the rounding mode. */
     m->slope += h / 3.0;
     if (!strcmp(m->place, "restore") && m->step == m->from) return 2; /* to be asked to */
     return acts(m, "step");
+}
+
+/* One number more than was asked for. */
+static void outside(const Model *m, double *beyond) {
+    if (!strcmp(m->act, "outside") && m->step >= m->from) *beyond = 1e300;
 }
 
 #define UNUSED(name) int name(void) { return 3; }
@@ -154,7 +178,7 @@ UNUSED(fmi2GetString) UNUSED(fmi2SetInteger) UNUSED(fmi2SetBoolean) UNUSED(fmi2S
 UNUSED(fmi2SerializedFMUstateSize) UNUSED(fmi2SerializeFMUstate) UNUSED(fmi2DeSerializeFMUstate)
 UNUSED(fmi2GetDirectionalDerivative) UNUSED(fmi2SetRealInputDerivatives)
 UNUSED(fmi2GetRealOutputDerivatives) UNUSED(fmi2CancelStep) UNUSED(fmi2GetStatus)
-UNUSED(fmi2GetRealStatus) UNUSED(fmi2GetIntegerStatus) UNUSED(fmi2GetStringStatus)
+UNUSED(fmi2GetIntegerStatus) UNUSED(fmi2GetStringStatus)
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
@@ -167,6 +191,7 @@ int fmi2EnterInitializationMode(Model *m) { return initial(m, "enter"); }
 int fmi2ExitInitializationMode(Model *m) { return initial(m, "leave"); }
 int fmi2Terminate(Model *m) { return acts(m, "end"); }
 int fmi2GetReal(Model *m, const unsigned *vr, size_t n, double *value) {
+    outside(m, value + n);
     for (size_t i = 0; i < n; i++) value[i] = vr[i] == 0 ? m->u : vr[i] == 1 ? m->y : m->slope;
     return acts(m, "get");
 }
@@ -174,7 +199,7 @@ int fmi2SetReal(Model *m, const unsigned *vr, size_t n, const double *value) {
     for (size_t i = 0; i < n; i++) if (vr[i] == 0) m->u = value[i];
     return acts(m, "set");
 }
-int fmi2DoStep(Model *m, double t, double h, int forward) { return stepped(m, h); }
+int fmi2DoStep(Model *m, double t, double h, int forward) { return stepped(m, t, h); }
 int fmi2GetFMUstate(Model *m, Model **state) {
     if (!*state) *state = malloc(sizeof *m);
     **state = *m;
@@ -187,7 +212,8 @@ int fmi2SetFMUstate(Model *m, Model *state) {
     return acts(m, "restore");
 }
 int fmi2FreeFMUstate(Model *m, Model **state) { free(*state); *state = NULL; return acts(m, "forget"); }
-int fmi2GetBooleanStatus(Model *m, int kind, int *value) { *value = 0; return 0; }
+int fmi2GetBooleanStatus(Model *m, int kind, int *value) { *value = m->ends; return 0; }
+int fmi2GetRealStatus(Model *m, int kind, double *value) { *value = m->reached; return 0; }
 #else
 UNUSED(fmi3ActivateModelPartition) UNUSED(fmi3CompletedIntegratorStep)
 UNUSED(fmi3DeserializeFMUState) UNUSED(fmi3EnterConfigurationMode) UNUSED(fmi3ExitConfigurationMode)
@@ -221,6 +247,7 @@ int fmi3EnterInitializationMode(Model *m, bool d, double a, double t, bool s, do
 int fmi3ExitInitializationMode(Model *m) { return initial(m, "leave"); }
 int fmi3Terminate(Model *m) { return acts(m, "end"); }
 int fmi3GetFloat64(Model *m, const unsigned *vr, size_t n, double *value, size_t size) {
+    outside(m, value + n);
     for (size_t i = 0; i < n; i++) value[i] = vr[i] == 0 ? m->u : vr[i] == 1 ? m->y : m->slope;
     return acts(m, "get");
 }
@@ -230,9 +257,12 @@ int fmi3SetFloat64(Model *m, const unsigned *vr, size_t n, const double *value, 
 }
 int fmi3DoStep(Model *m, double t, double h, bool forward, bool *event, bool *end, bool *early,
                double *reached) {
-    *event = *end = *early = false;
-    *reached = t + h;
-    return stepped(m, h);
+    const int status = stepped(m, t, h);
+    *event = false;
+    *end = m->ends;
+    *early = m->early;
+    *reached = m->reached;
+    return status;
 }
 int fmi3GetFMUState(Model *m, Model **state) {
     if (!*state) *state = malloc(sizeof *m);

@@ -37,6 +37,12 @@ ACTS = RAISES | {
     "sleep": "time.sleep(3600)",
     "slow": "time.sleep(.002)",
     "stdout": "os.close(1)",
+    "stderr": "os.close(2)",
+    "streams": "sys.stdout = sys.stderr = None",
+    "locale": "locale.setlocale(locale.LC_ALL, 'de_DE.UTF-8')",
+    "deaf": "signal.signal(signal.SIGINT, signal.SIG_IGN)",
+    "seterr": "numpy.seterr(all='raise')",
+    "recursion": "sys.setrecursionlimit(60)",
     "prints": "[print('%0100d' % i) for i in range(1000)]",
     "flood": "[self.log('x' * 1000, enums.Fmi2Status.error) for _ in range(1000)]",
     "long": "self.log('x' * 2**20, enums.Fmi2Status.error)",
@@ -52,7 +58,7 @@ ACTS = RAISES | {
     "queue": "self.log_queue.append(7)",
 }
 _SLAVE = """
-import ctypes, gc, os, tempfile, threading, time, warnings
+import ctypes, gc, locale, numpy, os, signal, sys, tempfile, threading, time, warnings
 from pythonfmu{of} import Fmi{fmi}Causality, Fmi{fmi}Slave, {real}, enums
 if {fmi} == 3:
     enums.Fmi2Status = enums.Fmi3Status

@@ -175,7 +175,8 @@ int fmu_step(Fmu *f, double time, double end, double size, At *at) {
     if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
     if (f->kind.python && exception_left()) return RAISED;
     if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
-    if (!fmu_succeeded(at->status) || (f->kind.fmi == 3 && *f->terminate)) return STEPPED;
+    const int cut = f->kind.fmi == 3 && (*f->terminate || *f->early);
+    if (cut || !fmu_succeeded(at->status)) return STEPPED;
     p->time = end;
     return 0;
 }

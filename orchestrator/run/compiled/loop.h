@@ -296,7 +296,7 @@ enum {
     JUDGE,       /* outputs are not finite, or beyond a bound */
     FAILED,      /* call number `what` of a get or set returned `status` */
     RAISED,      /* call `what`, -1 for doStep, has left a Python exception, which ctypes raises */
-    STEPPED,     /* doStep returned `status`, or asks to end */
+    STEPPED,     /* doStep returned `status`, asks to end or is cut short */
     UNSAVED,     /* the state before a step could not be saved */
     UNRESTORED,  /* the state before a step that was checked could not be restored */
     DRAW,        /* latencies */

@@ -10,6 +10,9 @@ def test_what_is_left_out_is_told_with_its_reason() -> None:
     assert told["link2 on post"] == (False, "out of reach: no narrow phase")
     assert told["contacts"] == (True, "2 pairs, 7 places, detected by graphics")
     assert told["virtual_environment"] == (True, "for Lambda_inv, P_c, contact geometry")
+    fewer = requirements.needs(open_scene.load("obstacles", ["contacts.polygon=[]"]))
+    (contacts,) = (n.why for n in fewer if n.part == "contacts")
+    assert contacts.startswith("1 pair, ")
     alone = {n.part: n.needed for n in requirements.needs(open_scene.load("five-bar"))}
     assert not alone["virtual_environment"]
     assert alone["loop closures"]

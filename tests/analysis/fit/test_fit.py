@@ -166,3 +166,9 @@ def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> N
         hl.fit(path)
     with pytest.raises(hl.InputFault, match="'crank' cannot be fitted; rotor_inertia"):
         hl.fit(csv(log, path), device=["crank"])
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, "no\0name", "/dev/zero", "missing.csv"])
+def test_a_log_is_a_file(name: str) -> None:
+    with pytest.raises(hl.InputFault, match="cannot be read as a log: it is no file"):
+        hl.fit(name)

@@ -135,8 +135,10 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
 def test_what_cannot_be_held_is_refused() -> None:
     with pytest.raises(hl.InputFault, match="--equilibrium"):
         hl.stability("closed-loop", {"graphics.rate": {"min": 20, "max": 60, "seed": 1}})
-    with pytest.raises(hl.InputFault, match="poses = 0: give 1 or more"):
+    with pytest.raises(hl.InputFault, match="poses = 0: give a whole number >= 1"):
         hl.stability("closed-loop", poses=0)
+    with pytest.raises(hl.InputFault, match=r"bounds = 0\.2: give Bounds"):
+        hl.equilibrium_stability("closed-loop", bounds=0.2)  # type: ignore[arg-type]
 
 
 def test_rates_that_hardly_repeat_are_judged_with_frames_of_whole_periods() -> None:

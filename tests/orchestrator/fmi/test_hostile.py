@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hapticlink as hl
@@ -15,6 +17,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
 from tests.orchestrator.foreign_fmus import ISOLATED, RUN
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
+from tests.orchestrator.hostile_slave import hostile_slave
 
 pytest.importorskip("resource")  # the FMU needs POSIX
 
@@ -130,6 +133,39 @@ def test_another_rounding_mode_is_restored_and_told(
     assert f"{name} changed how this process rounds numbers" in caplog.text
     assert 1.0 + 2.0**-53 == 1.0  # of this process, too
     assert 2.0**-1074 > 0.0
+
+
+def test_a_step_that_is_cut_short_unasked_is_no_whole_one(tmp_path: Path, loop: str) -> None:
+    """Early return is not allowed to it (FMI 3.0, section 4.2.1)."""
+    hostile_fmu(tmp_path, "3")
+    outcome = simulate(hostile_scene(tmp_path, "step_early_20"), tmp_path / "out").outcome
+    assert "fmi3DoStep returned early, at 0.304688 s, unasked" in str(outcome.fault)
+    assert outcome.end_time == 19 / 64
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+@pytest.mark.parametrize(
+    ("act", "end"),
+    [("finish", 20 / 64), ("beyond", 20 / 64), ("middle", 19 / 64), ("never", 19 / 64)],
+)
+def test_a_request_to_end_ends_the_run_at_the_last_whole_step(
+    tmp_path: Path, loop: str, fmi: str, act: str, end: float
+) -> None:
+    """`never` asks for an end at NaN."""
+    hostile_fmu(tmp_path, fmi)
+    outcome = simulate(hostile_scene(tmp_path, f"step_{act}_20"), tmp_path / "out").outcome
+    assert (outcome.reason, outcome.end_time) == ("terminated", end)
+
+
+def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path: Path) -> None:
+    streams, limit, errors = (sys.stdout, sys.stderr), sys.getrecursionlimit(), np.geterr()
+    hostile_fmu(tmp_path)
+    file = hostile_slave(tmp_path, "2").name
+    for act in ("streams", "recursion", "seterr"):
+        scene = hostile_scene(tmp_path, f"step_{act}_20", fmu=file)
+        assert simulate(scene, tmp_path / "out").outcome.reason == "duration"
+        assert (sys.stdout, sys.stderr) == streams
+        assert (sys.getrecursionlimit(), np.geterr()) == (limit, errors)
 
 
 @pytest.mark.parametrize("loop", ["compiled", "python"])

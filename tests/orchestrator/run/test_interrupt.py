@@ -196,3 +196,21 @@ def alive(pid: int) -> bool:
         return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[:1]
     except OSError:
         return False
+
+
+def test_a_second_signal_leaves_no_unfinished_file(tmp_path: Path) -> None:
+    text = f"""
+import signal
+from pathlib import Path
+from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base import interrupt
+with interrupt.held(interrupt.end_process):
+    with atomic_file(Path({str(tmp_path)!r}) / "whole.txt") as unfinished:
+        unfinished.write_text("half")
+        assert unfinished.exists()
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+"""
+    ended = subprocess.run([sys.executable, "-c", text], capture_output=True, check=False)
+    assert ended.stderr == b"hapticlink: interrupted twice: ended at once\n"
+    assert not [*tmp_path.iterdir()]

@@ -87,7 +87,12 @@ def test_all_faults_at_once_with_line_and_remedy() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "key", "message"),
     [
-        ('body = "bar", at', 'body = "rod", at', "linkage.operational_point.body", "no body 'rod'"),
+        (
+            'body = "bar", at',
+            'body = "rod", at',
+            "linkage.operational_point.body",
+            "no body 'rod'; there are bar",
+        ),
         ("start.pivot", "start.pvot", "linkage.start.pvot", "did you mean 'pivot'"),
         ("mass = 1.0", "mass = -1.0", "linkage.body[0] (bar).mass", ">= 0 (kg)"),
         ("mass = 1.0", "mass = inf", "linkage.body[0] (bar).mass", "finite"),
