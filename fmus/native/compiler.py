@@ -11,7 +11,7 @@ import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
@@ -33,6 +33,7 @@ TARGETS = {
 an ARM machine with Linux, where importers use the same folder; darwin64 contains both."""
 PLATFORMS = tuple(TARGETS)
 SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
+_SYSTEM = {"linux64": "linux", "win64": "windows", "darwin64": "darwin"}
 # No contraction: a fused multiply-add rounds once where CasADi's virtual machine rounds twice. No
 # vectorisation: its time grows with the square of the length of straight-line code, and it did not
 # make the code faster.
@@ -86,8 +87,37 @@ def compile_library(
         source = [*source]
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         slices = [_compiled(source, Path(folder), target, options) for target in targets]
-        library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))
+        library.write_bytes(_joined(slices))
     return library
+
+
+def binaries(
+    source: Sequence[Path],
+    name: str,
+    folder: Path,
+    platforms: Sequence[str],
+    options: Sequence[str],
+    fmi: int,
+) -> Iterator[tuple[str, bytes]]:
+    """Entries of an FMU with the shared library `name` for each of the platforms, compiled side by
+    side in `folder`: one for a platform of FMI 2.0, for each kind of processor of FMI 3.0 (section
+    2.5.1.4). Raises as `compile_library`."""  # fmt: skip
+    targets = [target for platform in platforms for target in TARGETS[platform]]
+    with ThreadPoolExecutor(len(targets)) as pool:
+        compiled = pool.map(lambda target: _compiled(source, folder, target, options), targets)
+        made = dict(zip(targets, compiled, strict=True))
+    for platform in platforms:
+        slices = {target: made[target] for target in TARGETS[platform]}
+        file = f"{name}{SUFFIX[platform]}"
+        if fmi == 2:
+            yield f"binaries/{platform}/{file}", _joined(slices.values())
+            continue
+        for target, library in slices.items():
+            yield f"binaries/{target.partition('-')[0]}-{_SYSTEM[platform]}/{file}", library
+
+
+def _joined(slices: Collection[bytes]) -> bytes:
+    return universal(slices) if len(slices) > 1 else next(iter(slices))
 
 
 def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[str] = ()) -> bytes:
