@@ -13,13 +13,14 @@ import sys
 import tempfile
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import fmpy
 
 from hapticlink.fmus.errors import CompilerError, FmuError
-from hapticlink.fmus.native.compiler_cache import compiler_cache
+from hapticlink.fmus.native.compiler_cache import CHOICE, linker_cache
 from hapticlink.fmus.versions import install_command, version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
@@ -135,19 +136,15 @@ def _compiled(
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     if target == WEBASSEMBLY:
         link = ["-mexec-model=reactor", "-s"]
+    jobs = {}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for file in [Path(source)] if isinstance(source, (Path, str)) else source:
+            command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
+            jobs[f"{file.stem}.o"] = pool.submit(_zig, command, own_folder, target)
+    for job in jobs.values():
+        job.result()
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
-    if isinstance(source, (Path, str)):
-        inputs = [str(Path(source).resolve())]
-    else:
-        jobs = {}
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            for file in source:
-                command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
-                jobs[f"{file.stem}.o"] = pool.submit(_zig, command, own_folder, target)
-        for job in jobs.values():
-            job.result()
-        inputs = [*jobs]
-    _zig([*link, *options, "-o", "library", *inputs], own_folder, target)
+    _zig([*link, *options, "-o", "library", *jobs], own_folder, target)
     return (own_folder / "library").read_bytes()
 
 
@@ -155,12 +152,14 @@ def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
     flags = WEBASSEMBLY_FLAGS if target == WEBASSEMBLY else FLAGS
     command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags]
     command += [f"-I{_HEADERS}", *arguments]
-    with tempfile.TemporaryDirectory(dir=folder) as local, compiler_cache() as own:
+    with tempfile.TemporaryDirectory(dir=folder) as local:
         # zig keeps its own C library in its cache, but not our code.
-        environment = {**os.environ, **own, "ZIG_LOCAL_CACHE_DIR": local}
-        done = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
-        )
+        compiles = nullcontext({CHOICE: local}) if "-c" in command else linker_cache(target)
+        with compiles as cache:
+            environment = {**os.environ, **cache, "ZIG_LOCAL_CACHE_DIR": local}
+            done = subprocess.run(
+                command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+            )
     if done.returncode:
         name = Path(command[-1]).name
         raise CompilerError(f"{name} does not compile for {target}:\n{done.stderr.strip()}")
