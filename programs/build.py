@@ -7,19 +7,21 @@ import shutil
 import tempfile
 import uuid
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Component
 from hapticlink.fmus import cache
-from hapticlink.fmus.archive import digest, icon, write
+from hapticlink.fmus.archive import digest, write
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler import (
     FLAGS,
     PLATFORMS,
+    PLATFORMS_3,
     binaries,
     compiler_version,
     host_platform,
@@ -30,10 +32,8 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
-from hapticlink.programs import description_fmi3
-from hapticlink.programs.description import documentation, model_description
-from hapticlink.programs.description_fmi3 import build_description, terminals
-from hapticlink.programs.ports import arrays, ports
+from hapticlink.programs import description, description_fmi3
+from hapticlink.programs.ports import ports
 from hapticlink.programs.resolved import Resolved, resolved
 from hapticlink.programs.sources import fmi3_sources, sources
 
@@ -66,13 +66,14 @@ def build_program(
     with temporary_folders.room() as room:
         try:
             compiler_version()
-            platforms = PLATFORMS if all_platforms else (host_platform(),)
+            every = PLATFORMS if fmi == 2 else PLATFORMS_3
+            platforms = every if all_platforms else (host_platform(fmi),)
             files = program_files(scene, identifier, without, fmi)
             material = {"block": identifier, "program": digest(files), "platforms": platforms,
                         "compiler": [compiler_version(), *FLAGS]}  # fmt: skip
 
             def make(folder: Path) -> Path:
-                return _built(files, identifier, platforms, folder, fmi)
+                return _built(files, identifier, platforms, folder)
 
             path = cache.cached(material, make, room, interrupt.check)
         except CompilerError as error:
@@ -103,37 +104,15 @@ def program_files(
         texts = sources(program, blocks_of_members, variables)
         haptic = program.system.timeline.clocks[0]
         step_size = program.system.timeline.seconds(haptic.longest)
-    page = documentation(scene, variables)
-    entries = [*arrays(variables)]
     if fmi == 3:
-        texts |= fmi3_sources(entries)
-    content = {name: text.encode() for name, text in texts.items()}
-    compiled = [name for name in texts if name.endswith(".c")]
-
-    def described(guid: str) -> bytes:
-        if fmi == 3:
-            return description_fmi3.model_description(
-                scene, identifier, entries, token=guid, step_size=step_size
-            )
-        return model_description(
-            scene, identifier, variables, guid=guid, step_size=step_size, files=compiled
-        )
-
-    whole = digest({**content, "xml": described(""), "page": page})
-    guid = f"{{{uuid.UUID(whole[:32])}}}"
-    content["scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["scene.h"]
-    if fmi == 3:
-        content["buildDescription.xml"] = build_description(identifier, compiled)
-        about = {"icon.png": icon("continuous"), "terminalsAndIcons.xml": terminals(entries)}
-        more = {f"terminalsAndIcons/{name}": text for name, text in about.items()}
-    else:
-        more = {"model.png": icon("continuous")}
-    return {
-        "modelDescription.xml": described(guid),
-        "documentation/index.html": page,
-        **more,
-        **{f"sources/{name}": text for name, text in content.items()},
-    }
+        texts |= fmi3_sources(variables)
+    compiled = sorted(name for name in texts if name.endswith(".c"))
+    described = description_fmi3.described if fmi == 3 else description.described
+    about = partial(described, scene, identifier, variables, step_size=step_size, files=compiled)
+    content = {f"sources/{name}": text.encode() for name, text in texts.items()}
+    guid = f"{{{uuid.UUID(digest({**content, **about(guid='')})[:32])}}}"
+    content["sources/scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["sources/scene.h"]
+    return content | about(guid=guid)
 
 
 def components(program: Resolved) -> dict[str, Component]:
@@ -150,7 +129,7 @@ def components(program: Resolved) -> dict[str, Component]:
 
 
 def _built(
-    files: Mapping[str, bytes], identifier: str, platforms: Sequence[str], folder: Path, fmi: int
+    files: Mapping[str, bytes], identifier: str, platforms: Sequence[str], folder: Path
 ) -> Path:
     """The FMU with a binary for each platform, written once FMPy finds nothing wrong with it."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
@@ -159,7 +138,7 @@ def _built(
             if entry.startswith("sources/"):
                 (room / Path(entry).name).write_bytes(files[entry])
         texts = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
-        entries |= binaries(texts, identifier, room, platforms, OPTIONS, fmi)
+        entries |= binaries(texts, identifier, room, platforms, OPTIONS)
     target = folder / f"{identifier}.fmu"
     with atomic_file(target) as unfinished:
         with unfinished.open("xb") as file:

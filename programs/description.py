@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from xml.etree import ElementTree as ET
 
+from hapticlink.fmus.archive import icon
 from hapticlink.fmus.documentation import STYLE
 from hapticlink.fmus.model_description import CAPABILITIES, LOG_CATEGORIES
 from hapticlink.fmus.units import base_unit
@@ -13,6 +14,7 @@ from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.ports import Port
 
+PAGE = "documentation/index.html"
 CAUSALITY = {
     "INPUT": "input",
     "OUTSIDE": "input",
@@ -23,7 +25,7 @@ CAUSALITY = {
 }
 
 
-def model_description(
+def described(
     scene: Scene,
     identifier: str,
     ports: Sequence[Port],
@@ -31,20 +33,24 @@ def model_description(
     guid: str,
     step_size: float,
     files: Iterable[str],
-) -> bytes:
-    """The XML text, the same for the same arguments. step_size (s): of the default experiment.
-    files: the C files of the program, in sources/."""
+) -> dict[str, bytes]:
+    """The files that describe the program, the same for the same arguments. step_size (s): of the
+    default experiment. files: the C files of the program, in sources/."""
     told = of_model(scene, identifier)
     root = ET.Element("fmiModelDescription", told, fmiVersion="2.0", guid=guid)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
     simulation = ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
     listed = ET.SubElement(simulation, "SourceFiles")
-    for name in sorted(files):
+    for name in files:
         ET.SubElement(listed, "File", name=name)
     definitions(root, scene, {port.unit for port in ports}, step_size)
     _variables(root, ports)
     _structure(root, ports)
-    return as_text(root)
+    return {
+        "modelDescription.xml": as_text(root),
+        "model.png": icon("continuous"),
+        PAGE: documentation(scene, ports),
+    }
 
 
 def of_model(scene: Scene, identifier: str) -> dict[str, str]:

@@ -10,9 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree as ET
 
+from hapticlink.fmus.archive import icon
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.programs.description import about, as_text, definitions, of_model
-from hapticlink.programs.ports import Array
+from hapticlink.programs.description import (
+    PAGE,
+    about,
+    as_text,
+    definitions,
+    documentation,
+    of_model,
+)
+from hapticlink.programs.ports import Array, Port, arrays
 
 CAPABILITIES = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
@@ -23,15 +31,30 @@ CAPABILITIES = {
 TIME = "time"
 
 
-def model_description(
+def described(
     scene: Scene,
     identifier: str,
-    arrays: Sequence[Array],
+    ports: Sequence[Port],
     *,
-    token: str,
+    guid: str,
     step_size: float,
+    files: Iterable[str],
+) -> dict[str, bytes]:
+    """As `description.described`. guid: the instantiation token."""
+    variables = [*arrays(ports)]
+    text = _model_description(scene, identifier, variables, token=guid, step_size=step_size)
+    return {
+        "modelDescription.xml": text,
+        "terminalsAndIcons/terminalsAndIcons.xml": _terminals(variables),
+        "terminalsAndIcons/icon.png": icon("continuous"),
+        "sources/buildDescription.xml": _build_description(identifier, files),
+        PAGE: documentation(scene, ports),
+    }
+
+
+def _model_description(
+    scene: Scene, identifier: str, arrays: Sequence[Array], *, token: str, step_size: float
 ) -> bytes:
-    """The XML text. token: the instantiation token. step_size (s): of the default experiment."""
     told = of_model(scene, identifier)
     root = ET.Element("fmiModelDescription", told, fmiVersion="3.0", instantiationToken=token)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
@@ -78,7 +101,7 @@ def _variable(variables: ET.Element, array: Array, holder: dict[str, Array]) -> 
         ET.SubElement(element, "Dimension", start=str(size))
 
 
-def terminals(arrays: Iterable[Array]) -> bytes:
+def _terminals(arrays: Iterable[Array]) -> bytes:
     """terminalsAndIcons.xml: a terminal for each block, with its inputs and outputs, and the extent
     of the icon."""
     root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
@@ -100,13 +123,12 @@ def terminals(arrays: Iterable[Array]) -> bytes:
     return as_text(root)
 
 
-def build_description(identifier: str, files: Iterable[str]) -> bytes:
-    """sources/buildDescription.xml. files: the C files."""
+def _build_description(identifier: str, files: Iterable[str]) -> bytes:
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     # A fused multiply-add rounds once, and would change the results.
     options = {"language": "C11", "compilerOptions": "-ffp-contract=off"}
     listed = ET.SubElement(configuration, "SourceFileSet", options)
-    for name in sorted(files):
+    for name in files:
         ET.SubElement(listed, "SourceFile", name=name)
     return as_text(root)

@@ -11,7 +11,7 @@ import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from importlib.metadata import PackageNotFoundError
@@ -26,15 +26,22 @@ from hapticlink.fmus.versions import install_command, version
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
 TARGETS = {
     # A version old enough for the systems in use.
-    "linux64": ("aarch64-linux-gnu.2.17" if _ARM_LINUX else "x86_64-linux-gnu.2.17",),
-    "win64": ("x86_64-windows-gnu",),
-    "darwin64": ("x86_64-macos.11.0", "aarch64-macos.11.0"),
+    "x86_64-linux": ("x86_64-linux-gnu.2.17",),
+    "aarch64-linux": ("aarch64-linux-gnu.2.17",),
+    "x86_64-windows": ("x86_64-windows-gnu",),
+    "x86_64-darwin": ("x86_64-macos.11.0",),
+    "aarch64-darwin": ("aarch64-macos.11.0",),
 }
-"""The compiler's targets for each platform of FMI 2.0 (section 2.3). linux64 is x86-64, or ARM64 on
-an ARM machine with Linux, where importers use the same folder; darwin64 contains both."""
-PLATFORMS = tuple(TARGETS)
-SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
-_SYSTEM = {"linux64": "linux", "win64": "windows", "darwin64": "darwin"}
+"""The compiler's targets for each platform of FMI 3.0 (section 2.5.1.4), and of FMI 2.0 (section
+2.3): linux64 is x86-64, or ARM64 on an ARM machine with Linux, where importers use the same folder;
+darwin64 contains both."""
+PLATFORMS_3 = tuple(TARGETS)
+TARGETS |= {
+    "linux64": TARGETS["aarch64-linux" if _ARM_LINUX else "x86_64-linux"],
+    "win64": TARGETS["x86_64-windows"],
+    "darwin64": TARGETS["x86_64-darwin"] + TARGETS["aarch64-darwin"],
+}
+PLATFORMS = ("linux64", "win64", "darwin64")
 # No contraction: a fused multiply-add rounds once where CasADi's virtual machine rounds twice. No
 # vectorisation: its time grows with the square of the length of straight-line code, and it did not
 # make the code faster.
@@ -46,12 +53,19 @@ WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hid
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def host_platform() -> str:
-    """The platform of FMI 2.0 that this process can load. Raises FmuError if native FMUs cannot be
-    built for it."""
-    if fmpy.platform not in TARGETS:
-        raise FmuError(f"native FMUs are made for {', '.join(TARGETS)}; this is {fmpy.platform}")
-    return fmpy.platform
+def host_platform(fmi: int = 2) -> str:
+    """The platform, as FMI 2.0 or 3.0 calls it, that this process can load. Raises FmuError if
+    native FMUs cannot be built for it."""
+    mine, known = (fmpy.platform, PLATFORMS) if fmi == 2 else (fmpy.platform_tuple, PLATFORMS_3)
+    if mine not in known:
+        raise FmuError(f"native FMUs are made for {', '.join(known)}; this is {mine}")
+    return mine
+
+
+def entry(platform: str, name: str) -> str:
+    """The path in an FMU of its library `name` for a platform."""
+    suffix = ".so" if "linux" in platform else ".dylib" if "darwin" in platform else ".dll"
+    return f"binaries/{platform}/{name}{suffix}"
 
 
 def compiler_version() -> str:
@@ -98,27 +112,19 @@ def binaries(
     folder: Path,
     platforms: Sequence[str],
     options: Sequence[str],
-    fmi: int,
 ) -> Iterator[tuple[str, bytes]]:
     """Entries of an FMU with the shared library `name` for each of the platforms, compiled side by
-    side in `folder`: one for a platform of FMI 2.0, for each kind of processor of FMI 3.0 (section
-    2.5.1.4). Raises as `compile_library`."""  # fmt: skip
+    side in `folder`. Raises as `compile_library`."""
     targets = [target for platform in platforms for target in TARGETS[platform]]
     with ThreadPoolExecutor(len(targets)) as pool:
         compiled = pool.map(lambda target: _compiled(source, folder, target, options), targets)
         made = dict(zip(targets, compiled, strict=True))
     for platform in platforms:
-        slices = {target: made[target] for target in TARGETS[platform]}
-        file = f"{name}{SUFFIX[platform]}"
-        if fmi == 2:
-            yield f"binaries/{platform}/{file}", _joined(slices.values())
-            continue
-        for target, library in slices.items():
-            yield f"binaries/{target.partition('-')[0]}-{_SYSTEM[platform]}/{file}", library
+        yield entry(platform, name), _joined([made[target] for target in TARGETS[platform]])
 
 
-def _joined(slices: Collection[bytes]) -> bytes:
-    return universal(slices) if len(slices) > 1 else next(iter(slices))
+def _joined(slices: Sequence[bytes]) -> bytes:
+    return universal(slices) if len(slices) > 1 else slices[0]
 
 
 def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[str] = ()) -> bytes:

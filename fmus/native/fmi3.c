@@ -1,9 +1,9 @@
-/* The FMI 3.0.2 co-simulation interface of a program, over its functions of FMI 2.0 (program.c), whose
- * order of calls, checks and messages it has.
+/* The FMI 3.0.2 co-simulation interface of an FMU over its functions of FMI 2.0, whose order of calls, checks
+ * and messages it has.
  *
- * An array is the scalars of FMI 2.0 from its value reference on, which count row by row. fmi3_rest.h,
- * generated, has the sizes of the variables, and those functions of the standard that need event mode,
- * clocks, other types or another interface: they fail. */
+ * An array is the scalars of FMI 2.0 from its value reference on, row by row; time follows the last.
+ * fmi3_rest.h, generated, has the sizes of the variables, and those functions of the standard that need
+ * event mode, clocks, other types or another kind of FMU: they fail. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,15 +25,15 @@ static void say(const Instance *i, fmi3Status status, const char *category, cons
     if (i->log && (i->logging || status >= fmi3Error)) i->log(i->environment, status, category, text);
 }
 
-/* Messages of the program, formats without arguments (FMI 2.0.5 section 2.1.5), in which the function
- * that was called has its name of FMI 3.0. */
+/* Messages of those functions: formats without arguments (FMI 2.0.5 section 2.1.5), which begin
+ * with the name of the one that was called. */
 static void pass_on(fmi2ComponentEnvironment own, fmi2String name, fmi2Status status, fmi2String category,
                     fmi2String message, ...) {
     const Instance *i = own;
-    char text[2200];
-    const int of_call = !strncmp(message, "fmi2", 4);
-    const int used = snprintf(text, sizeof text, "%s", of_call ? i->call : "");
-    snprintf(text + used, sizeof text - used, message + (of_call ? strcspn(message, " ") : 0));
+    char plain[2200], text[2300];
+    snprintf(plain, sizeof plain, message);
+    if (strncmp(plain, "fmi2", 4)) snprintf(text, sizeof text, "%s", plain);
+    else snprintf(text, sizeof text, "%s%s", i->call, plain + strcspn(plain, " "));
     say(i, (fmi3Status)status, category, text);
 }
 
@@ -58,11 +58,6 @@ static fmi3Status refuse(const Instance *i, const char *format, ...) {
 static fmi3Status lacks(fmi3Instance instance, const char *call) {
     return refuse(instance, "%s: this FMU is for co-simulation without event mode, and its variables are "
                   "Float64 of fixed sizes", call);
-}
-
-static fmi3Instance unfit(fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, const char *call) {
-    lacks(&(Instance){.environment = environment, .log = log}, call);
-    return NULL;
 }
 
 #include "fmi3_rest.h"
@@ -170,7 +165,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], 
 
 /* --- stepping -------------------------------------------------------------------------------- */
 
-/* A step in which the scene's condition to stop holds ends there, and the FMU asks to terminate. */
+/* An FMU that ends the simulation within a step, which is a discarded one in FMI 2.0, asks to terminate. */
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 start, fmi3Float64 size, fmi3Boolean no_way_back,
                       fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
     fmi2Component c = program(instance, __func__);
