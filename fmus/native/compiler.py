@@ -24,7 +24,7 @@ from hapticlink.fmus.native.compiler_cache import CHOICE, linker_cache
 from hapticlink.fmus.versions import install_command, version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
-TARGETS = {
+TARGETS: dict[str, tuple[str, ...]] = {
     # A version old enough for the systems in use.
     "x86_64-linux": ("x86_64-linux-gnu.2.17",),
     "aarch64-linux": ("aarch64-linux-gnu.2.17",),

@@ -221,6 +221,17 @@ def test_pieces_of_long_functions_give_the_same_bits(both, name, tmp_path, monke
     np.testing.assert_array_equal(driven(split), driven(both[name][0]))
 
 
+def test_libraries_for_fmi3_are_in_a_folder_for_each_processor(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiler, "_compiled", lambda *given: given[2])
+    assert dict(compiler.binaries([], "one", tmp_path, compiler.PLATFORMS_3, ())) == {
+        "binaries/x86_64-linux/one.so": "x86_64-linux-gnu.2.17",
+        "binaries/aarch64-linux/one.so": "aarch64-linux-gnu.2.17",
+        "binaries/x86_64-windows/one.dll": "x86_64-windows-gnu",
+        "binaries/x86_64-darwin/one.dylib": "x86_64-macos.11.0",
+        "binaries/aarch64-darwin/one.dylib": "aarch64-macos.11.0",
+    }
+
+
 def test_one_linker_at_a_time_uses_the_cache_of_its_target(tmp_path, monkeypatch):
     """Another target is linked beside it; a second one for the same target waits."""
     monkeypatch.delenv("ZIG_GLOBAL_CACHE_DIR", raising=False)

@@ -230,14 +230,18 @@ def test_a_condition_to_stop_asks_to_terminate(tmp_path: Path) -> None:
 
 
 def test_hapticlink_runs_it(tmp_path: Path) -> None:
-    """Beside the blocks of the same scene, at its rate."""
-    path = program("pendulum", (SECOND,), fmi=3)
-    experiment = run("pendulum", (SECOND, f'fmu.+={{name="copy", path="{path}"}}'), tmp_path)
-    rows = experiment.results.haptics
-    columns = [c for c in rows.columns if c.startswith("virtual_mechanism.")]
-    assert len(columns) > 9
+    """Beside the blocks of the same scene, with the force of their hand: the same rows, of sampled
+    blocks one later."""
+    path = program("closed-loop", (SECOND,), "hand", fmi=3)
+    copy = f'fmu.+={{name="copy", path="{path}"}}'
+    wire = 'connection.+={from="hand.F", to="copy.hand.F"}'
+    rows = run("closed-loop", (SECOND, copy, wire), tmp_path).results.haptics
+    columns = [c for c in rows.columns if f"copy.{c}" in rows.columns]
+    assert {c.partition(".")[0] for c in columns} >= {"haptic_device", "virtual_mechanism"}
     for column in columns:
-        np.testing.assert_array_equal(rows[f"copy.{column}"], rows[column])
+        late = int(column.startswith("controller."))
+        rest = len(rows[column]) - late
+        np.testing.assert_array_equal(rows[f"copy.{column}"][late:], rows[column][:rest])
 
 
 def test_terminals_and_description_of_the_build_fit_the_standard() -> None:
