@@ -33,6 +33,7 @@ def build(
     all_platforms: bool = False,
     as_one: bool = False,
     without: str | None = None,
+    fmi: int = 2,
 ) -> dict[str, Path]:
     """Build the FMUs of a scene, changed by `options`, in the folder `out`: `<block>.fmu` for each
     block. Returns the paths by block.
@@ -42,7 +43,8 @@ def build(
 
     `all_platforms` compiles native FMUs for Linux, Windows and macOS instead of this machine only.
     `as_one` builds one native FMU that holds all blocks with their rates and holds, by the name of
-    the scene's file; without: a block that it leaves out, whose outputs become its inputs.
+    the scene's file; without: a block that it leaves out, whose outputs become its inputs; fmi: 2
+    or 3, the version of the standard.
 
     Raises InputFault if the scene is invalid, has nothing to build, cannot become one FMU, or `out`
     cannot be written to; Fault if the compiler fails.
@@ -52,10 +54,14 @@ def build(
         from hapticlink.programs.build import build_program  # loads casadi
 
         name = scene if isinstance(scene, str | Path) else read.title
-        path = build_program(read, name, out=out, without=without, all_platforms=all_platforms)
+        path = build_program(
+            read, name, out=out, without=without, all_platforms=all_platforms, fmi=fmi
+        )
         return {path.stem: path}
     if without:
         raise InputFault("--without leaves a block out of one FMU: add --as-one")
+    if fmi != 2:
+        raise InputFault("FMUs of single blocks are of FMI 2.0; --fmi is for one FMU: add --as-one")
     if all_platforms and read.packaging != "native":
         raise InputFault("--all-platforms compiles: add --set packaging=native")
     planned = blocks(read)

@@ -22,6 +22,8 @@ Without = Annotated[
     Parameter(help="With --as-one: a block to leave out, whose outputs become inputs."),
 ]
 
+Fmi = Annotated[int, Parameter(help="With --as-one: the version of the standard, 2 or 3.")]
+
 
 def build(
     scene: Scene,
@@ -32,6 +34,7 @@ def build(
     all_platforms: AllPlatforms = False,
     as_one: AsOne = False,
     without: Without = None,
+    fmi: Fmi = 2,
 ) -> int:
     """Build the FMUs of a scene in OUT (default fmus/SCENE), one file per block, or one for all.
 
@@ -39,12 +42,19 @@ def build(
 
         hapticlink build closed-loop --set packaging=native --all-platforms
         hapticlink build closed-loop --as-one --without hand
+        hapticlink build closed-loop --as-one --fmi 3
     """
     import hapticlink as hl
 
     folder = out or default_folder("fmus", scene)
     paths = hl.build(
-        scene, set or (), out=folder, all_platforms=all_platforms, as_one=as_one, without=without
+        scene,
+        set or (),
+        out=folder,
+        all_platforms=all_platforms,
+        as_one=as_one,
+        without=without,
+        fmi=fmi,
     )
     say(*paths.values(), sep="\n")
     return 0

@@ -35,10 +35,10 @@ CAPABILITIES = {
     "canSerializeFMUstate": "true",
 }
 LOG_CATEGORIES = {
-    "logStatusWarning": "Messages with status fmi2Warning.",
-    "logStatusDiscard": "Messages with status fmi2Discard.",
-    "logStatusError": "Messages with status fmi2Error.",
-    "logStatusFatal": "Messages with status fmi2Fatal.",
+    "logStatusWarning": "Messages with status warning.",
+    "logStatusDiscard": "Messages with status discard.",
+    "logStatusError": "Messages with status error.",
+    "logStatusFatal": "Messages with status fatal.",
     "logAll": "All messages.",
 }
 

@@ -7,22 +7,22 @@ import shutil
 import tempfile
 import uuid
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Component
 from hapticlink.fmus import cache
-from hapticlink.fmus.archive import digest, icon, write
+from hapticlink.fmus.archive import digest, write
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler import (
     FLAGS,
     PLATFORMS,
-    SUFFIX,
-    compile_library,
+    PLATFORMS_3,
+    binaries,
     compiler_version,
     host_platform,
 )
@@ -32,10 +32,10 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
-from hapticlink.programs.description import documentation, model_description
+from hapticlink.programs import description, description_fmi3
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolved import Resolved, resolved
-from hapticlink.programs.sources import sources
+from hapticlink.programs.sources import fmi3_sources, sources
 
 OPTIONS = ("-DEXPORT=",)
 """The functions of the loop are not exported."""
@@ -48,6 +48,7 @@ def build_program(
     out: str | Path,
     without: str | None = None,
     all_platforms: bool = False,
+    fmi: int = 2,
 ) -> Path:
     """Write a scene as one native FMU into the folder `out`, and return its path. It needs no
     Python, and its outputs have the bits of a run of the scene.
@@ -55,16 +56,19 @@ def build_program(
     name: of the scene or its file, by which the FMU is called.
 
     without: a block to leave out, whose outputs that others need are inputs of the FMU.
-    all_platforms: compiles for Linux, Windows and macOS instead of this machine alone. Raises
-    InputFault if the scene is invalid or cannot become a program, with what stands in the way;
-    Fault if the compiler fails.
+    all_platforms: compiles for Linux, Windows and macOS instead of this machine alone. fmi: 2 or 3,
+    the version of the standard. Raises InputFault if the scene is invalid or cannot become a
+    program, with what stands in the way; Fault if the compiler fails.
     """
+    if fmi not in (2, 3):
+        raise InputFault(f"--fmi: {fmi!r} is not 2 or 3")
     identifier = _identifier(name)
     with temporary_folders.room() as room:
         try:
             compiler_version()
-            platforms = PLATFORMS if all_platforms else (host_platform(),)
-            files = program_files(scene, identifier, without)
+            every = PLATFORMS if fmi == 2 else PLATFORMS_3
+            platforms = every if all_platforms else (host_platform(fmi),)
+            files = program_files(scene, identifier, without, fmi)
             material = {"block": identifier, "program": digest(files), "platforms": platforms,
                         "compiler": [compiler_version(), *FLAGS]}  # fmt: skip
 
@@ -90,7 +94,9 @@ def _identifier(name: str | Path) -> str:
     return plain if plain.isidentifier() else f"scene_{plain}"
 
 
-def program_files(scene: Scene, identifier: str, without: str | None = None) -> dict[str, bytes]:
+def program_files(
+    scene: Scene, identifier: str, without: str | None = None, fmi: int = 2
+) -> dict[str, bytes]:
     """All files of the FMU but its binaries. Raises InputFault as `build_program`."""
     with resolved(scene, without) as program:
         blocks_of_members = components(program)
@@ -98,24 +104,15 @@ def program_files(scene: Scene, identifier: str, without: str | None = None) -> 
         texts = sources(program, blocks_of_members, variables)
         haptic = program.system.timeline.clocks[0]
         step_size = program.system.timeline.seconds(haptic.longest)
-    page = documentation(scene, variables)
-    content = {name: text.encode() for name, text in texts.items()}
-
-    def described(guid: str) -> bytes:
-        return model_description(
-            scene, identifier, variables, guid=guid, step_size=step_size,
-            files=(name for name in texts if name.endswith(".c")),
-        )  # fmt: skip
-
-    whole = digest({**content, "xml": described(""), "page": page})
-    guid = f"{{{uuid.UUID(whole[:32])}}}"
-    content["scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["scene.h"]
-    return {
-        "modelDescription.xml": described(guid),
-        "documentation/index.html": page,
-        "model.png": icon("continuous"),
-        **{f"sources/{name}": text for name, text in content.items()},
-    }
+    if fmi == 3:
+        texts |= fmi3_sources(variables)
+    compiled = sorted(name for name in texts if name.endswith(".c"))
+    described = description_fmi3.described if fmi == 3 else description.described
+    about = partial(described, scene, identifier, variables, step_size=step_size, files=compiled)
+    content = {f"sources/{name}": text.encode() for name, text in texts.items()}
+    guid = f"{{{uuid.UUID(digest({**content, **about(guid='')})[:32])}}}"
+    content["sources/scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["sources/scene.h"]
+    return content | about(guid=guid)
 
 
 def components(program: Resolved) -> dict[str, Component]:
@@ -141,14 +138,7 @@ def _built(
             if entry.startswith("sources/"):
                 (room / Path(entry).name).write_bytes(files[entry])
         texts = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
-
-        def compiled(platform: str) -> tuple[str, bytes]:
-            library = compile_library(texts, room / f"library-{platform}", platform, OPTIONS)
-            return platform, library.read_bytes()
-
-        with ThreadPoolExecutor(len(platforms)) as pool:
-            for platform, library in pool.map(compiled, platforms):
-                entries[f"binaries/{platform}/{identifier}{SUFFIX[platform]}"] = library
+        entries |= binaries(texts, identifier, room, platforms, OPTIONS)
     target = folder / f"{identifier}.fmu"
     with atomic_file(target) as unfinished:
         with unfinished.open("xb") as file:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from xml.etree import ElementTree as ET
 
+from hapticlink.fmus.archive import icon
 from hapticlink.fmus.documentation import STYLE
 from hapticlink.fmus.model_description import CAPABILITIES, LOG_CATEGORIES
 from hapticlink.fmus.units import base_unit
@@ -13,6 +14,7 @@ from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.ports import Port
 
+PAGE = "documentation/index.html"
 CAUSALITY = {
     "INPUT": "input",
     "OUTSIDE": "input",
@@ -23,7 +25,7 @@ CAUSALITY = {
 }
 
 
-def model_description(
+def described(
     scene: Scene,
     identifier: str,
     ports: Sequence[Port],
@@ -31,55 +33,75 @@ def model_description(
     guid: str,
     step_size: float,
     files: Iterable[str],
-) -> bytes:
-    """The XML text, the same for the same arguments. step_size (s): of the default experiment.
-    files: the C files of the program, in sources/."""
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=identifier,
-        guid=guid,
-        description=scene.title,
-        version=version("hapticlink"),
-        license="MIT",
-        generationTool=f"hapticlink {version('hapticlink')}",
-        variableNamingConvention="structured",
-    )
+) -> dict[str, bytes]:
+    """The files that describe the program, the same for the same arguments. step_size (s): of the
+    default experiment. files: the C files of the program, in sources/."""
+    told = of_model(scene, identifier)
+    root = ET.Element("fmiModelDescription", told, fmiVersion="2.0", guid=guid)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
     simulation = ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
     listed = ET.SubElement(simulation, "SourceFiles")
-    for name in sorted(files):
+    for name in files:
         ET.SubElement(listed, "File", name=name)
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    for unit in sorted({port.unit for port in ports}):
+    definitions(root, scene, {port.unit for port in ports}, step_size)
+    _variables(root, ports)
+    _structure(root, ports)
+    return {
+        "modelDescription.xml": as_text(root),
+        "model.png": icon("continuous"),
+        PAGE: documentation(scene, ports),
+    }
+
+
+def of_model(scene: Scene, identifier: str) -> dict[str, str]:
+    """The attributes of the program in modelDescription.xml."""
+    return {
+        "modelName": identifier,
+        "description": scene.title,
+        "version": version("hapticlink"),
+        "license": "MIT",
+        "generationTool": f"hapticlink {version('hapticlink')}",
+        "variableNamingConvention": "structured",
+    }
+
+
+def as_text(root: ET.Element) -> bytes:
+    """The indented XML text."""
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def definitions(root: ET.Element, scene: Scene, units: Iterable[str], step_size: float) -> None:
+    """Units, categories of messages and the default experiment, as FMI 2.0 and 3.0 have them."""
+    defined = ET.SubElement(root, "UnitDefinitions")
+    for unit in sorted(units):
         exponents = {base: str(power) for base, power in base_unit(unit).items()}
-        ET.SubElement(ET.SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
+        ET.SubElement(ET.SubElement(defined, "Unit", name=unit), "BaseUnit", exponents)
     categories = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", name=name, description=text)
     times = {"startTime": 0.0, "stopTime": float(scene.duration), "stepSize": step_size}
     ET.SubElement(root, "DefaultExperiment", {name: repr(t) for name, t in times.items()})
-    _variables(root, ports)
-    _structure(root, ports)
-    ET.indent(root)
-    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def about(port: Port) -> dict[str, str]:
+    """Causality, variability and, where it has to be said, how a variable starts."""
+    told = {"causality": CAUSALITY[port.kind], "variability": "continuous"}
+    if port.kind == "PARAMETER":
+        return told | {"variability": "fixed" if port.fixed else "tunable", "initial": "exact"}
+    if port.start is None:
+        kind = "discrete" if port.sampled else "continuous"
+        return told | {"variability": kind, "initial": "calculated"}
+    return told
 
 
 def _variables(root: ET.Element, ports: Sequence[Port]) -> None:
     parent = ET.SubElement(root, "ModelVariables")
     index = {port.name: str(i + 1) for i, port in enumerate(ports)}
     for reference, port in enumerate(ports):
-        about = {"name": port.name, "valueReference": str(reference)}
-        about["description"] = port.description
-        about["causality"] = CAUSALITY[port.kind]
-        if port.kind == "PARAMETER":
-            about |= {"variability": "fixed" if port.fixed else "tunable", "initial": "exact"}
-        elif port.start is None:
-            kind = "discrete" if port.sampled else "continuous"
-            about |= {"variability": kind, "initial": "calculated"}
-        else:
-            about["variability"] = "continuous"
-        real = ET.SubElement(ET.SubElement(parent, "ScalarVariable", about), "Real", unit=port.unit)
+        name = {"name": port.name, "valueReference": str(reference)}
+        told = name | {"description": port.description} | about(port)
+        real = ET.SubElement(ET.SubElement(parent, "ScalarVariable", told), "Real", unit=port.unit)
         if port.start is not None:
             real.set("start", repr(float(port.start)))
         if port.max is not None:

@@ -5,8 +5,11 @@ Value references count [inputs | parameters | outputs | energies | step errors] 
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Literal
 
 from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component, Variable
@@ -43,6 +46,34 @@ class Port:
     """The output of the program of which it is the time derivative."""
     depends: tuple[str, ...] = field(default=())
     """The inputs of the program that an output depends on at a communication point."""
+    shape: tuple[int, ...] = ()
+    """That of the vector or matrix of which it is an entry."""
+
+
+@dataclass(frozen=True)
+class Array:
+    """A variable of FMI 3.0, whose entries are scalars of the program, row by row."""
+
+    name: str
+    shape: tuple[int, ...]
+    reference: int
+    """That of the first entry among the scalars."""
+    entries: tuple[Port, ...]
+
+
+def arrays(ports: Sequence[Port]) -> Iterator[Array]:
+    """The scalars as variables of FMI 3.0: vectors and matrices whole, but for those of which not
+    all entries are there."""
+    reference = 0
+    for (_, name), group in groupby(ports, key=lambda p: (p.kind, p.name.partition("[")[0])):
+        entries = tuple(group)
+        shape = entries[0].shape
+        if shape and math.prod(shape) == len(entries):
+            yield Array(name, shape, reference, entries)
+        else:
+            for i, port in enumerate(entries, reference):
+                yield Array(port.name, (), i, (port,))
+        reference += len(entries)
 
 
 def ports(resolved: Resolved, components: Mapping[str, Component]) -> list[Port]:
@@ -67,18 +98,22 @@ def _inputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator
         outputs = resolved.system.fmu[resolved.outside].description.outputs
         used = {s.name for c in resolved.system.out_of(resolved.outside) for s in c.outputs}
         values = resolved.simulation.signals.values[span].tolist()
+        names = {s.port: s.name for s in outputs}  # of the last entry
         for place, (scalar, start) in enumerate(zip(outputs, values, strict=True), span.start):
             if scalar.name in used:
                 name, unit = f"{resolved.outside}.{scalar.name}", scalar.unit or "1"
                 text = f"{scalar.port} of the {resolved.outside}, which is left out."
-                yield Port("OUTSIDE", name, unit, text, place=place, start=start)
+                last = names[scalar.port].removeprefix(scalar.port)
+                shape = tuple(map(int, re.findall(r"\d+", last)))
+                yield Port("OUTSIDE", name, unit, text, place=place, start=start, shape=shape)
     for member, (fmu, component) in enumerate(components.items()):
         taken = fed(resolved.system, fmu)
         for reference, (v, name, unit, start) in enumerate(scalars(component.inputs)):
             if name not in taken:
                 yield Port(
-                    "INPUT", f"{fmu}.{name}", unit, v.description, member, reference, start=start
-                )
+                    "INPUT", f"{fmu}.{name}", unit, v.description, member, reference, start=start,
+                    shape=v.shape,
+                )  # fmt: skip
 
 
 def _parameters(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
@@ -92,7 +127,7 @@ def _parameters(resolved: Resolved, components: Mapping[str, Component]) -> Iter
                 continue
             yield Port(
                 "PARAMETER", f"{fmu}.{name}", unit, v.description, member, reference,
-                start=given.get(name, start), fixed=v.variability == "fixed",
+                start=given.get(name, start), fixed=v.variability == "fixed", shape=v.shape,
             )  # fmt: skip
 
 
@@ -114,7 +149,7 @@ def _outputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterato
                 "OUTPUT", f"{fmu}.{name}", unit, v.description, member, first + i,
                 signals.scalar(fmu, name), max=v.max, sampled=sampled,
                 derivative_of=f"{fmu}.{of}" if of and f"{fmu}.{of}" in chosen else None,
-                depends=tuple(f"{fmu}.{u}" for u in depends if u not in taken),
+                depends=tuple(f"{fmu}.{u}" for u in depends if u not in taken), shape=v.shape,
             )  # fmt: skip
 
 

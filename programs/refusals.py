@@ -23,8 +23,7 @@ def of_scene(scene: Scene) -> None:
     given = [fmu for fmu in scene.fmu if fmu.path]
     reasons = [f"{fmu.name} ({fmu.path}) is an FMU that exists already" for fmu in given]
     if reasons:
-        reasons.append("only blocks of this project are compiled into a program; FMUs that contain "
-                       "their sources are not yet")  # fmt: skip
+        reasons.append("only blocks of this project are compiled into a program, no other FMUs")
     if scene.at:
         reasons.append("[[at]]: what happens at given times is done by Python")
     reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]

@@ -15,16 +15,18 @@ from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.model_description import model_description
 from hapticlink.fmus.native.compiler import (
     FLAGS,
-    SUFFIX,
     TARGETS,
     compile_library,
     compiler_version,
+    entry,
 )
 from hapticlink.fmus.native.source import component_source
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
 COMMON = Path(__file__).parent / "fmi2_common.h"
 """What it includes."""
+FMI3 = Path(__file__).parent / "fmi3.c"
+"""An interface of FMI 3.0 over that of FMI 2.0."""
 
 
 def entries(
@@ -72,8 +74,7 @@ def entries(
         for platform in platforms:
             library = compile_library(sources if pieces else main, room / "library", platform)
             sources = [main, *sorted(room.glob("piece*.c"))]
-            entry = f"binaries/{platform}/{component.name}{SUFFIX[platform]}"
-            files[entry] = library.read_bytes()
+            files[entry(platform, component.name)] = library.read_bytes()
     return files
 
 

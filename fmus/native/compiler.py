@@ -11,28 +11,37 @@ import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import fmpy
 
 from hapticlink.fmus.errors import CompilerError, FmuError
-from hapticlink.fmus.native.compiler_cache import compiler_cache
+from hapticlink.fmus.native.compiler_cache import CHOICE, linker_cache
 from hapticlink.fmus.versions import install_command, version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
-TARGETS = {
+TARGETS: dict[str, tuple[str, ...]] = {
     # A version old enough for the systems in use.
-    "linux64": ("aarch64-linux-gnu.2.17" if _ARM_LINUX else "x86_64-linux-gnu.2.17",),
-    "win64": ("x86_64-windows-gnu",),
-    "darwin64": ("x86_64-macos.11.0", "aarch64-macos.11.0"),
+    "x86_64-linux": ("x86_64-linux-gnu.2.17",),
+    "aarch64-linux": ("aarch64-linux-gnu.2.17",),
+    "x86_64-windows": ("x86_64-windows-gnu",),
+    "x86_64-darwin": ("x86_64-macos.11.0",),
+    "aarch64-darwin": ("aarch64-macos.11.0",),
 }
-"""The compiler's targets for each platform of FMI 2.0 (section 2.3). linux64 is x86-64, or ARM64 on
-an ARM machine with Linux, where importers use the same folder; darwin64 contains both."""
-PLATFORMS = tuple(TARGETS)
-SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
+"""The compiler's targets for each platform of FMI 3.0 (section 2.5.1.4), and of FMI 2.0 (section
+2.3): linux64 is x86-64, or ARM64 on an ARM machine with Linux, where importers use the same folder;
+darwin64 contains both."""
+PLATFORMS_3 = tuple(TARGETS)
+TARGETS |= {
+    "linux64": TARGETS["aarch64-linux" if _ARM_LINUX else "x86_64-linux"],
+    "win64": TARGETS["x86_64-windows"],
+    "darwin64": TARGETS["x86_64-darwin"] + TARGETS["aarch64-darwin"],
+}
+PLATFORMS = ("linux64", "win64", "darwin64")
 # No contraction: a fused multiply-add rounds once where CasADi's virtual machine rounds twice. No
 # vectorisation: its time grows with the square of the length of straight-line code, and it did not
 # make the code faster.
@@ -44,12 +53,19 @@ WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hid
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def host_platform() -> str:
-    """The platform of FMI 2.0 that this process can load. Raises FmuError if native FMUs cannot be
-    built for it."""
-    if fmpy.platform not in TARGETS:
-        raise FmuError(f"native FMUs are made for {', '.join(TARGETS)}; this is {fmpy.platform}")
-    return fmpy.platform
+def host_platform(fmi: int = 2) -> str:
+    """The platform, as FMI 2.0 or 3.0 calls it, that this process can load. Raises FmuError if
+    native FMUs cannot be built for it."""
+    mine, known = (fmpy.platform, PLATFORMS) if fmi == 2 else (fmpy.platform_tuple, PLATFORMS_3)
+    if mine not in known:
+        raise FmuError(f"native FMUs are made for {', '.join(known)}; this is {mine}")
+    return mine
+
+
+def entry(platform: str, name: str) -> str:
+    """The path in an FMU of its library `name` for a platform."""
+    suffix = ".so" if "linux" in platform else ".dylib" if "darwin" in platform else ".dll"
+    return f"binaries/{platform}/{name}{suffix}"
 
 
 def compiler_version() -> str:
@@ -86,8 +102,29 @@ def compile_library(
         source = [*source]
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         slices = [_compiled(source, Path(folder), target, options) for target in targets]
-        library.write_bytes(slices[0] if len(slices) == 1 else universal(slices))
+        library.write_bytes(_joined(slices))
     return library
+
+
+def binaries(
+    source: Sequence[Path],
+    name: str,
+    folder: Path,
+    platforms: Sequence[str],
+    options: Sequence[str],
+) -> Iterator[tuple[str, bytes]]:
+    """Entries of an FMU with the shared library `name` for each of the platforms, compiled side by
+    side in `folder`. Raises as `compile_library`."""
+    targets = [target for platform in platforms for target in TARGETS[platform]]
+    with ThreadPoolExecutor(len(targets)) as pool:
+        compiled = pool.map(lambda target: _compiled(source, folder, target, options), targets)
+        made = dict(zip(targets, compiled, strict=True))
+    for platform in platforms:
+        yield entry(platform, name), _joined([made[target] for target in TARGETS[platform]])
+
+
+def _joined(slices: Sequence[bytes]) -> bytes:
+    return universal(slices) if len(slices) > 1 else slices[0]
 
 
 def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[str] = ()) -> bytes:
@@ -105,19 +142,15 @@ def _compiled(
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     if target == WEBASSEMBLY:
         link = ["-mexec-model=reactor", "-s"]
+    jobs = {}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for file in [Path(source)] if isinstance(source, (Path, str)) else source:
+            command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
+            jobs[f"{file.stem}.o"] = pool.submit(_zig, command, own_folder, target)
+    for job in jobs.values():
+        job.result()
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
-    if isinstance(source, (Path, str)):
-        inputs = [str(Path(source).resolve())]
-    else:
-        jobs = {}
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            for file in source:
-                command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
-                jobs[f"{file.stem}.o"] = pool.submit(_zig, command, own_folder, target)
-        for job in jobs.values():
-            job.result()
-        inputs = [*jobs]
-    _zig([*link, *options, "-o", "library", *inputs], own_folder, target)
+    _zig([*link, *options, "-o", "library", *jobs], own_folder, target)
     return (own_folder / "library").read_bytes()
 
 
@@ -125,12 +158,14 @@ def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
     flags = WEBASSEMBLY_FLAGS if target == WEBASSEMBLY else FLAGS
     command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags]
     command += [f"-I{_HEADERS}", *arguments]
-    with tempfile.TemporaryDirectory(dir=folder) as local, compiler_cache() as own:
+    with tempfile.TemporaryDirectory(dir=folder) as local:
         # zig keeps its own C library in its cache, but not our code.
-        environment = {**os.environ, **own, "ZIG_LOCAL_CACHE_DIR": local}
-        done = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
-        )
+        compiles = nullcontext({CHOICE: local}) if "-c" in command else linker_cache(target)
+        with compiles as cache:
+            environment = {**os.environ, **cache, "ZIG_LOCAL_CACHE_DIR": local}
+            done = subprocess.run(
+                command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+            )
     if done.returncode:
         name = Path(command[-1]).name
         raise CompilerError(f"{name} does not compile for {target}:\n{done.stderr.strip()}")

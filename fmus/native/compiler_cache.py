@@ -1,17 +1,15 @@
-"""Caches of zig, in which it keeps the C library that it builds for each target.
+"""The caches in which zig keeps the C library that it builds for each target, which linking needs.
 
 A second zig that starts within a tenth of a second of a first one with the same cache waits for a
-lock until the first one has compiled. Compilers that run at the same time have a cache each: the
-first one of a row of caches that is not in use. Each is 50 MB, copied from the first one.
+lock until the first one has compiled, and two that find no library build it both. So each target
+has a cache, which one zig uses at a time to link; compiling needs no cache.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from itertools import count
+from contextlib import contextmanager
 from pathlib import Path
 
 from hapticlink.fmus import cache, lock
@@ -21,32 +19,19 @@ CHOICE = "ZIG_GLOBAL_CACHE_DIR"
 
 
 @contextmanager
-def compiler_cache() -> Iterator[dict[str, str]]:
-    """The environment variables for a compiler; none where no cache can be written."""
-    if CHOICE in os.environ:
-        yield {}
-        return
+def linker_cache(target: str) -> Iterator[dict[str, str]]:
+    """The environment variables to link for a target; none where no cache can be written."""
     root = cache.user_folder() / "zig"
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    if CHOICE not in os.environ and _writable(root):
+        with lock.held(root / f"{target}.lock", lambda: None):
+            yield {CHOICE: str(root / target)}
+    else:
         yield {}
-        return
-    for k in count():
-        with lock.attempted(root / f"{k}.lock") as mine:
-            if mine:
-                if k:
-                    _copy(root / "0", root / str(k))
-                yield {CHOICE: str(root / str(k))}
-                return
 
 
-def _copy(first: Path, to: Path) -> None:
-    """Copies `first`, which may be in use, unless there is a copy. What zig finds incomplete, it
-    builds again."""
-    unfinished = to.with_suffix(".part")
-    if not to.exists():
-        shutil.rmtree(unfinished, ignore_errors=True)
-        with suppress(OSError, shutil.Error):
-            shutil.copytree(first, unfinished, ignore=shutil.ignore_patterns("tmp"))
-            unfinished.rename(to)
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)

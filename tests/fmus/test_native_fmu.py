@@ -7,6 +7,7 @@ import os
 import struct
 import subprocess
 import sys
+import threading
 import zipfile
 from array import array
 from importlib.metadata import PackageNotFoundError
@@ -43,7 +44,7 @@ from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.check import check_fmu, session
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native import compile_library, compiler, split_functions
-from hapticlink.fmus.native.compiler_cache import compiler_cache
+from hapticlink.fmus.native.compiler_cache import linker_cache
 from hapticlink.fmus.native.source import component_source
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import blocks
@@ -220,20 +221,35 @@ def test_pieces_of_long_functions_give_the_same_bits(both, name, tmp_path, monke
     np.testing.assert_array_equal(driven(split), driven(both[name][0]))
 
 
-def test_processes_that_compile_at_the_same_time_have_a_cache_each(tmp_path, monkeypatch):
+def test_libraries_for_fmi3_are_in_a_folder_for_each_processor(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiler, "_compiled", lambda *given: given[2])
+    assert dict(compiler.binaries([], "one", tmp_path, compiler.PLATFORMS_3, ())) == {
+        "binaries/x86_64-linux/one.so": "x86_64-linux-gnu.2.17",
+        "binaries/aarch64-linux/one.so": "aarch64-linux-gnu.2.17",
+        "binaries/x86_64-windows/one.dll": "x86_64-windows-gnu",
+        "binaries/x86_64-darwin/one.dylib": "x86_64-macos.11.0",
+        "binaries/aarch64-darwin/one.dylib": "aarch64-macos.11.0",
+    }
+
+
+def test_one_linker_at_a_time_uses_the_cache_of_its_target(tmp_path, monkeypatch):
+    """Another target is linked beside it; a second one for the same target waits."""
     monkeypatch.delenv("ZIG_GLOBAL_CACHE_DIR", raising=False)
     monkeypatch.setattr("hapticlink.fmus.cache.user_folder", lambda: tmp_path)
-    with compiler_cache() as first:
-        folder = Path(first["ZIG_GLOBAL_CACHE_DIR"])
-        (folder / "o").mkdir(parents=True)
-        (folder / "o" / "libc.a").write_text("built")
-        with compiler_cache() as second:
-            other = Path(second["ZIG_GLOBAL_CACHE_DIR"])
-            assert (other / "o" / "libc.a").read_text() == "built"
-            assert not (other / "o" / "libc.a").samefile(folder / "o" / "libc.a")
-    with compiler_cache() as third:
-        assert third == first
-    assert other != folder
+    entered = []
+
+    def link(target):
+        with linker_cache(target) as cache:
+            entered.append(cache["ZIG_GLOBAL_CACHE_DIR"])
+
+    with linker_cache("here") as first, linker_cache("there") as other:
+        assert first != other
+        waiting = threading.Thread(target=link, args=("here",))
+        waiting.start()
+        waiting.join(0.3)
+        assert entered == []
+    waiting.join()
+    assert entered == [first["ZIG_GLOBAL_CACHE_DIR"]]
 
 
 def test_rows_of_a_table_are_data(both):

@@ -12,13 +12,15 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from fmpy import platform, sharedLibraryExtension
+from fmpy import platform, platform_tuple, sharedLibraryExtension
 from fmpy.validation import validate_fmu
 
 from hapticlink.fmus.archive import write
 from hapticlink.orchestrator import open_scene
 from hapticlink.programs.build import OPTIONS, program_files
 
+DATA_OF = {"program.c": "scene.h", "fmi3.c": "fmi3_rest.h"}
+"""The C files that depend on the scene, with the headers that hold its data."""
 COMPILER = shutil.which("cc")
 FLAGS = ("-std=gnu11", "-fPIC", "-O0", "-w", "-ffp-contract=off", "-fvisibility=hidden", *OPTIONS)
 needs_compiler = pytest.mark.skipif(
@@ -32,11 +34,14 @@ def _folder() -> Path:
 
 
 @cache
-def program(scene: str, options: tuple[str, ...] = (), without: str | None = None) -> Path:
+def program(
+    scene: str, options: tuple[str, ...] = (), without: str | None = None, fmi: int = 2
+) -> Path:
     """The FMU of a scene."""
-    files = program_files(open_scene.load(scene, options), "program", without)
+    files = program_files(open_scene.load(scene, options), "program", without, fmi)
     library = compiled({Path(n).name: c for n, c in files.items() if n.startswith("sources/")})
-    whole = {**files, f"binaries/{platform}/program{sharedLibraryExtension}": library}
+    place = platform if fmi == 2 else platform_tuple
+    whole = {**files, f"binaries/{place}/program{sharedLibraryExtension}": library}
     path = Path(tempfile.mkdtemp(dir=_folder())) / "program.fmu"
     with path.open("xb") as file:
         write(whole, file)
@@ -46,14 +51,15 @@ def program(scene: str, options: tuple[str, ...] = (), without: str | None = Non
 
 def compiled(sources: dict[str, bytes], flags: Sequence[str] = FLAGS) -> bytes:
     """The shared library of C files, as `cc *.c` makes it."""
-    headers = b"".join(sources[n] for n in sorted(sources) if n.endswith(".h") and n != "scene.h")
+    shared = sorted(n for n in sources if n.endswith(".h") and n not in DATA_OF.values())
+    headers = b"".join(sources[n] for n in shared if not n.startswith("fmi3"))
     objects = []
     with tempfile.TemporaryDirectory(dir=_folder()) as name:
         room = Path(name)
         for file, content in sources.items():
             (room / file).write_bytes(content)
         for file in sorted(n for n in sources if n.endswith(".c")):
-            uses = sources["scene.h"] if file == "program.c" else b""
+            uses = sources[DATA_OF[file]] if file in DATA_OF else b""
             key = sha256(b"\0".join([sources[file], headers, uses, *map(str.encode, flags)]))
             kept = _folder() / f"{key.hexdigest()}.o"
             if not kept.exists():
