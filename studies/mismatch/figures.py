@@ -60,7 +60,7 @@ def lines(
         axes.set_xticks([*map(float, RATES), APART], [*RATES, VARIABLE], fontsize="small")
         axes.minorticks_off()
     every[0].set_ylabel(unit)
-    found = {}
+    found: dict[str, Any] = {}
     for axes in every:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
