@@ -21,7 +21,7 @@ from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.advise.methods import GAINS, HOLDS
 from hapticlink.analysis.sweep import row as sweep_row
 from hapticlink.analysis.sweep import sweep
-from hapticlink.analysis.sweep.job import Job, job
+from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
@@ -143,6 +143,24 @@ def advise(
     Raises InputFault for a scene without a device, a controller, a hand or anything that is held.
     """
     read = open_scene.load(scene, options)
+    methods = all_methods(read)
+    around = list(draws(read, count, seed))
+
+    def run(of: Sequence[Method], drawn: Sequence[Sequence[str]]) -> dict[Method, list[Row]]:
+        return on_draws(scene, options, of, drawn, folder, processes=processes, tell=tell)
+
+    screened = {method: rows[0] for method, rows in run(methods, [()]).items()}
+    ranked = _distinct(sorted(methods, key=lambda m: _rank(screened[m])), screened)
+    ran: list[Measured] = []
+    while ranked and not any(one.admitted for one in ran):
+        these, ranked = ranked[:ROUND], ranked[ROUND:]
+        for method, rows in run(these, around).items():
+            ran.append(_measured(method, [screened[method], *rows]))
+    return _chosen(read.title, ran, screened)
+
+
+def all_methods(read: Scene) -> list[Method]:
+    """The methods of a scene. Raises InputFault where there are none."""
     if not (read.device and read.controller and read.hand and read.linkage):
         raise InputFault(
             "nothing to advise: a [linkage], [device], [controller], [hand] are needed"
@@ -150,30 +168,32 @@ def advise(
     if read.graphics is None:
         raise InputFault("nothing to advise: without [graphics] there is one rate, and no hold")
     gains = (OWN, "soft", "medium") if read.controller.teleoperation else (OWN,)
-    methods = [Method(hold, of) for hold in HOLDS for of in gains]
+    return [Method(hold, of) for hold in HOLDS for of in gains]
 
-    def run(pairs: Sequence[tuple[Method, Sequence[str]]]) -> list[Row]:
-        """Rows of methods with the options of a draw each."""
-        jobs: list[Job] = []
-        for method, drawn in pairs:
-            given = (*options, *drawn, *method.options)
-            jobs.append(job(scene, given, {"method": method.name, "draw": " ".join(drawn)}))
 
-        def told(done: int) -> None:
-            tell(done, len(jobs))
+def on_draws(
+    scene: str | Path | Scene,
+    options: Sequence[str],
+    methods: Sequence[Method],
+    drawn: Sequence[Sequence[str]],
+    folder: Path,
+    *,
+    processes: int = 1,
+    tell: Callable[[int, int], object] = lambda done, of: None,
+) -> dict[Method, list[Row]]:
+    """The rows of methods on a scene with the options of each draw, in the order of the draws."""
+    jobs = [
+        job(scene, (*options, *draw, *method.options), _point(method, draw))
+        for method in methods
+        for draw in drawn
+    ]
+    rows = sweep(jobs, folder, processes, tell=lambda done: tell(done, len(jobs)), measure=measured)
+    n = len(drawn)
+    return {method: rows[i * n : (i + 1) * n] for i, method in enumerate(methods)}
 
-        return sweep(jobs, folder, processes, tell=told, measure=measured)
 
-    screened = dict(zip(methods, run([(method, ()) for method in methods]), strict=True))
-    ranked = _distinct(sorted(methods, key=lambda m: _rank(screened[m])), screened)
-    around = list(draws(read, count, seed))
-    ran: list[Measured] = []
-    while ranked and not any(one.admitted for one in ran):
-        these, ranked = ranked[:ROUND], ranked[ROUND:]
-        rows = run([(method, drawn) for method in these for drawn in around])
-        for i, method in enumerate(these):
-            ran.append(_measured(method, [screened[method], *rows[i * count : (i + 1) * count]]))
-    return _chosen(read.title, ran, screened)
+def _point(method: Method, draw: Sequence[str]) -> dict[str, str]:
+    return {"method": method.name, "draw": " ".join(draw)}
 
 
 def measured(experiment: Experiment) -> Row:

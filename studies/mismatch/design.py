@@ -83,13 +83,14 @@ def references(cases: Iterable[Case]) -> Iterator[Job]:
 
 
 def methods(arrangement: str, bias: str, rate: str) -> list[Method]:
-    """The methods that are compared. Of a mechanism at the graphics rate, the report's gains and
-    the integrators are tried with the report's model alone, which has no Coriolis compensation."""
-    whole = rate in FEW and (arrangement == MOBILITY or bias == "none")
+    """The methods that are compared. All are at FEW rates with the report's model, which has no
+    Coriolis compensation; elsewhere neither the report's gains nor integrators, and LIKELY holds
+    of a mechanism at the graphics rate."""
+    whole = rate in FEW and bias == "none"
     gains = [g for g in GAINS if whole or g != REPORT]
     if arrangement == MOBILITY:
         return [Method(*each) for each in product(OF_MATRICES, gains) if each[1] != "soft"]
-    found = [Method(hold, g) for hold, g in product(HOLDS if rate in FEW else LIKELY, gains)]
+    found = [Method(hold, g) for hold, g in product(HOLDS if whole else LIKELY, gains)]
     others = [i for i in INTEGRATORS if whole and i != "rk4"]
     return found + [Method(h, "medium", i) for h, i in product(COMPARED, others)]
 

@@ -13,8 +13,8 @@ lifted map spans one frame."""
 VARIABLE, LOW, HIGH = "10..60", 10, 60
 COLUMNS = (*RATES, VARIABLE)
 FEW = ("10", "30", "57", VARIABLE)
-"""The rates at which all is tried: at the others neither the report's gains nor the integrators,
-and of the holds LIKELY."""
+"""The rates at which all is tried, without Coriolis compensation; elsewhere of the holds LIKELY,
+and neither the report's gains nor the integrators."""
 LIKELY = ("zoh", "foh", "second-order", "passive", "foh-derivative, passive")
 KEPT_APART, NEAREST = "22", "20"
 """A rate at which nothing is chosen, whose frames are no whole ticks, and the row it takes."""
