@@ -1,7 +1,5 @@
 """`hapticlink advise` on scenes that it was not made with: is another method better?
 
-    python -m benchmarks.advise --first 2300 --count 10 --jobs 2 results/advise
-
 Scenes are drawn with seeds: linkage, masses, gains, rates, delays, hand (tests/attack/verdicts.py).
 Each is advised. Then all holds with all gains run on DRAWS draws of it that `advise` has not seen.
 The best is the one with the smallest error, median of log(error) over these draws, of those that
@@ -10,7 +8,7 @@ keep the limits in all of them.
 
 from __future__ import annotations
 
-import argparse
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +23,8 @@ from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene import overrides
 from tests.attack.verdicts import drawn
 
+FIRST, COUNT = 2300, 10
+"""Seeds of the scenes."""
 DRAWS, SEED, NEAR = 8, 1, 1.1
 """Draws of a scene, their seed, which `advise` does not use, and how near the best is as good."""
 
@@ -88,7 +88,7 @@ def _error(rows: Sequence[Row]) -> float:
     return float(np.exp(np.median([np.log(max(row.get(METRIC, 1e3), 1e-9)) for row in rows])))
 
 
-def page(found: Sequence[Judged]) -> Iterator[str]:
+def page(found: Sequence[Judged], command: str) -> Iterator[str]:
     """The lines of README.md."""
     known = [one for one in found if one.best]
     yield "# What `hapticlink advise` is worth on scenes kept apart\n"
@@ -99,12 +99,9 @@ def page(found: Sequence[Judged]) -> Iterator[str]:
         f"{len(found)}, those counted in which none is and it says so.\n"
     )
     yield (
-        f"    python -m benchmarks.advise --first {found[0].seed} --count {len(found)} "
-        "results/advise\n"
-    )
-    yield (
-        "Scenes are drawn with the seed of the row (`tests/attack/verdicts.py`): linkage, masses, "
-        "gains, rates, delays, hand. `advise` runs on its own draws; then all holds with the "
+        f"`{command}` makes this page. Scenes are drawn with the seed of the row "
+        "(`tests/attack/verdicts.py`): linkage, masses, gains, rates, delays, hand. `advise` runs "
+        "on its own draws; then all holds with the "
         f"scene's own, soft and medium gains run on {DRAWS} others. Error: the largest distance of "
         "handle and operational point of a run, median of the draws.\n"
     )
@@ -113,28 +110,12 @@ def page(found: Sequence[Judged]) -> Iterator[str]:
     yield from (one.line for one in found)
 
 
-def measure(
-    out: Path, first: int, count: int, processes: int, tell: Callable[[str], object] = print
-) -> list[Judged]:
-    """Judges scenes and writes their page."""
+def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+    """Write README.md to `out`."""
+    count = 2 if quick else COUNT
     found = []
-    for seed in range(first, first + count):
-        found.append(judged(seed, Path("sweeps/advise") / str(seed), processes))
-        tell(found[-1].line)
+    for i in range(count):
+        told(f"scene {i + 1}", i, count)
+        found.append(judged(FIRST + i, Path("sweeps/advise"), os.cpu_count() or 1))
     out.mkdir(parents=True, exist_ok=True)
-    (out / "README.md").write_text("\n".join(page(found)) + "\n", encoding="utf-8")
-    return found
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--first", type=int, default=2300)
-    parser.add_argument("--count", type=int, default=10)
-    parser.add_argument("--jobs", type=int, default=2)
-    given = parser.parse_args()
-    measure(given.out, given.first, given.count, given.jobs)
-
-
-if __name__ == "__main__":
-    main()
+    (out / "README.md").write_text("\n".join(page(found, command)) + "\n", encoding="utf-8")

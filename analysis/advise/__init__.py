@@ -28,6 +28,7 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import HAND_WRENCH, HANDLE_POSE
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.scene import Scene
 
 SHARE, LEAST = 0.25, 1e-3
@@ -197,13 +198,18 @@ def _point(method: Method, draw: Sequence[str]) -> dict[str, str]:
 
 
 def measured(experiment: Experiment) -> Row:
-    """The row of a run, with the work of the hand on the handle, its absolute values summed."""
-    found = sweep_row.measure(experiment)
-    table = experiment.results.haptics
-    if HANDLE_POSE in table and HAND_WRENCH in table and len(table[HANDLE_POSE]) > 1:
-        moved = np.diff(table[HANDLE_POSE], axis=0)
-        found[WORK] = float(np.abs((table[HAND_WRENCH][:-1] * moved).sum(axis=1)).sum())
-    return found
+    """The row of a run, with the work of the hand."""
+    return sweep_row.measure(experiment) | {WORK: hand_work(experiment.results)}
+
+
+def hand_work(results: Results) -> float:
+    """The work (J) of the hand on the handle, its absolute values summed; 0 where one of them is
+    missing."""
+    table = results.haptics
+    if HANDLE_POSE not in table or HAND_WRENCH not in table:
+        return 0.0
+    moved = np.diff(table[HANDLE_POSE], axis=0)
+    return float(np.abs((table[HAND_WRENCH][:-1] * moved).sum(axis=1)).sum())
 
 
 def energy(row: Row) -> float:

@@ -55,7 +55,7 @@ def study(
     at = method_choice.margins(rest)
     by_cell = method_choice.cells(r for r in runs if r["arrangement"] != design.CONTINUOUS)
     advice = {cell: method_choice.choice(cell, rows, at) for cell, rows in by_cell.items()}
-    listed = {cell: method_choice.to_try(cell, by_cell, c.best) for cell, c in advice.items()}
+    listed = {cell: method_choice.to_try(cell, by_cell[cell], c.best) for cell, c in advice.items()}
     for arrangement, bias in product((design.DIRECT, design.MOBILITY), BIAS):
         row = arrangement, bias, NEAREST
         advice[arrangement, bias, KEPT_APART] = advice[row]

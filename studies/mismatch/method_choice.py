@@ -14,7 +14,7 @@ two alone keeps them it has at least k, where P(at least k heads of n tosses) < 
 
 No method has nearly the smallest error in every case. So a cell has a list to try, too: LISTED
 methods, the one above first, each next one that with which the smallest error of the list is within
-NEAR of that of all methods in the most cases of this rate and its neighbours.
+NEAR of that of all methods in the most cases.
 """
 
 from __future__ import annotations
@@ -29,14 +29,15 @@ from numpy.typing import NDArray
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import MOBILITY, of_map
 from studies.mismatch.measure import COUPLING, MARGIN, PEAK, WORK, draw, stable
-from studies.mismatch.methods import RATES, Method, order
+from studies.mismatch.methods import Method, order
 
 SHARE, LEAST = 0.25, 1e-3
 """Share of the hand's work, and energy (J): what moves the handle at 8 cm/s."""
 LEVEL = 0.05
-NEAR, LISTED = 1.1, 4
+NEAR, LISTED = 1.1, 5
 Cell = tuple[str, str, str]
 """Arrangement, bias and rate."""
+Listed = tuple[Method, ...]
 Cells = Mapping[Cell, Mapping[Method, Mapping[str, Row]]]
 """The rows by cell, method and draw."""
 Margins = Mapping[tuple[str, Method, str], Mapping[str, Row]]
@@ -133,28 +134,17 @@ def choice(
     return Choice(cell, best, ties, len(draws), len(draws), 0, True)
 
 
-def to_try(cell: Cell, by_cell: Cells, first: Method) -> tuple[Method, ...]:
+def to_try(cell: Cell, by_method: Mapping[Method, Mapping[str, Row]], first: Method) -> Listed:
     """The list of a cell, from `first` on, in the order of what each adds."""
-    arrangement, bias, rate = cell
-    rates = [r for r in RATES if (arrangement, bias, r) in by_cell]
-    i = rates.index(rate) if rate in rates else -1
-    methods = [m for m in by_cell[cell] if m.candidate]
-    off: dict[Method, list[float]] = {m: [] for m in methods}
-    for each in rates[max(0, i - 1) : i + 2] if i >= 0 else [rate]:
-        rows = by_cell[arrangement, bias, each]
-        if all(m in rows for m in methods):
-            tried = {m: rows[m] for m in rows if m.candidate}
-            for m, found in relative(tried, metric(arrangement)).items():
-                if m in off:
-                    off[m] += found
-    listed = [first]
-    while len(listed) < min(LISTED, len(methods)):
+    tried = {m: rows for m, rows in by_method.items() if m.candidate}
+    off, listed = relative(tried, metric(cell[0])), [first]
+    while len(listed) < min(LISTED, len(tried)):
 
         def gain(m: Method) -> tuple[int, float]:
             least = np.min([off[one] for one in (*listed, m)], axis=0)
             return int((least <= NEAR).sum()), -float(np.minimum(np.log(least), 3.0).sum())
 
-        listed.append(max((m for m in methods if m not in listed), key=gain))
+        listed.append(max((m for m in tried if m not in listed), key=gain))
     return tuple(listed)
 
 

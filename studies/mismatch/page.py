@@ -79,8 +79,8 @@ def _answer(found: Found) -> Iterator[str]:
         "where one is advised, by a smaller error in more than three quarters of the draws; where "
         f"none is, by keeping the limits in more draws by a sign test at {LEVEL:.0%}. Try, too: no "
         "method is the most accurate in every hand, so run these as well on your own scene, and "
-        "take the smallest error within the limits; the best of the row and these is within a "
-        "tenth of the best of all methods in most cases of this rate and its neighbours. "
+        "take the smallest error within the limits: each is that which adds most cases in which "
+        "the best of the row and these is within a tenth of the best of all methods. "
         "[advice.csv](advice.csv) has quartiles, spread over seeds, coupling error, energy and "
         "margin of each row."
     )
@@ -137,7 +137,7 @@ def _table(found: Found, arrangement: str, bias: str) -> str:
         taken = named(chosen.best) if chosen.admitted else f"nothing; best: {named(chosen.best)}"
         lines.append(
             f"| {rate} | {taken} | {_within(chosen)} | {error} | {_several(chosen.ties)} | "
-            f"{_several(found.listed[cell][1:])} |"
+            f"{'; '.join(map(named, found.listed[cell][1:]))} |"
         )
     return "\n".join(lines)
 

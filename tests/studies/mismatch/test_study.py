@@ -217,7 +217,7 @@ def test_the_list_to_try_has_what_is_nearly_best_in_most_cases() -> None:
     off = method_choice.relative(by_method, "tracking_max_mm")
     assert off[PSPM] == pytest.approx([1.0] * 6 + [np.inf] * 2)
     assert off[other] == pytest.approx([4.9] * 6 + [1.04] * 2)
-    assert method_choice.to_try(CELL, {CELL: by_method}, ZOH) == (ZOH, PSPM, FOH, other)
+    assert method_choice.to_try(CELL, by_method, ZOH) == (ZOH, PSPM, FOH, other)
 
 
 def _sweep(jobs: list[Job], *_: Any, measure: Any, **__: Any) -> list[Row]:
