@@ -188,7 +188,11 @@ def on_draws(
         for method in methods
         for draw in drawn
     ]
-    rows = sweep(jobs, folder, processes, tell=lambda done: tell(done, len(jobs)), measure=measured)
+
+    def told(done: int) -> None:
+        tell(done, len(jobs))
+
+    rows = sweep(jobs, folder, processes, tell=told, measure=measured)
     n = len(drawn)
     return {method: rows[i * n : (i + 1) * n] for i, method in enumerate(methods)}
 

@@ -48,26 +48,30 @@ def lines(
 ) -> str:
     """Draws panels side by side with one scale; returns the file's name. named: the lines with a
     colour; hollow: what hollow points mean; scale: as Matplotlib names it."""
+    from matplotlib.ticker import LogLocator
+
     figure, every = panels(len(drawn), width=5.2, height=4.4, sharey=True)
     for axes, (heading, by_line) in zip(every, drawn, strict=True):
         for label, points in by_line.items():
             _line(axes, label, points, named, others)
         axes.set_title(heading, fontsize="medium")
         axes.set_yscale(scale, **({"linthresh": 1.0} if scale == "symlog" else {}))
+        if scale == "log":
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.set_xscale("log")
         axes.set_xlabel("graphics rate (Hz)")
-        axes.set_xticks([*map(float, RATES), APART], [*RATES, VARIABLE], fontsize="small")
+        axes.set_xticks([*map(float, RATES), APART], [*RATES, VARIABLE], fontsize="x-small")
         axes.minorticks_off()
     every[0].set_ylabel(unit)
     found: dict[str, Any] = {}
     for axes in every:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
-    found |= _marks(drawn, hollow)
-    figure.legend(
-        found.values(), found.keys(), loc="outside lower center", ncols=4, fontsize="small"
-    )
+    shown = {label: found[label] for label in (*named, others) if label in found}
+    shown |= _marks(drawn, hollow)
+    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 2 * len(drawn)}
+    figure.legend(shown.values(), shown.keys(), fontsize="small", **where)
     figure.suptitle(fill(title, 46 * len(drawn) + 10))
     return save(figure, folder, name)
 

@@ -24,13 +24,14 @@ from studies.mismatch.methods import (
     GAINS,
     HOLDS,
     INTEGRATORS,
+    LIKELY,
     OF_MATRICES,
     RATES,
     REPORT,
     Method,
 )
 
-SOME = "some draws unstable; median of the others"
+SOME = "some draws unstable; of the others"
 NAMED = ("zoh", "foh", "second-order", "passive")
 """The holds that have a colour."""
 STRONGEST = 20.0
@@ -89,15 +90,15 @@ def _gains(folder: Path, found: Found) -> Iterator[str]:
         f"Gains decide before holds: at 10 Hz, without Coriolis compensation, {low[0]} % of the "
         f"runs keep the limits with soft gains, {low[1]} % with medium, {low[2]} % with stiff ones"
     )
-    unit = "runs within the limits (%), all holds"
+    unit = f"runs within the limits (%), {len(LIKELY)} holds"
     made = lines(folder, "gains.png", title, drawn, unit, list(GAINS), scale="linear")
     yield _text(f"{title}.", made, "Runs within the limits by gains and rate")
 
 
 def _share(found: Found, bias: str, gains: str, rate: str) -> float | None:
-    """Runs within the limits (%), over holds and draws; None where there are none."""
+    """Runs within the limits (%), over LIKELY holds and draws; None where there are none."""
     cell = found.cells[DIRECT, bias, rate]
-    rows = [r for hold in HOLDS for r in cell.get(Method(hold, gains), {}).values()]
+    rows = [r for hold in LIKELY for r in cell.get(Method(hold, gains), {}).values()]
     return 100 * float(np.mean([within(r) for r in rows])) if rows else None
 
 
@@ -105,7 +106,7 @@ def _tracking(folder: Path, found: Found) -> Iterator[str]:
     drawn = _by_hold(found, DIRECT, lambda r: r[METRIC], np.median)
     cells = [(b, r) for b in BIAS for r in COLUMNS]
     first = sum(found.advice[DIRECT, b, r].best.hold == "zoh" for b, r in cells)
-    title = f"zoh is the best hold in {first} of {len(cells)} rows, with the gains of the row"
+    title = f"zoh is the best hold in {first} of {len(cells)} rows"
     none = [
         r for r in COLUMNS if not any(r in p and p[r].whole for _, by in drawn for p in by.values())
     ]

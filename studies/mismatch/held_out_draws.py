@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import product
 from textwrap import fill
@@ -62,7 +61,7 @@ def section(found: Found) -> Iterator[str]:
             taken = _near(by_cell, cell, [chosen.best])
             listed = _near(by_cell, cell, found.listed[cell])
             row.append(
-                f"{good} of {len(rows)}{'' if chosen.admitted else ' (not advised)'}; "
+                f"{good} of {len(rows)}{'' if chosen.admitted else '*'}; "
                 f"{sum(taken)}, {sum(listed)} of {len(listed)}"
             )
         lines.append("| " + " | ".join(row) + " |")
@@ -73,8 +72,9 @@ def section(found: Found) -> Iterator[str]:
         f"were in no choice. With the advised methods {sound} of {of} of these runs are stable, "
         f"and {kept} of {of} keep both limits. At rest on the slider-crank "
         f"{bad[0]} of the {bad[1]} rows with a map are unstable. In the table: draws within the "
-        "limits with the method of the row; and in how many of the cases in which any method keeps "
-        "the limits it does, with an error within a tenth of the smallest, the row's method alone, "
+        "limits with the method of the row (* not advised); and in how many of the cases in which "
+        "any method keeps the limits it does, with an error within a tenth of the smallest, the "
+        "row's method alone, "
         "and the best of it and of those to try, too. The error is that of tracking, of a "
         "mechanism at 512 Hz the coupling error ([kept-apart.csv](kept-apart.csv)).",
         108,
@@ -83,12 +83,11 @@ def section(found: Found) -> Iterator[str]:
     heads = [f"{PLACES[a]}, {'on' if b == 'full' else 'off'}" for a, b in every]
     table = ["| Hz | " + " | ".join(heads) + " |", "|---" * (1 + len(heads)) + "|", *lines]
     yield "\n".join(table)
-    most = Counter(_nearest(by_cell, c).gains for c in found.advice if c[0] == DIRECT)
+    looked_up = [_near(by_cell, c, [_nearest(by_cell, c)]) for c in found.advice if c[0] == DIRECT]
     yield fill(
-        "One method for all hands cannot do better by much: the one that would have been right "
-        f"most often, looked up afterwards, is so in {_share(_looked_up(found, by_cell))} with the "
-        f"mechanism at the graphics rate ({both([f'{n} times {g}' for g, n in most.items()])} "
-        "gains). `hapticlink advise` runs all methods on a scene of yours.",
+        "One method for all hands cannot reach that with the mechanism at the graphics rate: the "
+        "one that is right most often at a rate, looked up on these very cases, is so in "
+        f"{_share(looked_up)}. `hapticlink advise` runs all methods on a scene of yours.",
         108,
         break_on_hyphens=False,
     )
@@ -109,11 +108,6 @@ def _near(by_cell: Cells, cell: Cell, methods: Sequence[Method]) -> list[bool]:
 def _nearest(by_cell: Cells, cell: Cell) -> Method:
     """The method that is within a tenth of the best in most cases, by the cases themselves."""
     return max(by_cell[cell], key=lambda m: sum(_near(by_cell, cell, [m])))
-
-
-def _looked_up(found: Found, by_cell: Cells) -> list[list[bool]]:
-    every = (c for c in found.advice if c[0] == DIRECT)
-    return [_near(by_cell, c, [_nearest(by_cell, c)]) for c in every]
 
 
 def _share(found: Sequence[Sequence[bool]]) -> str:
