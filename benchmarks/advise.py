@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 
@@ -27,6 +28,7 @@ FIRST, COUNT = 2300, 10
 """Seeds of the scenes."""
 DRAWS, SEED, NEAR = 8, 1, 1.1
 """Draws of a scene, their seed, which `advise` does not use, and how near the best is as good."""
+WIDTH = 108
 
 
 @dataclass(frozen=True)
@@ -92,19 +94,23 @@ def page(found: Sequence[Judged], command: str) -> Iterator[str]:
     """The lines of README.md."""
     known = [one for one in found if one.best]
     yield "# What `hapticlink advise` is worth on scenes kept apart\n"
-    yield (
+    yield fill(
         f"The method that it says to take is within a tenth of the best of all methods in "
         f"{sum(one.near for one in known)} of the {len(known)} scenes in which any keeps the "
         f"limits in all draws, and within the limits in {sum(one.within for one in found)} of "
-        f"{len(found)}, those counted in which none is and it says so.\n"
+        f"{len(found)}, those counted in which none is and it says so.",
+        WIDTH,
     )
-    yield (
+    yield ""
+    yield fill(
         f"`{command}` makes this page. Scenes are drawn with the seed of the row "
         "(`tests/attack/verdicts.py`): linkage, masses, gains, rates, delays, hand. `advise` runs "
         "on its own draws; then all holds with the "
         f"scene's own, soft and medium gains run on {DRAWS} others. Error: the largest distance of "
-        "handle and operational point of a run, median of the draws.\n"
+        "handle and operational point of a run, median of the draws.",
+        WIDTH,
     )
+    yield ""
     yield "| seed | scene | advised | within the limits | best | error relative to the best |"
     yield "|---" * 6 + "|"
     yield from (one.line for one in found)
