@@ -19,20 +19,17 @@ import numpy as np
 
 from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.advise.methods import GAINS, HOLDS
+from hapticlink.analysis.findings.user_port import LEAST, SHARE, hand_work
 from hapticlink.analysis.sweep import row as sweep_row
 from hapticlink.analysis.sweep import sweep
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.loop_names import HAND_WRENCH, HANDLE_POSE
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.scene import Scene
 
-SHARE, LEAST = 0.25, 1e-3
-"""Share of the hand's work, and energy (J): what moves the handle at 8 cm/s."""
 APART = 42.0, 1.0
 """Tracking errors (mm, the length of a link, and rad) from which on a run counts as unstable."""
 PEAK, WORK = "port_peak_J", "hand_work_J"
@@ -204,16 +201,6 @@ def _point(method: Method, draw: Sequence[str]) -> dict[str, str]:
 def measured(experiment: Experiment) -> Row:
     """The row of a run, with the work of the hand."""
     return sweep_row.measure(experiment) | {WORK: hand_work(experiment.results)}
-
-
-def hand_work(results: Results) -> float:
-    """The work (J) of the hand on the handle, its absolute values summed; 0 where one of them is
-    missing."""
-    table = results.haptics
-    if HANDLE_POSE not in table or HAND_WRENCH not in table:
-        return 0.0
-    moved = np.diff(table[HANDLE_POSE], axis=0)
-    return float(np.abs((table[HAND_WRENCH][:-1] * moved).sum(axis=1)).sum())
 
 
 def energy(row: Row) -> float:

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.analysis.advise import LEAST, SHARE, hand_work
 from hapticlink.analysis.findings.measures import Measures
+from hapticlink.analysis.findings.user_port import LEAST, SHARE, hand_work
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.tables import Results
 

@@ -26,13 +26,12 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.analysis.findings.user_port import LEAST, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import MOBILITY, of_map
 from studies.mismatch.measure import COUPLING, MARGIN, PEAK, WORK, draw, stable
 from studies.mismatch.methods import Method, order
 
-SHARE, LEAST = 0.25, 1e-3
-"""Share of the hand's work, and energy (J): what moves the handle at 8 cm/s."""
 LEVEL = 0.05
 NEAR, LISTED = 1.1, 5
 Cell = tuple[str, str, str]

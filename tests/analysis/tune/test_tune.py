@@ -18,7 +18,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.advise import hand_work
+from hapticlink.analysis.findings.user_port import hand_work
 from hapticlink.analysis.stability.hands import FIRM, spring
 from hapticlink.analysis.stability.poses import LIGHT, Pose, simulated
 from hapticlink.analysis.stability.resting_scene import resting
