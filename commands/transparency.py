@@ -21,7 +21,7 @@ from hapticlink.orchestrator.base.terminal_output import say
 
 Poses = Annotated[int, Parameter(help="Number of poses of the scene's run.")]
 Costs = Annotated[
-    bool, Parameter(negative="", help="Beside it what rates, delays and holds change at the start.")
+    bool, Parameter(negative="", help="Beside it what rates, delays and holds cost at the start.")
 ]
 
 
@@ -56,17 +56,17 @@ def transparency(
     given, name = changes.options, default_folder("runs", scene).name
     with waiting(f"{name}: equilibria and linearisations, which can take a minute", quiet):
         in_poses = analysis.transparency(scene, given, count=poses)
-        beside = dict(analysis.costs(scene, given, say)) if costs else {}
+        beside = analysis.costs(scene, given, say) if costs else []
     folder = folders.ensure(out or changes.folder("runs", scene))
     record = {
         "title": in_poses[0].title,
         "poses": [pose.record() for pose in in_poses],
-        "changes": {change: pose.record() for change, pose in beside.items()},
+        "changes": {cost.change: cost.record() for cost in beside},
     }
     write_json(folder / "transparency.json", record)
     figure_axes.save({"transparency": transparency_figure.draw(in_poses)}, folder)
     lines = [line for pose in in_poses for line in pose.lines()]
-    lines += [line for pose in beside.values() for line in pose.lines()]
+    lines += analysis.cost_lines(beside) if beside else []
     print_result(
         (f"{name}:", *(f"  {line}" for line in lines), f"  {folder}/"), record, quiet, json
     )

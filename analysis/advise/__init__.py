@@ -19,19 +19,17 @@ import numpy as np
 
 from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.advise.methods import GAINS, HOLDS
+from hapticlink.analysis.findings.user_port import LEAST, SHARE, hand_work
 from hapticlink.analysis.sweep import row as sweep_row
 from hapticlink.analysis.sweep import sweep
-from hapticlink.analysis.sweep.job import Job, job
+from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.loop_names import HAND_WRENCH, HANDLE_POSE
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
 
-SHARE, LEAST = 0.25, 1e-3
-"""Share of the hand's work, and energy (J): what moves the handle at 8 cm/s."""
 APART = 42.0, 1.0
 """Tracking errors (mm, the length of a link, and rad) from which on a run counts as unstable."""
 PEAK, WORK = "port_peak_J", "hand_work_J"
@@ -143,6 +141,24 @@ def advise(
     Raises InputFault for a scene without a device, a controller, a hand or anything that is held.
     """
     read = open_scene.load(scene, options)
+    methods = all_methods(read)
+    around = list(draws(read, count, seed))
+
+    def run(of: Sequence[Method], drawn: Sequence[Sequence[str]]) -> dict[Method, list[Row]]:
+        return on_draws(scene, options, of, drawn, folder, processes=processes, tell=tell)
+
+    screened = {method: rows[0] for method, rows in run(methods, [()]).items()}
+    ranked = _distinct(sorted(methods, key=lambda m: _rank(screened[m])), screened)
+    ran: list[Measured] = []
+    while ranked and not any(one.admitted for one in ran):
+        these, ranked = ranked[:ROUND], ranked[ROUND:]
+        for method, rows in run(these, around).items():
+            ran.append(_measured(method, [screened[method], *rows]))
+    return _chosen(read.title, ran, screened)
+
+
+def all_methods(read: Scene) -> list[Method]:
+    """The methods of a scene. Raises InputFault where there are none."""
     if not (read.device and read.controller and read.hand and read.linkage):
         raise InputFault(
             "nothing to advise: a [linkage], [device], [controller], [hand] are needed"
@@ -150,40 +166,41 @@ def advise(
     if read.graphics is None:
         raise InputFault("nothing to advise: without [graphics] there is one rate, and no hold")
     gains = (OWN, "soft", "medium") if read.controller.teleoperation else (OWN,)
-    methods = [Method(hold, of) for hold in HOLDS for of in gains]
+    return [Method(hold, of) for hold in HOLDS for of in gains]
 
-    def run(pairs: Sequence[tuple[Method, Sequence[str]]]) -> list[Row]:
-        """Rows of methods with the options of a draw each."""
-        jobs: list[Job] = []
-        for method, drawn in pairs:
-            given = (*options, *drawn, *method.options)
-            jobs.append(job(scene, given, {"method": method.name, "draw": " ".join(drawn)}))
 
-        def told(done: int) -> None:
-            tell(done, len(jobs))
+def on_draws(
+    scene: str | Path | Scene,
+    options: Sequence[str],
+    methods: Sequence[Method],
+    drawn: Sequence[Sequence[str]],
+    folder: Path,
+    *,
+    processes: int = 1,
+    tell: Callable[[int, int], object] = lambda done, of: None,
+) -> dict[Method, list[Row]]:
+    """The rows of methods on a scene with the options of each draw, in the order of the draws."""
+    jobs = [
+        job(scene, (*options, *draw, *method.options), _point(method, draw))
+        for method in methods
+        for draw in drawn
+    ]
 
-        return sweep(jobs, folder, processes, tell=told, measure=measured)
+    def told(done: int) -> None:
+        tell(done, len(jobs))
 
-    screened = dict(zip(methods, run([(method, ()) for method in methods]), strict=True))
-    ranked = _distinct(sorted(methods, key=lambda m: _rank(screened[m])), screened)
-    around = list(draws(read, count, seed))
-    ran: list[Measured] = []
-    while ranked and not any(one.admitted for one in ran):
-        these, ranked = ranked[:ROUND], ranked[ROUND:]
-        rows = run([(method, drawn) for method in these for drawn in around])
-        for i, method in enumerate(these):
-            ran.append(_measured(method, [screened[method], *rows[i * count : (i + 1) * count]]))
-    return _chosen(read.title, ran, screened)
+    rows = sweep(jobs, folder, processes, tell=told, measure=measured)
+    n = len(drawn)
+    return {method: rows[i * n : (i + 1) * n] for i, method in enumerate(methods)}
+
+
+def _point(method: Method, draw: Sequence[str]) -> dict[str, str]:
+    return {"method": method.name, "draw": " ".join(draw)}
 
 
 def measured(experiment: Experiment) -> Row:
-    """The row of a run, with the work of the hand on the handle, its absolute values summed."""
-    found = sweep_row.measure(experiment)
-    table = experiment.results.haptics
-    if HANDLE_POSE in table and HAND_WRENCH in table and len(table[HANDLE_POSE]) > 1:
-        moved = np.diff(table[HANDLE_POSE], axis=0)
-        found[WORK] = float(np.abs((table[HAND_WRENCH][:-1] * moved).sum(axis=1)).sum())
-    return found
+    """The row of a run, with the work of the hand."""
+    return sweep_row.measure(experiment) | {WORK: hand_work(experiment.results)}
 
 
 def energy(row: Row) -> float:

@@ -52,6 +52,10 @@ from hapticlink.orchestrator.base.loop_names import (
 from hapticlink.orchestrator.results.run_record import BlockEnergy, PortEnergy
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
+SHARE, LEAST = 0.25, 1e-3
+"""What a rendering may generate: a share of the hand's work, or an energy (J), which moves the
+handle at 8 cm/s."""
+
 
 class UserPort(NamedTuple):
     """Work of the hands and energy generated (J) at times (s), the mechanism's samples; that of
@@ -93,6 +97,16 @@ def user_port(results: Results) -> UserPort | None:
         {name: np.concatenate([p.blocks_J[name] for p in found]) for name in last.blocks_J},
         last.works,
     )
+
+
+def hand_work(results: Results) -> float:
+    """The work (J) of the hand on the handle, its absolute values summed; 0 where one of them is
+    missing."""
+    table = results.haptics
+    if HANDLE_POSE not in table or HAND_WRENCH not in table:
+        return 0.0
+    moved = np.diff(table[HANDLE_POSE], axis=0)
+    return float(np.abs((table[HAND_WRENCH][:-1] * moved).sum(axis=1)).sum())
 
 
 def measured(windows: Iterable[UserPort | None]) -> PortEnergy | None:

@@ -17,16 +17,18 @@ and gravity of the mechanism are not in the ideal.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import evenly_spaced, simulated
 from hapticlink.analysis.stability.rates import whole_frames
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
@@ -110,19 +112,23 @@ class Transparency:
         """The result as text."""
         yield f"at {self.pose}:"
         for d in self.free:
-            felt, angle = at_slow(d.felt), float(at_slow(d.angle))
+            felt, w = complex(at_slow(d.felt)), 2 * np.pi * SLOW
+            inert = f"{short(felt.real)} kg"
+            if felt.real < 0.0:  # pressed against something
+                inert = f"a spring of {short(-felt.real * w * w)} N/m"
+            turned = f", turned by {short(float(at_slow(d.angle)))} degrees" * (felt.real > 0.0)
             yield (
                 f"  along {_named(d.along)} a mechanism of {short(d.inertia)} kg is felt as "
-                f"{short(float(felt.real))} kg and {short(-2 * np.pi * SLOW * float(felt.imag))} "
-                f"N.s/m at {SLOW:g} Hz, turned by {short(angle)} degrees; right up to "
-                f"{_hertz(d.right_up_to)}"
+                f"{inert} and {short(-w * felt.imag)} N.s/m at {SLOW:g} Hz{turned}; right "
+                f"up to {_hertz(d.right_up_to)}"
             )
         for c in self.constrained:
-            felt = "rigid" if np.isinf(c.slow) else f"{short(c.slow)} N/m at {SLOW:g} Hz"
-            yield f"  against {_named(c.along)}, which is constrained: {felt}"
+            stiff = "rigid" if np.isinf(c.slow) else f"{short(c.slow)} N/m at {SLOW:g} Hz"
+            yield f"  against {_named(c.along)}, which is constrained: {stiff}"
         if self.constrained and self.free:
-            width = "infinite" if np.isinf(self.width) else short(self.width)
-            yield f"  Z-width (constrained over free impedance at {SLOW:g} Hz): {width}"
+            yield (
+                f"  Z-width (constrained over free impedance at {SLOW:g} Hz): {_width(self.width)}"
+            )
 
     def record(self) -> dict[str, Any]:
         """The part of transparency.json on this pose."""
@@ -173,11 +179,14 @@ def at_pose(scene: str | Path | Scene, options: Sequence[str], name: str) -> Tra
     """How a scene feels where it is at rest. Raises InputFault where it is not."""
     read = open_scene.load(scene, options)
     with resting(scene, options) as place:
-        linear = place.period({}).in_map
-        cut = response(place.map, linear, hand_port(place.map.system))
-        X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
-        length = mean_link_length(_linkage(read))
-        return of(read.title, name, X, mobility(place), length)
+        return _felt(read, place, name, {})
+
+
+def _felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
+    linear = place.period(scales).in_map
+    cut = response(place.map, linear, hand_port(place.map.system))
+    X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
+    return of(read.title, name, X, mobility(place), mean_link_length(_linkage(read)))
 
 
 def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Transparency:
@@ -216,29 +225,100 @@ def mobility(place: RestingScene) -> Matrix:
     raise InputFault(f"no FMU puts out the mobility of the mechanism ({' or '.join(MOBILITIES)})")
 
 
+@dataclass(frozen=True)
+class Cost:
+    """How a scene feels with a change, and `times`, the factor on its stiffnesses (dampings by its
+    root) up to which it is stable in spring hands, with `stiffest`, how it feels there; None
+    without gains or where it is not stable with any."""
+
+    change: str
+    felt: Transparency
+    times: float | None
+    stiffest: Transparency | None
+
+    def cells(self) -> tuple[str, ...]:
+        """The row of a table, without the change."""
+        kg = ", ".join(short(float(at_slow(d.felt).real)) for d in self.felt.free)
+        stiff, most = (_stiffness(f) if f else "-" for f in (self.felt, self.stiffest))
+        times = f"{short(self.times)} times" if self.times else "-"
+        width = _width(self.felt.width) if self.felt.constrained else "-"
+        widest = _width(self.stiffest.width) if self.stiffest and self.felt.constrained else "-"
+        return kg, _hertz(self.felt.right_up_to), stiff, width, times, most, widest
+
+    def record(self) -> dict[str, Any]:
+        """The part of transparency.json on this change."""
+        most = self.stiffest.record() if self.stiffest else None
+        return self.felt.record() | {"stable_up_to": self.times, "stiffest": most}
+
+
 def costs(
     scene: str | Path | Scene, options: Sequence[str], tell: Callable[[str], object]
-) -> Iterator[tuple[str, Transparency]]:
-    """How the scene feels at its start with other rates, delays and holds, by what is changed."""
+) -> list[Cost]:
+    """How the scene feels at its start with other rates, delays and holds, and how stiff it can be
+    made."""
     read, given = open_scene.load(scene, options), tuple(options)
     pose = evenly_spaced(simulated(scene, given), _linkage(read), 1)[0]
-    rate = exact(read.haptics.rate)
-    changes: dict[str, dict[str, object]] = {
-        "as it is": {},
-        "twice the haptic rate": {"haptics.rate": float(2 * rate)},
-        "half the haptic rate": {"haptics.rate": float(rate / 2)},
-        "a period of delay of the motors": {"delays": {"controller.F_motor": float(1 / rate)}},
-        "a period of delay of the handle": {"delays": {"haptic_device.x": float(1 / rate)}},
-    }
+    rate = float(exact(read.haptics.rate))
+    late = {"motors": ("controller.F_motor",), "handle": ("haptic_device.x", "haptic_device.v")}
+    late["mechanism"] = ("virtual_mechanism.x", "virtual_mechanism.v")
+    changes: dict[str, dict[str, object]] = {"as it is": {}}
+    for name, factor in (("half", 0.5), ("twice", 2.0)):
+        changes[f"{name} the haptic rate"] = {"haptics.rate": factor * rate}
+        if read.graphics is not None and isinstance(read.graphics.rate, int | float | str):
+            changed_rate = factor * float(exact(read.graphics.rate))
+            changes[f"{name} the graphics rate"] = {"graphics.rate": changed_rate}
+    for name, ports in late.items():
+        changes[f"{name} a haptic period late"] = {"delays": dict.fromkeys(ports, 1.0 / rate)}
     if read.graphics is not None:
-        changes |= {f"hold {name}": {"hold": name} for name in ("zoh", "foh", "smooth")}
+        changes |= {f"hold {n}": {"hold": n} for n in ("zoh", "foh", "second-order", "smooth")}
+    found = []
     for name, change in changes.items():
         try:
             changed = (*given, *overrides.written(change))
             told = pose.options(whole_frames(open_scene.load(scene, changed), changed))
-            yield name, replace(at_pose(scene, told, pose.name), pose=name)
+            with resting(scene, told) as place:
+                found.append(_cost(read, place, name))
         except (InputFault, FmuFault) as fault:
             tell(f"  {name}: {fault}")
+    return found
+
+
+def _cost(read: Scene, place: RestingScene, change: str) -> Cost:
+    felt = _felt(read, place, change, {})
+    try:
+        judge = Judge({change: place})
+        times = judge.margin({})
+        return Cost(
+            change, felt, times, _felt(read, place, change, dict.fromkeys(judge.laws, times))
+        )
+    except (InputFault, FmuFault):
+        return Cost(change, felt, None, None)
+
+
+HEADS = (
+    "", f"felt at {SLOW:g} Hz (kg)", "right up to", "constraint (N/m)", "Z-width",
+    "gains stable up to", "constraint then", "Z-width then",
+)  # fmt: skip
+
+
+def cost_lines(found: Sequence[Cost]) -> Iterator[str]:
+    """The costs as a table; what changes nothing in one row."""
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for cost in found:
+        rows.setdefault(cost.cells(), []).append(cost.change)
+    table = [HEADS, *((", ".join(names), *cells) for cells, names in rows.items())]
+    wide = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for row in table:
+        yield "  ".join(cell.ljust(n) for cell, n in zip(row, wide, strict=True)).rstrip()
+
+
+def _stiffness(felt: Transparency) -> str:
+    slow = [c.slow for c in felt.constrained]
+    return "none" if not slow else "rigid" if np.isinf(max(slow)) else short(max(slow))
+
+
+def _width(width: float) -> str:
+    return "infinite" if np.isinf(width) else short(width)
 
 
 def _linkage(read: Scene) -> Linkage:

@@ -3,8 +3,8 @@
 A projector on the constrained directions that is held is stale while the mechanism moves, which a
 linearisation at rest cannot show: gains that stiffen a constraint can throw the handle off. So the
 handle may leave the operational point by at most TRACKED times as far as with the scene's own
-gains, scaled to the margin where they lack it, and the user's port may give at most TRACKED times
-as much energy, or LEAST_J.
+gains, scaled to the margin where they lack it, and the user's port may give as much energy as with
+these, or a quarter of the hand's work, which is the limit of `advise`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from __future__ import annotations
 import numpy as np
 
 from hapticlink.analysis.findings.measures import Measures
+from hapticlink.analysis.findings.user_port import LEAST, SHARE, hand_work
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results.tables import Results
 
 TRACKED = 1.2
-LEAST_J = 1e-3
-"""Energy (J) at the user's port that any gains may give: what moves the handle at 8 cm/s."""
 
 
 def motion(run: Results, end: float = 0.0) -> dict[str, float]:
@@ -40,9 +39,12 @@ class RunLimit:
         self._end = Measures(run).tracking[""].end_s
         own = motion(run)
         self._distance = TRACKED * own["distance"]
-        self._energy = max(TRACKED * own["energy_peak"], LEAST_J)
+        self._energy = max(own["energy_peak"], SHARE * hand_work(run), LEAST)
         if not np.isfinite(self._distance):
-            raise InputFault(f"the scene's own run fails: {run.record.fault}")
+            raise InputFault(
+                f"the scene's own run fails: {run.record.fault}; take smaller gains, or a duration "
+                "that ends before"
+            )
 
     def motion(self, run: Results) -> dict[str, float]:
         """The `motion` of a run. Raises InputFault where it fails, ends early, or the handle leaves

@@ -20,11 +20,12 @@ def search(scales: Scales, feel: Feel, require: Callable[[Scales], None]) -> tup
     `require` raises InputFault with the reason, and so does this where none hold."""
     if {"drift", "topology"} <= {*scales} and {"constraint", "contact"} <= {*feel.along}:
         return _raised("drift", scales, feel.alike, require)
-    why = ""
+    why = []
     for law in ("topology", "drift"):
         if law in scales:
-            scales, why = _raised(law, scales, dict, require)
-    return scales, why
+            scales, limit = _raised(law, scales, dict, require)
+            why.append(f"{limit} ({law})")
+    return scales, "; ".join(why)
 
 
 def _raised(

@@ -24,7 +24,10 @@ class Judge:
         self._at = at
         self.laws = next(iter(at.values())).gains.laws
         if not self.laws:
-            raise InputFault("no virtual coupling and no topology controller: no gains to tune")
+            raise InputFault(
+                "no virtual coupling and no topology controller: no gains to tune; take "
+                "--set controller.teleoperation=true"
+            )
         self._order = [(pose, hand) for hand in SPRINGS[::-1] for pose in at]
 
     def unstable(self, scales: Scales, factor: float) -> str | None:

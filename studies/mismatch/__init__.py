@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 from pathlib import Path
 
 from hapticlink.analysis.sweep import Measure, sweep, table
@@ -11,7 +12,7 @@ from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator.results import folders
 from studies.mismatch import cases, design, measure, method_choice, page
 from studies.mismatch.cases import Case
-from studies.mismatch.methods import BIAS, COLUMNS, KEPT_APART, RATES
+from studies.mismatch.methods import BIAS, KEPT_APART, NEAREST, VARIABLE
 
 SECONDS = {"run": 0.07, "map": 0.8}
 """Processor time of a run, and of a scene at rest."""
@@ -53,23 +54,22 @@ def study(
     rest = all_of("maps", design.margins(linkages, design.all_margins()), measure.at_rest)
     at = method_choice.margins(rest)
     by_cell = method_choice.cells(r for r in runs if r["arrangement"] != design.CONTINUOUS)
-    advice = {cell: method_choice.choice(cell, found, at) for cell, found in by_cell.items()}
-    methods = {}
-    for arrangement in (design.DIRECT, design.MOBILITY):
-        for bias in BIAS:
-            for rate in (*COLUMNS, KEPT_APART):
-                chosen = advice[arrangement, bias, "20" if rate == KEPT_APART else rate]
-                methods[arrangement, bias, rate] = chosen.taken
-    jobs = design.kept_apart_runs(apart, methods)
-    tried = measure.compared(all_of("kept apart", jobs, measure.of_run))
+    advice = {cell: method_choice.choice(cell, rows, at) for cell, rows in by_cell.items()}
+    listed = {cell: method_choice.to_try(cell, by_cell[cell], c.best) for cell, c in advice.items()}
+    for arrangement, bias in product((design.DIRECT, design.MOBILITY), BIAS):
+        row = arrangement, bias, NEAREST
+        advice[arrangement, bias, KEPT_APART] = advice[row]
+        listed[arrangement, bias, KEPT_APART] = listed[row]
+    tried = measure.compared(all_of("kept apart", design.kept_apart_runs(apart), measure.of_run))
     new = [x for x in dict.fromkeys(case.linkage for case in apart) if x not in linkages]
     wanted = dict.fromkeys(
-        (a, design.of_map(a, m), r)
-        for (a, _, r), m in methods.items()
-        if r in (*RATES, KEPT_APART) and design.mapped(m)
+        (a, design.of_map(a, c.best), r)
+        for (a, _, r), c in advice.items()
+        if r != VARIABLE and design.mapped(c.best)
     )
     rest_apart = all_of("maps kept apart", design.margins(new, wanted), measure.at_rest)
-    for name, rows in (("runs", runs), ("maps", rest), ("kept-apart", [*tried, *rest_apart])):
+    found = page.Found(runs, by_cell, at, advice, listed, tried, method_choice.margins(rest_apart))
+    named = {"runs": runs, "maps": rest, "kept-apart": [*tried, *rest_apart]}
+    for name, rows in (named | {"advice": list(page.table_rows(found))}).items():
         table.write(folder / f"{name}.csv", [measure.rounded(row) for row in rows])
-    found = page.Found(runs, by_cell, at, advice, methods, tried, method_choice.margins(rest_apart))
     return page.write(folder, found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from importlib.util import find_spec
 from itertools import product
@@ -15,9 +15,12 @@ from studies.mismatch.methods import (
     BIAS,
     COLUMNS,
     COMPARED,
+    FEW,
     GAINS,
     HOLDS,
     INTEGRATORS,
+    KEPT_APART,
+    LIKELY,
     OF_MATRICES,
     RATES,
     REPORT,
@@ -79,15 +82,16 @@ def references(cases: Iterable[Case]) -> Iterator[Job]:
         yield run(CONTINUOUS, case, Method("zoh", REPORT), bias, str(rate))
 
 
-def methods(arrangement: str, bias: str) -> list[Method]:
-    """The methods that are compared. Of a mechanism at the graphics rate, the report's gains and
-    the integrators are tried with the report's model alone, which has no Coriolis compensation."""
+def methods(arrangement: str, bias: str, rate: str) -> list[Method]:
+    """The methods that are compared. All are at FEW rates with the report's model, which has no
+    Coriolis compensation; elsewhere neither the report's gains nor integrators, and LIKELY holds
+    of a mechanism at the graphics rate."""
+    whole = rate in FEW and bias == "none"
+    gains = [g for g in GAINS if whole or g != REPORT]
     if arrangement == MOBILITY:
-        return [Method(hold, gains) for hold, gains in product(OF_MATRICES, (REPORT, "medium"))]
-    if bias == "full":
-        return [Method(hold, gains) for hold, gains in product(HOLDS, GAINS) if gains != REPORT]
-    found = [Method(hold, gains) for hold, gains in product(HOLDS, GAINS)]
-    others = (i for i in INTEGRATORS if i != "rk4")
+        return [Method(*each) for each in product(OF_MATRICES, gains) if each[1] != "soft"]
+    found = [Method(hold, g) for hold, g in product(HOLDS if whole else LIKELY, gains)]
+    others = [i for i in INTEGRATORS if whole and i != "rk4"]
     return found + [Method(h, "medium", i) for h, i in product(COMPARED, others)]
 
 
@@ -96,7 +100,7 @@ def runs(cases: Sequence[Case]) -> list[Job]:
     found = [*references(cases)]
     for arrangement in (DIRECT, MOBILITY):
         for bias, rate in product(BIAS, COLUMNS):
-            for method, case in product(methods(arrangement, bias), cases):
+            for method, case in product(methods(arrangement, bias, rate), cases):
                 found.append(run(arrangement, case, method, bias, rate))
     return found
 
@@ -114,13 +118,14 @@ def margins(linkages: Iterable[str], wanted: Iterable[tuple[str, Method, str]]) 
 
 def count(cases: int) -> int:
     """How many runs `runs` has on so many cases."""
-    tried = sum(len(methods(a, b)) for a, b in product((DIRECT, MOBILITY), BIAS))
-    return cases * (tried * len(COLUMNS) + 2 * len(BIAS))
+    every = product((DIRECT, MOBILITY), BIAS, COLUMNS)
+    return cases * (sum(len(methods(*cell)) for cell in every) + 2 * len(BIAS))
 
 
 def count_apart(cases: int) -> int:
-    """How many runs `kept_apart_runs` has at most on so many cases."""
-    return cases * (2 * 2 * len(BIAS) * (len(COLUMNS) + 1) + 2 * len(BIAS))
+    """How many runs `kept_apart_runs` has on so many cases."""
+    every = product((DIRECT, MOBILITY), BIAS, (*COLUMNS, KEPT_APART))
+    return cases * (sum(len(methods_apart(*cell)) for cell in every) + 2 * len(BIAS))
 
 
 def mapped(method: Method) -> bool:
@@ -130,11 +135,14 @@ def mapped(method: Method) -> bool:
 
 
 def all_margins() -> list[tuple[str, Method, str]]:
-    """Every method with rk4 that a map vouches for, at all fixed rates."""
-    direct = filter(mapped, (Method(hold, gains) for hold, gains in product(HOLDS, GAINS)))
-    held = dict.fromkeys(of_map(MOBILITY, m) for m in methods(MOBILITY, "none"))
-    every = [(DIRECT, m) for m in direct] + [(MOBILITY, m) for m in held]
-    return [(arrangement, m, rate) for (arrangement, m), rate in product(every, RATES)]
+    """Every method with rk4 that a map vouches for, at the fixed rates at which it is tried."""
+    every = (
+        (arrangement, of_map(arrangement, method), rate)
+        for arrangement, rate in product((DIRECT, MOBILITY), RATES)
+        for method in methods(arrangement, "none", rate)
+        if mapped(method) and method.integrator == "rk4"
+    )
+    return list(dict.fromkeys(every))
 
 
 def of_map(arrangement: str, method: Method) -> Method:
@@ -143,13 +151,16 @@ def of_map(arrangement: str, method: Method) -> Method:
     return method._replace(hold="zoh") if arrangement == MOBILITY else method
 
 
-def kept_apart_runs(
-    cases: Sequence[Case], methods: Mapping[tuple[str, str, str], Method]
-) -> list[Job]:
-    """The method of each (arrangement, bias, rate) on the cases kept apart, and beside it `zoh`
-    with the same gains."""
+def methods_apart(arrangement: str, bias: str, rate: str) -> list[Method]:
+    """The methods that are tried on the cases kept apart."""
+    return [m for m in methods(arrangement, bias, rate) if m.candidate]
+
+
+def kept_apart_runs(cases: Sequence[Case]) -> list[Job]:
+    """Runs of the cases kept apart, by which advice is compared with the best of all methods."""
     found = [*references(cases)]
-    for (arrangement, bias, rate), method in methods.items():
-        for each in dict.fromkeys((method, Method("zoh", method.gains))):
-            found += [run(arrangement, case, each, bias, rate) for case in cases]
+    for cell in product((DIRECT, MOBILITY), BIAS, (*COLUMNS, KEPT_APART)):
+        arrangement, bias, rate = cell
+        for method, case in product(methods_apart(*cell), cases):
+            found.append(run(arrangement, case, method, bias, rate))
     return found

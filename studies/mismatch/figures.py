@@ -1,5 +1,4 @@
-"""Heat maps of the study: methods against graphics rates, a number in each cell, a colour bar with
-its unit. Cells without a number are hatched, and the legend says why."""
+"""Figures of the study: numbers over the graphics rate, a line for each of a few methods."""
 
 from __future__ import annotations
 
@@ -8,29 +7,24 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from studies.report.draw import save
-
-
-class Square(NamedTuple):
-    """What a cell shows: a value, or None with a text; `marked` is drawn in bold with a frame."""
-
-    value: float | None
-    text: str = ""
-    marked: bool = False
+from studies.mismatch.methods import RATES, VARIABLE
+from studies.report.draw import BLUE, GREEN, GREY, ORANGE, panels, save
 
 
-Panel = tuple[str, Mapping[str, Mapping[str, Square]]]
-"""A heading, and squares by row and column."""
-STRONGEST = 20.0
-"""Where a signed scale ends."""
-HATCH: dict[str, Any] = {
-    "facecolor": "0.88",
-    "edgecolor": "0.65",
-    "hatch": "////",
-    "linewidth": 0.0,
-}
+class Point(NamedTuple):
+    """A number at a rate; hollow unless `whole`, ringed where `taken`."""
+
+    value: float
+    whole: bool = True
+    taken: bool = False
+
+
+Panel = tuple[str, Mapping[str, Mapping[str, Point]]]
+"""A heading, and points by line and rate."""
+COLOURS = (BLUE, ORANGE, GREEN, "#cc79a7")
+"""Of the lines that a figure names; all others are grey."""
+APART = 90.0
+"""Where on the axis the rate that varies is drawn, with no line to it."""
 
 
 def short(value: float | None) -> str:
@@ -40,88 +34,78 @@ def short(value: float | None) -> str:
     return f"{float(f'{value:.2g}'):.10g}"
 
 
-def maps(
+def lines(
     folder: Path,
     name: str,
     title: str,
-    panels: Sequence[Panel],
+    drawn: Sequence[Panel],
     unit: str,
-    without: str,
-    marked: str = "",
+    named: Sequence[str],
+    *,
+    hollow: str = "",
     scale: str = "log",
+    others: str = "other holds",
 ) -> str:
-    """Draws panels side by side with one colour scale; returns the file's name. unit: the label of
-    the colour bar; without, marked: what hatched and framed cells mean; scale: "log",
-    "linear", or "signed", a linear one around 0."""
-    from matplotlib import colormaps
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
+    """Draws panels side by side with one scale; returns the file's name. named: the lines with a
+    colour; hollow: what hollow points mean; scale: as Matplotlib names it."""
+    from matplotlib.ticker import LogLocator
 
-    rows = max(len(squares) for _, squares in panels)
-    figure = Figure(figsize=(2.6 + 4.2 * len(panels), 2.1 + 0.33 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(1, len(panels), squeeze=False, sharey=True)[0]
-    values = [s.value for _, p in panels for by in p.values() for s in by.values()]
-    norm = _norm([v for v in values if v is not None], scale)
-    colours = colormaps["RdBu" if scale == "signed" else "viridis_r"]
-    for each, (heading, squares) in zip(axes, panels, strict=True):
-        _map(each, squares, norm, colours)
-        each.set_title(heading, fontsize="medium")
-    bar = figure.colorbar(ScalarMappable(norm, colours), ax=list(axes), label=unit)
-    bar.ax.yaxis.set_major_formatter("{x:g}")
-    narrow = 0 < norm.vmax < 20 * norm.vmin
-    bar.ax.yaxis.set_minor_formatter("{x:g}" if narrow else "")
-    patches = [Patch(**HATCH, label=without)] if None in values else []
-    if marked:
-        patches.append(Patch(facecolor="white", edgecolor="black", linewidth=1.6, label=marked))
-    if patches:
-        figure.legend(handles=patches, loc="outside lower center", ncols=2, fontsize="small")
-    figure.suptitle(fill(title, 46 * len(panels) + 10))
+    figure, every = panels(len(drawn), width=5.2, height=4.4, sharey=True)
+    for axes, (heading, by_line) in zip(every, drawn, strict=True):
+        for label, points in by_line.items():
+            _line(axes, label, points, named, others)
+        axes.set_title(heading, fontsize="medium")
+        axes.set_yscale(scale, **({"linthresh": 1.0} if scale == "symlog" else {}))
+        if scale == "log":
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_xscale("log")
+        axes.set_xlabel("graphics rate (Hz)")
+        axes.set_xticks([*map(float, RATES), APART], [*RATES, VARIABLE], fontsize="x-small")
+        axes.minorticks_off()
+    every[0].set_ylabel(unit)
+    found: dict[str, Any] = {}
+    for axes in every:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    shown = {label: found[label] for label in (*named, others) if label in found}
+    shown |= _marks(drawn, hollow)
+    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 2 * len(drawn)}
+    figure.legend(shown.values(), shown.keys(), fontsize="small", **where)
+    figure.suptitle(fill(title, 46 * len(drawn) + 10))
     return save(figure, folder, name)
 
 
-def _norm(values: Sequence[float], scale: str) -> Any:
-    from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
+def _line(
+    axes: Any, label: str, points: Mapping[str, Point], named: Sequence[str], others: str
+) -> None:
+    """One line, its points, and the one at the rate that varies."""
+    front = label in named
+    style: dict[str, Any] = {
+        "color": COLOURS[list(named).index(label)] if front else GREY,
+        "alpha": 1.0 if front else 0.5,
+        "linewidth": 1.6 if front else 0.7,
+        "zorder": 3 if front else 2,
+        "label": label if front else others,
+    }
+    fixed = {float(rate): p for rate, p in points.items() if rate != VARIABLE}
+    axes.plot(list(fixed), [p.value for p in fixed.values()], **style)
+    for x, p in (*fixed.items(), *((APART, p) for r, p in points.items() if r == VARIABLE)):
+        if front:
+            face = style["color"] if p.whole else "white"
+            axes.plot(x, p.value, "o", ms=4.5, mfc=face, mec=style["color"], zorder=4)
+        if p.taken:
+            axes.plot(x, p.value, "o", ms=10, mfc="none", mec="black", zorder=5)
 
-    most = max((abs(v) for v in values), default=1.0)
-    if scale == "signed":
-        most = min(most, STRONGEST)
-        return TwoSlopeNorm(0.0, -most, most)
-    if scale == "linear":
-        return Normalize(0.0, most)
-    least = min((v for v in values if v > 0), default=most)
-    return LogNorm(min(least, 0.99 * most), most, clip=True)
 
+def _marks(drawn: Sequence[Panel], hollow: str) -> dict[str, Any]:
+    """Legend entries of hollow and ringed points, where there are any."""
+    from matplotlib.lines import Line2D
 
-def _map(axes: Any, squares: Mapping[str, Mapping[str, Square]], norm: Any, colours: Any) -> None:
-    from matplotlib.patches import Rectangle
-
-    columns = list(next(iter(squares.values())))
-    for i, by in enumerate(squares.values()):
-        for k, column in enumerate(columns):
-            square, corner = by[column], (k - 0.5, i - 0.5)
-            if square.value is None:
-                axes.add_patch(Rectangle(corner, 1, 1, **HATCH))
-                dark = "0.3"
-            else:
-                shade = colours(float(norm(square.value)))
-                axes.add_patch(Rectangle(corner, 1, 1, facecolor=shade, edgecolor="white"))
-                dark = "white" if np.dot(shade[:3], (0.3, 0.6, 0.1)) < 0.5 else "black"
-            text = square.text or short(square.value)
-            weight = "bold" if square.marked else "normal"
-            axes.text(k, i, text, ha="center", va="center", fontsize=8, color=dark, weight=weight)
-            if square.marked:
-                inner = (k - 0.46, i - 0.44)
-                frame: dict[str, Any] = {
-                    "fill": False,
-                    "edgecolor": "black",
-                    "linewidth": 1.6,
-                    "zorder": 3,
-                }
-                axes.add_patch(Rectangle(inner, 0.92, 0.88, **frame))
-    axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(squares) - 0.5, -0.5))
-    axes.set_xticks(range(len(columns)), columns)
-    axes.set_yticks(range(len(squares)), list(squares))
-    axes.set_xlabel("graphics rate (Hz)")
+    every = [p for _, by in drawn for points in by.values() for p in points.values()]
+    found = {}
+    if not all(p.whole for p in every):
+        found[hollow] = Line2D([], [], ls="", marker="o", ms=4.5, mfc="white", mec="black")
+    if any(p.taken for p in every):
+        found["advised"] = Line2D([], [], ls="", marker="o", ms=10, mfc="none", mec="black")
+    return found

@@ -12,7 +12,7 @@ import numpy as np
 
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import CONTINUOUS, DIRECT, MOBILITY, REFERENCE, mapped
-from studies.mismatch.figures import Panel, Square, maps, short
+from studies.mismatch.figures import Panel, Point, lines, short
 from studies.mismatch.findings import COMPENSATION, Found, both
 from studies.mismatch.measure import COUPLING, KICK, MARGIN, RUN, draw, stable
 from studies.mismatch.method_choice import LEAST, SHARE, energy, margin, within
@@ -20,16 +20,22 @@ from studies.mismatch.methods import (
     BIAS,
     COLUMNS,
     COMPARED,
+    FEW,
     GAINS,
     HOLDS,
     INTEGRATORS,
+    LIKELY,
     OF_MATRICES,
     RATES,
     REPORT,
     Method,
 )
 
-UNSTABLE = "unstable in some draw; number of stable draws"
+SOME = "some draws unstable; of the others"
+NAMED = ("zoh", "foh", "second-order", "passive")
+"""The holds that have a colour."""
+STRONGEST = 20.0
+"""Growth (1/s) at which the figure of margins ends."""
 Rows = Mapping[str, Row]
 
 
@@ -41,37 +47,30 @@ def sections(folder: Path, found: Found) -> Iterator[str]:
     yield _modelling(found)
 
 
-def _rows(found: Found, arrangement: str, bias: str, rate: str, method: Method) -> Rows:
-    return found.cells[arrangement, bias, rate][method]
-
-
-def _all_stable(rows: Iterable[Row]) -> bool:
-    return all(map(stable, rows))
-
-
-def _square(rows: Rows, value: Callable[[Row], float], of: Callable[..., float]) -> Square:
-    """A number of the draws; where one is unstable, how many are not."""
-    if not _all_stable(rows.values()):
-        return Square(None, f"{sum(map(stable, rows.values()))}/{len(rows)}")
-    return Square(float(of([value(r) for r in rows.values()])))
+def _point(rows: Rows, value: Callable[[Row], float], of: Callable[..., float]) -> Point | None:
+    """A number of the stable draws, if that is half of them at least."""
+    good = [value(row) for row in rows.values() if stable(row)]
+    whole = len(good) == len(rows)
+    return Point(float(of(good)), whole) if good and 2 * len(good) >= len(rows) else None
 
 
 def _by_hold(
     found: Found, arrangement: str, value: Callable[[Row], float], of: Callable[..., float]
 ) -> list[Panel]:
-    """Panels by model: holds against rates, with the gains that were taken for the cell."""
-    panels: list[Panel] = []
+    """Panels by model: a line for each hold, with the gains that were taken for the cell."""
+    drawn: list[Panel] = []
     for bias in BIAS:
-        squares: dict[str, dict[str, Square]] = {}
+        by_line: dict[str, dict[str, Point]] = {}
         holds = OF_MATRICES if arrangement == MOBILITY else HOLDS
         for hold, rate in product(holds, COLUMNS):
-            taken = found.methods[arrangement, bias, rate]
-            rows = _rows(found, arrangement, bias, rate, Method(hold, taken.gains))
-            advised = found.advice[arrangement, bias, rate].method
-            marked = advised is not None and advised.hold == hold
-            squares.setdefault(hold, {})[rate] = _square(rows, value, of)._replace(marked=marked)
-        panels.append((COMPENSATION[bias], squares))
-    return panels
+            chosen = found.advice[arrangement, bias, rate]
+            tried = found.cells[arrangement, bias, rate]
+            rows = tried.get(Method(hold, chosen.best.gains), {})
+            if point := _point(rows, value, of):
+                taken = chosen.admitted and chosen.best.hold == hold
+                by_line.setdefault(hold, {})[rate] = point._replace(taken=taken)
+        drawn.append((COMPENSATION[bias], by_line))
+    return drawn
 
 
 def _text(text: str, figure: str, alt: str) -> str:
@@ -79,102 +78,99 @@ def _text(text: str, figure: str, alt: str) -> str:
 
 
 def _gains(folder: Path, found: Found) -> Iterator[str]:
-    panels: list[Panel] = []
+    drawn: list[Panel] = []
     for bias in BIAS:
-        squares = {g: {r: Square(_share(found, bias, g, r)) for r in COLUMNS} for g in GAINS}
-        panels.append((COMPENSATION[bias], squares))
+        by_line: dict[str, dict[str, Point]] = {}
+        for gains, rate in product(GAINS, COLUMNS):
+            if (share := _share(found, bias, gains, rate)) is not None:
+                by_line.setdefault(gains, {})[rate] = Point(share)
+        drawn.append((COMPENSATION[bias], by_line))
     low = [short(_share(found, "none", g, "10")) for g in GAINS]
     title = (
         f"Gains decide before holds: at 10 Hz, without Coriolis compensation, {low[0]} % of the "
         f"runs keep the limits with soft gains, {low[1]} % with medium, {low[2]} % with stiff ones"
     )
-    unit = "runs within the limits (%), all holds"
-    made = maps(folder, "gains.png", title, panels, unit, "not tried", scale="linear")
+    unit = f"runs within the limits (%), {len(LIKELY)} holds"
+    made = lines(folder, "gains.png", title, drawn, unit, list(GAINS), scale="linear")
     yield _text(f"{title}.", made, "Runs within the limits by gains and rate")
 
 
 def _share(found: Found, bias: str, gains: str, rate: str) -> float | None:
-    """Runs within the limits (%), over holds and draws; None where there are none."""
+    """Runs within the limits (%), over LIKELY holds and draws; None where there are none."""
     cell = found.cells[DIRECT, bias, rate]
-    rows = [r for hold in HOLDS for r in cell.get(Method(hold, gains), {}).values()]
+    rows = [r for hold in LIKELY for r in cell.get(Method(hold, gains), {}).values()]
     return 100 * float(np.mean([within(r) for r in rows])) if rows else None
 
 
 def _tracking(folder: Path, found: Found) -> Iterator[str]:
-    panels = _by_hold(found, DIRECT, lambda r: r[METRIC], np.median)
+    drawn = _by_hold(found, DIRECT, lambda r: r[METRIC], np.median)
     cells = [(b, r) for b in BIAS for r in COLUMNS]
-    first = sum(found.methods[DIRECT, b, r].hold == "zoh" for b, r in cells)
-    none = [r for r in COLUMNS if all(by[r].value is None for _, p in panels for by in p.values())]
-    title = f"zoh is what the answer takes in {first} of {len(cells)} columns"
+    first = sum(found.advice[DIRECT, b, r].best.hold == "zoh" for b, r in cells)
+    title = f"zoh is the best hold in {first} of {len(cells)} rows"
+    none = [
+        r for r in COLUMNS if not any(r in p and p[r].whole for _, by in drawn for p in by.values())
+    ]
     if none:
         title += f"; at {both(none)} Hz no hold is stable in every draw"
     unit = "largest |x_S - x_D| (mm), median"
-    made = maps(folder, "tracking.png", title, panels, unit, UNSTABLE, "advised")
+    made = lines(folder, "tracking.png", title, drawn, unit, NAMED, hollow=SOME)
     text = (
-        f"{title}. Each column has the gains that the answer takes for it. `foh` has a smaller "
-        f"median than `zoh` in {_fewer(panels)} columns in which both are stable in every draw."
+        f"{title}. Each rate has the gains that the table takes for it, which change with a rate, "
+        f"and the errors with them. `foh` has a smaller median than `zoh` at {_fewer(drawn)} rates "
+        "at which both are stable in every draw."
     )
     yield _text(text, made, "Tracking error by hold and rate")
 
 
-def _fewer(panels: Iterable[Panel]) -> str:
-    """In how many columns `foh` has a smaller number than `zoh`, of those with both."""
-    both_known = [
-        (foh, zoh)
-        for _, squares in panels
-        for rate in COLUMNS
-        if (foh := squares["foh"][rate].value) is not None
-        and (zoh := squares["zoh"][rate].value) is not None
+def _fewer(drawn: Iterable[Panel]) -> str:
+    """At how many rates `foh` has a smaller number than `zoh`, of those with both."""
+    pairs = [
+        (by["foh"][rate], by["zoh"][rate])
+        for _, by in drawn
+        for rate in by.get("foh", {})
+        if rate in by.get("zoh", {})
     ]
-    return f"{sum(foh < zoh for foh, zoh in both_known)} of {len(both_known)}"
+    whole = [(foh.value, zoh.value) for foh, zoh in pairs if foh.whole and zoh.whole]
+    return f"{sum(foh < zoh for foh, zoh in whole)} of {len(whole)}"
 
 
 def _energy(folder: Path, found: Found) -> Iterator[str]:
-    panels = _by_hold(found, DIRECT, lambda r: 100 * energy(r), np.max)
-    squares = [s for _, p in panels for by in p.values() for s in by.values()]
-    known = [s.value for s in squares if s.value is not None]
+    drawn = _by_hold(found, DIRECT, lambda r: max(1.0, 100 * energy(r)), np.max)
+    known = [p.value for _, by in drawn for ps in by.values() for p in ps.values() if p.whole]
     over = sum(v > 100 for v in known)
     title = (
         f"{over} of {len(known)} combinations that are stable in every draw generate more "
         "energy at the user's port than is allowed"
     )
     unit = "peak generated (% of what is allowed)"
-    shown = [
-        (h, {n: {r: _at_least(s) for r, s in by.items()} for n, by in p.items()}) for h, p in panels
-    ]
-    made = maps(folder, "energy.png", title, shown, unit, UNSTABLE, "advised")
+    made = lines(folder, "energy.png", title, drawn, unit, NAMED, hollow=SOME)
     text = (
         f"{title}: {SHARE:.0%} of the hand's work, and at least {1e3 * LEAST:g} mJ. `foh` "
-        f"generates less than `zoh` in {_fewer(panels)} columns. A stable run is not yet a passive "
+        f"generates less than `zoh` at {_fewer(drawn)} rates. A stable run is not yet a passive "
         "one, which tracking errors do not show."
     )
     yield _text(text, made, "Energy at the user's port by hold and rate")
 
 
-def _at_least(square: Square) -> Square:
-    """A square whose number fits a logarithmic scale."""
-    return square if square.value is None else square._replace(value=max(square.value, 1.0))
-
-
 def _margins(folder: Path, found: Found) -> Iterator[str]:
     holds = [h for h in HOLDS if mapped(Method(h, "soft"))]
-    panels: list[Panel] = []
+    drawn: list[Panel] = []
     for gains in GAINS:
-        squares: dict[str, dict[str, Square]] = {}
+        by_line: dict[str, dict[str, Point]] = {}
         for hold, rate in product(holds, RATES):
             least = margin(found.margins, DIRECT, Method(hold, gains), rate)
-            square = Square(least, marked=least is not None and least < 0)
-            squares.setdefault(hold, {})[rate] = square
-        panels.append((f"{gains} gains", squares))
-    every = [s for _, p in panels for by in p.values() for s in by.values()]
-    bad = sum(s.marked for s in every)
+            if least is not None:
+                by_line.setdefault(hold, {})[rate] = Point(max(-STRONGEST, least), least > 0)
+        drawn.append((f"{gains} gains", by_line))
+    every = [p for _, by in drawn for points in by.values() for p in points.values()]
+    bad = sum(not p.whole for p in every)
     title = (
         f"At rest in an arm of 300 N/m, {bad} of {len(every)} combinations are unstable on "
         "some linkage"
     )
-    unit = "margin (1/s), colours end at 20"
-    made = maps(
-        folder, "margins.png", title, panels, unit, "no equilibrium found", "unstable", "signed"
+    unit = f"margin (1/s), drawn from {-STRONGEST:g} on"
+    made = lines(
+        folder, "margins.png", title, drawn, unit, NAMED[:3], hollow="unstable", scale="symlog"
     )
     yield _text(f"{title}. {_signs(found)}", made, "Stability margin by hold, rate and gains")
 
@@ -200,33 +196,32 @@ def _signs(found: Found) -> str:
 
 
 def _integrators(folder: Path, found: Found) -> Iterator[str]:
-    ratios: dict[str, list[float]] = {i: [] for i in INTEGRATORS}
-    squares: dict[str, dict[str, Square]] = {}
-    for hold, integrator, rate in product(COMPARED, INTEGRATORS, COLUMNS):
-        rows = _rows(found, DIRECT, "none", rate, Method(hold, "medium", integrator))
-        by_rk4 = _rows(found, DIRECT, "none", rate, Method(hold, "medium"))
-        ratios[integrator] += [
-            rows[c][METRIC] / by_rk4[c][METRIC]
-            for c in rows
-            if stable(rows[c]) and stable(by_rk4[c])
-        ]
-        square = _square(rows, lambda r: r[METRIC], np.median)
-        squares.setdefault(f"{hold}; {integrator}", {})[rate] = square
-    others = [i for i in INTEGRATORS if i != "rk4"]
-    middle = {i: float(np.median(ratios[i])) for i in others if ratios[i]}
+    ratios: dict[str, list[float]] = {i: [] for i in INTEGRATORS if i != "rk4"}
+    by_line: dict[str, dict[str, Point]] = {}
+    sound = Counter[str]()
+    for hold, integrator, rate in product(COMPARED, INTEGRATORS, FEW):
+        cell = found.cells[DIRECT, "none", rate]
+        rows = cell[Method(hold, "medium", integrator)]
+        by_rk4 = cell[Method(hold, "medium")]
+        sound[integrator] += all(map(stable, rows.values()))
+        good = [c for c in rows if stable(rows[c]) and stable(by_rk4[c])]
+        if integrator != "rk4" and good:
+            found_here = [rows[c][METRIC] / by_rk4[c][METRIC] for c in good]
+            ratios[integrator] += found_here
+            point = Point(float(np.median(found_here)))
+            by_line.setdefault(f"{hold}; {integrator}", {})[rate] = point
+    middle = {i: float(np.median(r)) for i, r in ratios.items() if r}
     stated = ", ".join(f"{short(v)} with {i}" for i, v in middle.items())
     title = f"Tracking error relative to rk4 with the same hold and medium gains: {stated}"
-    unit = "largest |x_S - x_D| (mm), median"
-    panels: list[Panel] = [(COMPENSATION["none"], squares)]
-    made = maps(folder, "integrators.png", title, panels, unit, UNSTABLE)
+    drawn: list[Panel] = [(COMPENSATION["none"], by_line)]
+    unit = "error relative to rk4, median"
+    made = lines(folder, "integrators.png", title, drawn, unit, list(by_line), scale="linear")
     quarters = "; ".join(
         f"{i} {' to '.join(short(q) for q in np.quantile(ratios[i], [0.25, 0.75]))}" for i in middle
     )
-    sound = [(name, square) for name, by in squares.items() for square in by.values()]
-    counts = {i: sum(s.value is not None for n, s in sound if n.endswith(i)) for i in INTEGRATORS}
-    kept = ", ".join(f"{count} with {i}" for i, count in counts.items())
+    kept = ", ".join(f"{count} with {i}" for i, count in sound.items())
     text = (
-        f"{title} (medians within draws; quartiles {quarters}). Of {len(COMPARED) * len(COLUMNS)} "
+        f"{title} (medians within draws; quartiles {quarters}). Of {len(COMPARED) * len(FEW)} "
         f"cells, stable in every draw: {kept}. The passive midpoint rule makes no energy of its "
         "own; what the holds make is not its matter."
     )
@@ -234,22 +229,22 @@ def _integrators(folder: Path, found: Found) -> Iterator[str]:
 
 
 def _mobility(folder: Path, found: Found) -> Iterator[str]:
-    panels = _by_hold(found, MOBILITY, lambda r: r[COUPLING], np.median)
+    drawn = _by_hold(found, MOBILITY, lambda r: r[COUPLING], np.median)
     ratios = []
-    for (_, squares), rate in product(panels, COLUMNS):
-        values = [v for by in squares.values() if (v := by[rate].value) is not None]
-        if own := squares["zoh"][rate].value:
-            ratios.append(min(values) / own)
+    for (_, by_line), rate in product(drawn, COLUMNS):
+        values = {h: p[rate].value for h, p in by_line.items() if rate in p and p[rate].whole}
+        if "zoh" in values:
+            ratios.append(min(values.values()) / values["zoh"])
     gain = 100 * (1 - float(np.median(ratios))) if ratios else float("nan")
     title = (
         "With Lambda^-1 and P_c held, the best hold of a rate moves the handle off by "
         f"{gain:.0f} % less than zoh"
     )
     unit = "handle off (mm), median"
-    made = maps(folder, "mobility.png", title, panels, unit, UNSTABLE, "advised")
+    made = lines(folder, "mobility.png", title, drawn, unit, OF_MATRICES, hollow=SOME)
     text = (
-        f"{title} (median of the columns). It is the distance from the continuous run within 1 s. "
-        "Each column has the gains that the answer takes for it."
+        f"{title} (median of the rates). It is the distance from the continuous run within 1 s. "
+        "Each rate has the gains that the table takes for it."
     )
     yield _text(f"{text}{_lost(found)}", made, "Coupling error with Lambda^-1 held")
 
@@ -258,27 +253,32 @@ def _lost(found: Found) -> str:
     """The draws that no hold and no rate keeps stable at the report's gains, and whether they are
     where nothing is held."""
     every = [
-        _rows(found, MOBILITY, bias, rate, Method(hold, REPORT))
-        for bias, rate, hold in product(BIAS, COLUMNS, OF_MATRICES)
+        found.cells[MOBILITY, "none", rate][Method(hold, REPORT)]
+        for rate, hold in product(FEW, OF_MATRICES)
     ]
     lost = [name for name in every[0] if not any(stable(rows[name]) for rows in every)]
     if not lost:
         return ""
     by_case = Counter(every[0][name]["case"] for name in lost)
     where = "; ".join(f"{case} ({n})" for case, n in by_case.items())
-    alone = [r for r in found.runs if r["arrangement"] == CONTINUOUS and draw(r) in lost]
-    sound = sum(stable(r) for r in alone if r["rate"] == str(REFERENCE))
+    alone = (r for r in _continuous(found) if r["bias"] == "none" and draw(r) in lost)
+    sound = sum(map(stable, alone))
     return (
         f" With the report's gains, {len(lost)} of {len(every[0])} draws are unstable with every "
-        f"hold at every graphics rate: {where}. Of the same blocks at {REFERENCE} Hz {sound} of "
-        f"{len(lost) * len(BIAS)} runs are stable: where these are, it is not the graphics rate, "
+        f"hold at {both(FEW)} Hz: {where}. Of the same blocks at {REFERENCE} Hz {sound} of "
+        f"{len(lost)} runs are stable: where these are, it is not the graphics rate, "
         "but 512 Hz that is too slow for these gains."
     )
 
 
+def _continuous(found: Found) -> list[Row]:
+    every = (r for r in found.runs if r["arrangement"] == CONTINUOUS)
+    return [r for r in every if r["rate"] == str(REFERENCE)]
+
+
 def _modelling(found: Found) -> str:
     """What leaving out Coriolis and centrifugal terms costs where nothing is held."""
-    rows = [r for r in found.runs if r["arrangement"] == CONTINUOUS and r["rate"] == str(REFERENCE)]
+    rows = _continuous(found)
     by = {b: [r[METRIC] for r in rows if r["bias"] == b] for b in BIAS}
     worst = max((r for r in rows if r["bias"] == "full"), key=lambda r: r[METRIC])
     text = (

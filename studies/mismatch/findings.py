@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from hapticlink.analysis.sweep.row import METRIC, Row
-from studies.mismatch.figures import short
-from studies.mismatch.method_choice import Cell, Cells, Choice, Margins, quartiles
+from hapticlink.analysis.sweep.row import Row
+from studies.mismatch.method_choice import Cell, Cells, Choice, Margins
 from studies.mismatch.methods import Method
 
 COMPENSATION = {"none": "Coriolis compensation off", "full": "Coriolis compensation on"}
@@ -16,14 +15,14 @@ COMPENSATION = {"none": "Coriolis compensation off", "full": "Coriolis compensat
 @dataclass(frozen=True)
 class Found:
     """runs: those by which methods were chosen, with the continuous ones; cells: the same by cell,
-    method and case; margins: at rest; advice: by cell; methods: what was taken along to the cases
-    kept apart, of which `tried` are the runs and `margins_apart` the maps."""
+    method and case; margins: at rest; advice and `listed`, the methods to try: by cell, also of the
+    rate kept apart; `tried` and `margins_apart`: runs and maps of the cases kept apart."""
 
     runs: Sequence[Row]
     cells: Cells
     margins: Margins
     advice: Mapping[Cell, Choice]
-    methods: Mapping[Cell, Method]
+    listed: Mapping[Cell, Sequence[Method]]
     tried: Sequence[Row]
     margins_apart: Margins
 
@@ -32,14 +31,6 @@ def named(method: Method) -> str:
     """A method as text."""
     own = "" if method.integrator == "rk4" else f", {method.integrator}"
     return f"`{method.hold}`, {method.gains}{own}"
-
-
-def errors(rows: Sequence[Row]) -> str:
-    """Median, quartiles and largest tracking error (mm) of some runs."""
-    if not rows:
-        return "-"
-    low, middle, high, worst = map(short, quartiles(rows, METRIC))
-    return f"{middle} ({low} to {high}; {worst})"
 
 
 def both(names: Sequence[str]) -> str:

@@ -4,13 +4,17 @@ A method is admitted to a cell if every draw ends within its limits: stable, and
 energy generated at the user's port of at most SHARE of the hand's work (less than LEAST is not
 counted). Where a lifted map vouches for it, that one must be stable on every linkage, too.
 
-Of two admitted methods one is better beyond the spread if its error is smaller in more than three
-quarters of the draws. The best one has the smallest median of log(error/mean of the draw); those
-that it does not beat beyond the spread are ties, of which the simplest is advised.
+Of the admitted methods the one with the smallest median of log(error/mean of the draw) is advised.
+Those that it does not beat beyond the spread, by a smaller error in more than three quarters of the
+draws, are as good.
 
 Where none is admitted nothing is advised. Then the best one keeps the limits in the most draws, and
 beats another beyond the spread if a sign test says so at LEVEL: of the n draws in which one of the
 two alone keeps them it has at least k, where P(at least k heads of n tosses) < LEVEL.
+
+No method has nearly the smallest error in every case. So a cell has a list to try, too: LISTED
+methods, the one above first, each next one that with which the smallest error of the list is within
+NEAR of that of all methods in the most cases.
 """
 
 from __future__ import annotations
@@ -22,16 +26,17 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.analysis.findings.user_port import LEAST, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import MOBILITY, of_map
 from studies.mismatch.measure import COUPLING, MARGIN, PEAK, WORK, draw, stable
 from studies.mismatch.methods import Method, order
 
-SHARE, LEAST = 0.25, 1e-3
-"""Share of the hand's work, and energy (J): what moves the handle at 8 cm/s."""
 LEVEL = 0.05
+NEAR, LISTED = 1.1, 5
 Cell = tuple[str, str, str]
 """Arrangement, bias and rate."""
+Listed = tuple[Method, ...]
 Cells = Mapping[Cell, Mapping[Method, Mapping[str, Row]]]
 """The rows by cell, method and draw."""
 Margins = Mapping[tuple[str, Method, str], Mapping[str, Row]]
@@ -83,22 +88,22 @@ def metric(arrangement: str) -> str:
 
 @dataclass(frozen=True)
 class Choice:
-    """The advice for a cell. method: None if none is admitted; best: that of the smallest error,
-    or which keeps the limits in the most draws; ties: all that it does not beat, from the simplest
+    """The advice for a cell. best: that of the smallest error, or, where none is admitted, which
+    keeps the limits in the most draws; ties: all others that it does not beat, from the simplest
     on. `most` of the `of` draws stay within the limits with `best`, and `lost` are unstable."""
 
     cell: Cell
-    method: Method | None
     best: Method
     ties: tuple[Method, ...]
     most: int
     of: int
     lost: int
+    admitted: bool
 
     @property
-    def taken(self) -> Method:
-        """What is advised, or the best where nothing is."""
-        return self.method or self.best
+    def method(self) -> Method | None:
+        """What is advised, if anything is."""
+        return self.best if self.admitted else None
 
 
 def choice(
@@ -109,7 +114,7 @@ def choice(
 ) -> Choice:
     """The advice for a cell, with `share` as the limit of energy."""
     arrangement, _, rate = cell
-    simple = sorted(by_method, key=order)
+    simple = sorted((m for m in by_method if m.candidate), key=order)
     draws = sorted(by_method[simple[0]])
     kept = {m: np.array([within(by_method[m][d], share) for d in draws]) for m in simple}
     least = {m: margin(at, arrangement, m, rate) for m in simple}
@@ -117,14 +122,50 @@ def choice(
     able = [m for m in sound if kept[m].all()]
     if not able:
         best = max(sound or simple, key=lambda m: int(kept[m].sum()))
-        ties = tuple(m for m in sound if not more(kept[best], kept[m]))
+        ties = tuple(m for m in sound if m != best and not more(kept[best], kept[m]))
         lost = sum(not stable(row) for row in by_method[best].values())
-        return Choice(cell, None, best, ties, int(kept[best].sum()), len(draws), lost)
+        return Choice(cell, best, ties, int(kept[best].sum()), len(draws), lost, False)
     errors = {m: logs(by_method[m], metric(arrangement)) for m in able}
     mean = np.mean(list(errors.values()), axis=0)
     best = min(able, key=lambda m: float(np.median(errors[m] - mean)))
-    ties = tuple(m for m in able if np.quantile(errors[m] - errors[best], 0.25) <= 0.0)
-    return Choice(cell, ties[0], best, ties, len(draws), len(draws), 0)
+    even = (m for m in able if np.quantile(errors[m] - errors[best], 0.25) <= 0.0)
+    ties = tuple(m for m in even if m != best)
+    return Choice(cell, best, ties, len(draws), len(draws), 0, True)
+
+
+def to_try(cell: Cell, by_method: Mapping[Method, Mapping[str, Row]], first: Method) -> Listed:
+    """The list of a cell, from `first` on, in the order of what each adds."""
+    tried = {m: rows for m, rows in by_method.items() if m.candidate}
+    off, listed = relative(tried, metric(cell[0])), [first]
+    while len(listed) < min(LISTED, len(tried)):
+
+        def gain(m: Method) -> tuple[int, float]:
+            least = np.min([off[one] for one in (*listed, m)], axis=0)
+            return int((least <= NEAR).sum()), -float(np.minimum(np.log(least), 3.0).sum())
+
+        listed.append(max((m for m in tried if m not in listed), key=gain))
+    return tuple(listed)
+
+
+def relative(by_method: Mapping[Method, Mapping[str, Row]], of: str) -> dict[Method, list[float]]:
+    """By case, the error of each method (geometric mean of the case's draws) relative to the
+    smallest of the methods that keep the limits in all draws of the case; infinite where it keeps
+    them not itself. Cases in which none does are left out."""
+    names = sorted({row["case"] for row in next(iter(by_method.values())).values()})
+    size = {}
+    for m, rows in by_method.items():
+        mine = [[row for row in rows.values() if row["case"] == name] for name in names]
+        size[m] = np.array(
+            [
+                np.exp(np.mean([np.log(max(r[of], 1e-9)) for r in each]))
+                if all(map(within, each))
+                else np.inf
+                for each in mine
+            ]
+        )
+    least = np.min(list(size.values()), axis=0)
+    some = np.isfinite(least)
+    return {m: (found[some] / least[some]).tolist() for m, found in size.items()}
 
 
 def more(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:

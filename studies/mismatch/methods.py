@@ -6,12 +6,18 @@ from typing import NamedTuple
 
 from hapticlink.analysis.advise.methods import GAINS, HOLDS
 
-RATES = {"10": "512/51", "20": "512/26", "30": "512/17", "57": "512/9"}
-"""Graphics rates (Hz): whole haptic ticks a frame, so that the lifted map spans one frame."""
+TICKS = (51, 34, 26, 20, 17, 15, 13, 11, 10, 9, 8)
+RATES = {f"{512 / ticks:.0f}": f"512/{ticks}" for ticks in TICKS}
+"""Graphics rates (Hz), those next to 10, 15, ..., 60 with whole haptic ticks a frame, so that the
+lifted map spans one frame."""
 VARIABLE, LOW, HIGH = "10..60", 10, 60
 COLUMNS = (*RATES, VARIABLE)
-KEPT_APART = "24"
-"""A rate at which nothing is chosen, whose frames are no whole ticks."""
+FEW = ("10", "30", "57", VARIABLE)
+"""The rates at which all is tried, without Coriolis compensation; elsewhere of the holds LIKELY,
+and neither the report's gains nor the integrators."""
+LIKELY = ("zoh", "foh", "second-order", "passive", "foh-derivative, passive")
+KEPT_APART, NEAREST = "22", "20"
+"""A rate at which nothing is chosen, whose frames are no whole ticks, and the row it takes."""
 BIAS = ("none", "full")
 OF_MATRICES = ("zoh", "foh", "second-order", "delayed")
 """Holds that are tried on Lambda^-1 and P_c."""
@@ -28,6 +34,12 @@ class Method(NamedTuple):
     hold: str
     gains: str
     integrator: str = "rk4"
+
+    @property
+    def candidate(self) -> bool:
+        """Whether it can be advised: the report's gains and other integrators are compared at FEW
+        rates alone."""
+        return self.gains != REPORT and self.integrator == "rk4"
 
     @property
     def options(self) -> tuple[str, ...]:

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
 from textwrap import fill
 
 import numpy as np
 
+from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch import finding_figures, held_out_draws
 from studies.mismatch.cases import SEEDS
 from studies.mismatch.design import DIRECT, FLOOR, MOBILITY, REFERENCE, SUBSTEPS
 from studies.mismatch.figures import short
-from studies.mismatch.findings import COMPENSATION, Found, both, errors, named
-from studies.mismatch.measure import APART, COUPLING, floor, stable
+from studies.mismatch.findings import COMPENSATION, Found, both, named
+from studies.mismatch.measure import APART, COUPLING, MARGIN, floor, stable
 from studies.mismatch.method_choice import (
     LEAST,
     LEVEL,
+    NEAR,
     SHARE,
     Choice,
     choice,
@@ -26,8 +28,9 @@ from studies.mismatch.method_choice import (
     metric,
     over_seeds,
     quartiles,
+    relative,
 )
-from studies.mismatch.methods import BIAS, COLUMNS, VARIABLE
+from studies.mismatch.methods import BIAS, COLUMNS, FEW, LIKELY, TICKS, VARIABLE, Method
 
 WIDTH = 108
 
@@ -51,7 +54,7 @@ def _answer(found: Found) -> Iterator[str]:
         "Limits: the coupling stays stable, and sampling and holding generate at most "
         f"{SHARE:.0%} of the hand's work at the user's port. A method is advised where it keeps "
         "them in every draw; elsewhere nothing keeps them, and the best is named with what it does "
-        "keep."
+        "keep. At a rate that is not in a table take the row next to it."
     )
     yield "\n".join(
         paragraph(
@@ -60,31 +63,30 @@ def _answer(found: Found) -> Iterator[str]:
         for arrangement, place in ((DIRECT, "the graphics rate"), (MOBILITY, "512 Hz"))
         for bias in BIAS
     )
+    yield paragraph(held_out_draws.worth(found))
     yield paragraph(_where_to_run(found))
     yield "## The mechanism at the graphics rate"
     for bias in BIAS:
-        yield from _table(found, DIRECT, bias)
+        yield _table(found, DIRECT, bias)
     yield paragraph(
         "Gains K_pc (N/m, N/m, N.m/rad) and B_pc (N.s/m, N.s/m, N.m.s/rad): soft (25, 25, .01) and "
         "(5, 5, .002); medium (100, 100, .1) and (20, 20, .02), as in `closed-loop-direct`; stiff "
         "(100, 100, .5) and (70, 70, .375), the report's. `a, b` is hold `a` from slow to fast and "
         "`b` from fast to slow, without `b` the latest sample; `slope` is of the velocity from "
         "slow to fast. Within the limits: draws that are stable and keep the limit of energy at "
-        "the user's port (below). Error: "
-        "the largest |x_S - x_D| of a run, median of the stable draws (quartiles; worst); over "
-        f"seeds: the largest by the smallest of a case's {SEEDS} draws, median of the cases. "
-        "Handle off: distance of the handle from that of the same blocks run "
-        "continuously, within 1 s, median. Energy: the largest peak at the user's port, as a part "
-        "of what is allowed (below). Margin: decay rate of the slowest mode of the lifted map, in "
-        "an arm of 300 N/m, the smallest of the linkages; it is bounded by the arm's own modes. "
-        "An adaptive hold has no map. As good: other methods that the best one does not beat "
-        "beyond the spread. Where one is advised, that is a smaller error in more than three "
-        "quarters of the draws, and the simplest of all these is taken; where none is, keeping the "
-        f"limits in more draws by a sign test at {LEVEL:.0%}."
+        "the user's port (below). Error: the largest |x_S - x_D| of a run, median of the stable "
+        "draws (worst). As good: other methods that the best one does not beat beyond the spread: "
+        "where one is advised, by a smaller error in more than three quarters of the draws; where "
+        f"none is, by keeping the limits in more draws by a sign test at {LEVEL:.0%}. Try, too: no "
+        "method is the most accurate in every hand, so run these as well on your own scene, and "
+        "take the smallest error within the limits: each is that which adds most cases in which "
+        "the best of the row and these is within a tenth of the best of all methods. "
+        "[advice.csv](advice.csv) has quartiles, spread over seeds, coupling error, energy and "
+        "margin of each row."
     )
     yield "## The mechanism at 512 Hz, Lambda^-1 and P_c held (the report)"
     for bias in BIAS:
-        yield from _table(found, MOBILITY, bias)
+        yield _table(found, MOBILITY, bias)
 
 
 def _kept(found: Found, arrangement: str, bias: str) -> str:
@@ -112,7 +114,7 @@ def _where_to_run(found: Found) -> str:
     for bias in BIAS:
         at = []
         for arrangement, place in ((MOBILITY, "512 Hz"), (DIRECT, "30 Hz")):
-            taken = found.methods[arrangement, bias, "30"]
+            taken = found.advice[arrangement, bias, "30"].best
             rows = found.cells[arrangement, bias, "30"][taken].values()
             error = short(quartiles(filter(stable, rows), metric(DIRECT))[1])
             at.append(f"{error} mm for the mechanism at {place} ({named(taken)})")
@@ -120,30 +122,24 @@ def _where_to_run(found: Found) -> str:
     return text
 
 
-def _table(found: Found, arrangement: str, bias: str) -> Iterator[str]:
+def _table(found: Found, arrangement: str, bias: str) -> str:
     lines = [
         f"| {COMPENSATION[bias]}: graphics rate (Hz) | take | within the limits | error (mm) "
-        "| over seeds | handle off (mm) | energy | margin (1/s) | as good |",
-        "|---" * 9 + "|",
+        "| as good | try, too |",
+        "|---" * 6 + "|",
     ]
     for rate in COLUMNS:
         cell = (arrangement, bias, rate)
         chosen = found.advice[cell]
-        rows = [r for r in found.cells[cell][chosen.taken].values() if stable(r)]
-        off = short(quartiles(rows, COUPLING)[1])
-        least = margin(found.margins, arrangement, chosen.taken, rate)
+        rows = [r for r in found.cells[cell][chosen.best].values() if stable(r)]
+        _, middle, _, worst = map(short, quartiles(rows, METRIC))
+        error = f"{middle} ({worst})" if rows else "-"
+        taken = named(chosen.best) if chosen.admitted else f"nothing; best: {named(chosen.best)}"
         lines.append(
-            f"| {rate} | {_taken(chosen)} | {_within(chosen)} | "
-            f"{errors(rows)} | {short(over_seeds(rows, metric(DIRECT)))} | "
-            f"{off} | {short(max(map(energy, rows), default=None))} | {short(least) or '-'} | "
-            f"{_ties(chosen)} |"
+            f"| {rate} | {taken} | {_within(chosen)} | {error} | {_several(chosen.ties)} | "
+            f"{'; '.join(map(named, found.listed[cell][1:]))} |"
         )
-    yield "\n".join(lines)
-
-
-def _taken(chosen: Choice) -> str:
-    """What is advised, or that nothing is, and the best."""
-    return named(chosen.method) if chosen.method else f"nothing; best: {named(chosen.best)}"
+    return "\n".join(lines)
 
 
 def _within(chosen: Choice) -> str:
@@ -151,6 +147,42 @@ def _within(chosen: Choice) -> str:
     over = chosen.of - chosen.most - chosen.lost
     why = [f"{chosen.lost} unstable"] * (chosen.lost > 0) + [f"{over} by energy"] * (over > 0)
     return f"{chosen.most} of {chosen.of}" + (f" ({', '.join(why)})" if why else "")
+
+
+def _several(methods: Sequence[Method]) -> str:
+    """Up to three methods, by name."""
+    more = f" and {len(methods) - 3} more" if len(methods) > 3 else ""
+    return "; ".join(map(named, methods[:3])) + more if methods else "none"
+
+
+def table_rows(found: Found) -> Iterator[Row]:
+    """What is known of the method of each row of the tables, for advice.csv."""
+    for (arrangement, bias, rate), chosen in found.advice.items():
+        if rate not in COLUMNS:
+            continue
+        cell = (arrangement, bias, rate)
+        rows = [r for r in found.cells[cell][chosen.best].values() if stable(r)]
+        low, middle, high, worst = quartiles(rows, METRIC)
+        yield {
+            "arrangement": arrangement,
+            "bias": bias,
+            "rate": rate,
+            **chosen.best._asdict(),
+            "advised": chosen.admitted,
+            "within": chosen.most,
+            "of": chosen.of,
+            "unstable": chosen.lost,
+            "tracking_mm": middle,
+            "tracking_lower_mm": low,
+            "tracking_upper_mm": high,
+            "tracking_worst_mm": worst,
+            "over_seeds": over_seeds(rows, METRIC),
+            COUPLING: quartiles(rows, COUPLING)[1],
+            "energy": max(map(energy, rows), default=float("nan")),
+            MARGIN: margin(found.margins, arrangement, chosen.best, rate),
+            "as_good": "; ".join(map(named, chosen.ties)),
+            "try": "; ".join(map(named, found.listed[cell])),
+        }
 
 
 SHARES = (0.1, SHARE, 0.5, 1.0)
@@ -163,28 +195,20 @@ def _other_limits(found: Found) -> Iterator[str]:
         f"The share of {SHARE:.0%} was set when runs had been seen, so that it is no part of the "
         "evidence. A mechanism at the graphics rate, with other shares of the hand's work:"
     )
-    columns = [(bias, rate) for bias in BIAS for rate in COLUMNS]
-    heads = [f"{COMPENSATION[bias].split()[-1]}, {rate}" for bias, rate in columns]
-    lines = ["| | " + " | ".join(heads) + " |", "|---" * (1 + len(columns)) + "|"]
-    for share in SHARES:
-        row = []
-        for bias, rate in columns:
+    heads = [f"{COMPENSATION[bias].split()[-1]}, {share:.0%}" for bias in BIAS for share in SHARES]
+    lines = ["| Hz | " + " | ".join(heads) + " |", "|---" * (1 + len(heads)) + "|"]
+    for rate in COLUMNS:
+        row = [rate]
+        for bias, share in product(BIAS, SHARES):
             cell = (DIRECT, bias, rate)
             chosen = choice(cell, found.cells[cell], found.margins, share)
-            row.append(named(chosen.method) if chosen.method else f"{chosen.most} of {chosen.of}")
-        lines.append(f"| {share:.0%} | " + " | ".join(row) + " |")
+            row.append(named(chosen.best) if chosen.admitted else f"{chosen.most} of {chosen.of}")
+        lines.append("| " + " | ".join(row) + " |")
     yield "\n".join(lines)
     yield paragraph(
-        "Columns: Coriolis compensation, graphics rate (Hz). Where nothing is advised: the most "
-        "draws within the limits."
+        "Columns: Coriolis compensation, share. Where nothing is advised: the most draws within "
+        "the limits."
     )
-
-
-def _ties(chosen: Choice) -> str:
-    others = [named(m) for m in chosen.ties if m != chosen.taken]
-    if not others:
-        return "none"
-    return "; ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
 
 
 def _limits(found: Found) -> Iterator[str]:
@@ -209,8 +233,8 @@ def _limits(found: Found) -> Iterator[str]:
         "that varies. Every method runs on the same draws, and methods are compared within a draw. "
         f"Where all {of} draws keep the limits, up to {1 - LEVEL ** (1 / of):.0%} of further ones "
         f"may not ({1 - LEVEL:.0%} confidence, if draws know nothing of each other). Graphics "
-        "rates are whole haptic ticks a frame: 51, 26, 17 and 9 of 1/512 s. A run is stable if it "
-        "reaches its end with handle and operational point less than "
+        f"rates are whole haptic ticks a frame: {both(list(map(str, TICKS)))} of 1/512 s. A run is "
+        "stable if it reaches its end with handle and operational point less than "
         f"{APART[0]:g} mm and {APART[1]:g} rad apart. A method is "
         "advised if every draw is stable, the energy at the user's port peaks at most "
         f"at {SHARE:.0%} of the hand's work (its absolute values summed; peaks below "
@@ -218,12 +242,25 @@ def _limits(found: Found) -> Iterator[str]:
         f"where it has one, is stable on {both(['five-bar', 'four-bar', 'serial arm'])}. A "
         "quarter: the continuous runs, which no hold disturbs, generate up to "
         f"{_continuous(found):.0%} without Coriolis compensation, and a limit below that would "
-        "refuse the ideal. Of a mechanism at the graphics rate, the report's gains and the "
-        "integrators were tried without Coriolis compensation alone, to save runs. The continuous "
+        "refuse the ideal. Tried at "
+        f"{both(FEW)} Hz without Coriolis compensation alone: all holds, the report's gains, and, "
+        "of a mechanism at the graphics rate, the integrators. Elsewhere it has the holds "
+        f"{both([f'`{hold}`' for hold in LIKELY])}, one of which is within a tenth of the best of "
+        f"all in {_likely(found)} cases in which any keeps the limits. The continuous "
         f"runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by "
         f"{np.median(sizes):.1g} mm within 1 s (median; up to {max(sizes):.1g}), so that smaller "
         "differences of the handle mean nothing."
     )
+
+
+def _likely(found: Found) -> str:
+    """In how many cases one of the holds that are tried everywhere is nearly the best."""
+    least = []
+    for rate in FEW:
+        off = relative(found.cells[DIRECT, "none", rate], METRIC)
+        known = [ratios for m, ratios in off.items() if m.hold in LIKELY and m.integrator == "rk4"]
+        least += np.min(known, axis=0).tolist()
+    return f"{sum(value <= NEAR for value in least)} of {len(least)}"
 
 
 def _continuous(found: Found) -> float:

@@ -16,6 +16,7 @@ from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.analysis.transparency import FORCE, HERTZ
 from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.specs.control import Teleoperation, Topology
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written
 
@@ -123,3 +124,31 @@ def test_a_pressed_run_gives_the_felt_stiffness() -> None:
     along = constraint.along
     size = abs(along @ np.linalg.inv(S) @ F) / abs(along @ S @ x)
     assert size == pytest.approx(constraint.slow, rel=0.01)
+
+
+def test_costs_are_those_of_changed_scenes_and_their_limit_that_of_runs() -> None:
+    """With the mechanism at 512 Hz no hold counts at rest. At 6.5 times the stiffnesses the handle
+    comes to rest if the motors are a period late, and not if they are not, as the limits say."""
+    costs = {c.change: c for c in transparency.costs("closed-loop", written(ENCODERS), print)}
+    own, half = costs["as it is"], costs["half the haptic rate"]
+    assert costs["hold foh"].cells() == own.cells() == costs["half the graphics rate"].cells()
+    late = costs["motors a haptic period late"]
+    assert (half.times or 9.0) < 2.0 < (own.times or 0.0) < 6.5 < (late.times or 0.0)
+    assert half.stiffest is not None
+    assert own.stiffest is not None
+    assert half.stiffest.width < own.stiffest.width
+    _, first, *others = transparency.cost_lines(list(costs.values()))
+    assert first.startswith("as it is, half the graphics rate, twice the graphics rate, hold zoh")
+    assert len(others) == 5
+    pose = hl.run("closed-loop", {"duration": 0.01}, figures=False)["virtual_mechanism.x"][0]
+    hand = spring((pose + np.array([1e-4, 0.0, 1e-3])).tolist(), (0.0, 0.0, 0.0), 100.0)
+    given: dict[str, Any] = ENCODERS | {"hand": hand, "linkage.start_velocity": {}, "duration": 2.0}
+    control = open_scene.load("closed-loop").controller
+    assert control is not None
+    assert isinstance(control.teleoperation, Teleoperation)
+    for law, of in (("teleoperation", control.teleoperation), ("topology", Topology())):
+        given[f"controller.{law}.stiffness"] = (6.5 * np.array(of.stiffness)).tolist()
+        given[f"controller.{law}.damping"] = (6.5**0.5 * np.array(of.damping)).tolist()
+    for delays, rests in (({}, False), ({"controller.F_motor": T}, True)):
+        run = hl.run("closed-loop", given | {"delays": delays}, figures=False)
+        assert (np.abs(run["haptic_device.v"][-200:]).max() < 1e-4) == rests

@@ -47,9 +47,10 @@ def test_every_case_is_a_scene(arrangement: str) -> None:
 
 
 def test_every_method_is_a_scene() -> None:
-    made = [design.run(DIRECT, ALL[0], m, "none", "30") for m in design.methods(DIRECT, "none")]
-    made += [
-        design.run(MOBILITY, ALL[0], m, "none", "30") for m in design.methods(MOBILITY, "none")
+    made = [
+        design.run(arrangement, ALL[0], m, "none", "30")
+        for arrangement in (DIRECT, MOBILITY)
+        for m in design.methods(arrangement, "none", "30")
     ]
     assert [j.refusal for j in made if j.scene is None] == []
     assert len({j.key for j in made}) == len(made)
@@ -74,9 +75,7 @@ def test_the_expected_time_counts_all_jobs() -> None:
     one = [cases.trained()[0]]
     made = design.runs(one)
     assert len(made) == design.count(1)
-    both = product((DIRECT, MOBILITY), ("none", "full"), (*RATES, "10..60", "24"))
-    methods = dict.fromkeys(both, Method("foh", "soft"))
-    assert len(design.kept_apart_runs(one, methods)) == design.count_apart(1)
+    assert len(design.kept_apart_runs(one)) == design.count_apart(1)
     assert 0 < expected(2) == 2 * expected(4)
 
 
@@ -153,7 +152,7 @@ def test_only_what_keeps_the_limits_everywhere_is_advised() -> None:
     good = _of([2.0] * 8)
     for bad in (_row(1.0, peak=5.1e-3), _row(43.0), _row(1.0, end="stop_when")):
         found = choice(CELL, {ZOH: good, FOH: {**_of([1.0] * 8), "case 3": bad}}, {})
-        assert (found.method, found.ties) == (ZOH, (ZOH,))
+        assert (found.method, found.ties) == (ZOH, ())
     enough = choice(CELL, {FOH: {**_of([1.0] * 8), "case 3": _row(1.0, peak=4.9e-3)}}, {})
     assert enough.method == FOH
     bad = {"case 1": _row(50.0), "case 2": _row(1.0, peak=5.1e-3)}
@@ -171,12 +170,12 @@ def test_an_unstable_map_forbids_a_method() -> None:
 
 
 def test_a_winner_only_beyond_the_spread() -> None:
-    """foh is better in 7 of 8 cases, then in 5: within the spread the simpler one is advised."""
+    """foh is better in 7 of 8 cases, then in 5: within the spread zoh is as good."""
     zoh = [2.0] * 8
     wins = choice(CELL, {ZOH: _of(zoh), FOH: _of([1.0] * 7 + [3.0])}, {})
-    assert (wins.method, wins.best, wins.ties) == (FOH, FOH, (FOH,))
+    assert (wins.method, wins.ties) == (FOH, ())
     ties = choice(CELL, {ZOH: _of(zoh), FOH: _of([1.0] * 5 + [3.0] * 3)}, {})
-    assert (ties.method, ties.best, ties.ties) == (ZOH, FOH, (ZOH, FOH))
+    assert (ties.method, ties.ties) == (FOH, (ZOH,))
 
 
 def test_where_nothing_is_advised_the_best_wins_only_beyond_the_spread() -> None:
@@ -190,14 +189,35 @@ def test_where_nothing_is_advised_the_best_wins_only_beyond_the_spread() -> None
         }
         found = choice(CELL, {ZOH: zoh, FOH: foh}, {})
         assert (found.method, found.best, found.most, found.lost) == (None, FOH, 7, 1)
-        assert found.ties == ((ZOH, FOH) if tied else (FOH,))
+        assert found.ties == ((ZOH,) if tied else ())
 
 
 def test_errors_are_compared_within_draws() -> None:
     """Draws that differ a hundredfold do not hide a tenth within each."""
     scale = np.geomspace(0.1, 10.0, 8)
     rows = {ZOH: _of((1.1 * scale).tolist()), FOH: _of(scale.tolist())}
-    assert choice(CELL, rows, {}).ties == (FOH,)
+    found = choice(CELL, rows, {})
+    assert (found.best, found.ties) == (FOH, ())
+
+
+def test_the_list_to_try_has_what_is_nearly_best_in_most_cases() -> None:
+    """Of 8 cases zoh, the safe one, is the best in none; pspm is in six, foh in the other two, in
+    which pspm leaves the limits; second-order is next to foh and adds nothing."""
+
+    def rows(errors: list[float]) -> dict[str, Row]:
+        return {f"case {i}, seed 1": _row(e) | {"case": f"case {i}"} for i, e in enumerate(errors)}
+
+    other = Method("second-order", "soft")
+    by_method = {
+        ZOH: rows([2.0] * 8),
+        FOH: rows([5.0] * 6 + [0.5] * 2),
+        PSPM: rows([1.0] * 6 + [50.0] * 2),
+        other: rows([4.9] * 6 + [0.52] * 2),
+    }
+    off = method_choice.relative(by_method, "tracking_max_mm")
+    assert off[PSPM] == pytest.approx([1.0] * 6 + [np.inf] * 2)
+    assert off[other] == pytest.approx([4.9] * 6 + [1.04] * 2)
+    assert method_choice.to_try(CELL, by_method, ZOH) == (ZOH, PSPM, FOH, other)
 
 
 def _sweep(jobs: list[Job], *_: Any, measure: Any, **__: Any) -> list[Row]:
@@ -231,8 +251,8 @@ def test_the_page_gives_the_advice_of_the_rows(
     path = make(tmp_path, tmp_path, 1, trained=trained, kept_apart=cases.kept_apart()[:2])
     text = path.read_text()
     assert text.index("| take |") < text.index("## Why") < text.index("## Kept apart")
-    for rate in ("10", "20", "30", "57"):
-        assert f"| {rate} | `foh`, soft | {of} of {of} | 1 (1 to 1; 1) | 1 |" in text
+    for rate in RATES:
+        assert f"| {rate} | `foh`, soft | {of} of {of} | 1 (1) |" in text
     assert "Coriolis compensation on: graphics rate" in text
     figures = ("gains", "tracking", "energy", "margins", "integrators", "mobility")
     for name in figures:
@@ -240,6 +260,10 @@ def test_the_page_gives_the_advice_of_the_rows(
         assert (tmp_path / f"{name}.png").is_file()
     with (tmp_path / "runs.csv").open() as file:
         assert sum(1 for _ in csv.DictReader(file)) == design.count(len(trained))
+    with (tmp_path / "advice.csv").open() as file:
+        rows = {(r["arrangement"], r["bias"], r["rate"]): r for r in csv.DictReader(file)}
+    assert len(rows) == 4 * len(design.COLUMNS)
+    assert rows[DIRECT, "none", "39"]["try"].startswith("`foh`, soft")
     design.run.cache_clear()
 
 
@@ -266,7 +290,13 @@ def short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of a study of the serial arm in an arm of 100 N/m, with few holds, rates and maps
     and runs of 1 s; all else is as in the whole one."""
     arranged, whole = design.arranged, design.all_margins()
-    for name, value in (("COLUMNS", SHORT), ("OF_MATRICES", ("zoh",)), ("COMPARED", ("zoh",))):
+    for name, value in (
+        ("COLUMNS", SHORT),
+        ("FEW", SHORT),
+        ("OF_MATRICES", ("zoh",)),
+        ("COMPARED", ("zoh",)),
+        ("LIKELY", ("zoh", "foh")),
+    ):
         for part in (make_module, held_out_draws, method_choice, design, page, finding_figures):
             monkeypatch.setattr(part, name, value, raising=False)
     for hold in [h for h in HOLDS if h not in ("zoh", "foh")]:
