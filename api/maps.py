@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from hapticlink.analysis.maps import Map, compute_map
+from hapticlink.analysis.maps.stability_map import Map, compute_map
 from hapticlink.analysis.sweep.points import Vary, axes
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.results import folders

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.sweep import Unfinished, grid, job, row, table
-from hapticlink.analysis.sweep import sweep as make
+from hapticlink.analysis.sweep import grid, job, row, table
 from hapticlink.analysis.sweep.points import Runs, Vary, points
+from hapticlink.analysis.sweep.run_sweep import Unfinished
+from hapticlink.analysis.sweep.run_sweep import sweep as make
 from hapticlink.api.frame import frame
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, InputFault, unknown

@@ -16,7 +16,14 @@ from textwrap import fill
 
 import numpy as np
 
-from hapticlink.analysis.advise import Advice, Method, advise, all_methods, on_draws, within
+from hapticlink.analysis.advise.advise_method import (
+    Advice,
+    Method,
+    advise,
+    all_methods,
+    on_draws,
+    within,
+)
 from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene

@@ -47,7 +47,7 @@ def advise(
 
         hapticlink advise closed-loop-direct --set graphics.rate=22
     """
-    from hapticlink.analysis.advise import advise as find
+    from hapticlink.analysis.advise.advise_method import advise as find
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 

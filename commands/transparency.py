@@ -47,7 +47,7 @@ def transparency(
 
         hapticlink transparency closed-loop --set sensing=encoders --costs
     """
-    from hapticlink.analysis import transparency as analysis
+    from hapticlink.analysis.transparency import mobility_at_hand as analysis
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
     from hapticlink.visualization import figure_axes

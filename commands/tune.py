@@ -34,8 +34,8 @@ def tune(
 
         hapticlink tune closed-loop --set sensing=encoders
     """
-    from hapticlink.analysis.tune import Tuned
-    from hapticlink.analysis.tune import tune as find
+    from hapticlink.analysis.tune.tune_gains import Tuned
+    from hapticlink.analysis.tune.tune_gains import tune as find
     from hapticlink.orchestrator.base.faults import Interrupted
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json

@@ -2,7 +2,7 @@
 
 from hapticlink.analysis.fit.fit import Fitted as Fitted
 from hapticlink.analysis.fit.fit import fit as fit
-from hapticlink.analysis.maps import Map as Map
+from hapticlink.analysis.maps.stability_map import Map as Map
 from hapticlink.analysis.stability.passivity import Passivity as Passivity
 from hapticlink.analysis.stability.passivity import passivity as passivity
 from hapticlink.analysis.stability.scene_stability import (
@@ -11,10 +11,10 @@ from hapticlink.analysis.stability.scene_stability import (
 from hapticlink.analysis.stability.scene_stability import stability as stability
 from hapticlink.analysis.stability.stability_verdict import Stability as Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability as VaryingStability
-from hapticlink.analysis.transparency import Transparency as Transparency
-from hapticlink.analysis.transparency import transparency as transparency
-from hapticlink.analysis.tune import Tuned as Tuned
-from hapticlink.analysis.tune import tune as tune
+from hapticlink.analysis.transparency.mobility_at_hand import Transparency as Transparency
+from hapticlink.analysis.transparency.mobility_at_hand import transparency as transparency
+from hapticlink.analysis.tune.tune_gains import Tuned as Tuned
+from hapticlink.analysis.tune.tune_gains import tune as tune
 from hapticlink.api.compare import Comparison as Comparison
 from hapticlink.api.compare import compare as compare
 from hapticlink.api.files import build as build

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from itertools import product
 from pathlib import Path
 
-from hapticlink.analysis.sweep import Measure, sweep, table
+from hapticlink.analysis.sweep import table
 from hapticlink.analysis.sweep.job import Job
 from hapticlink.analysis.sweep.row import Row
+from hapticlink.analysis.sweep.run_sweep import Measure, sweep
 from hapticlink.orchestrator.results import folders
 from studies.mismatch import cases, design, measure, method_choice, page
 from studies.mismatch.cases import Case

@@ -81,6 +81,7 @@ def run_case(name: str, options: dict[str, Any], found: Stability, case: Case) -
     """stable or unstable, by a run in a pose and a hand."""
     pose = next(p for p in found.poses if p.name == case.pose)
     hand = found.hands[case.hand]
+    assert hand  # the free handle is no case here
     table = {k: v for k, v in asdict(hand).items() if v is not None and k != "interpolation"}
     target = [float(x + off) for x, off in zip(pose.point, OFF, strict=True)]
     table["target"] = [[0.0, *target]]

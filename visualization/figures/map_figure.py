@@ -17,7 +17,7 @@ from hapticlink.visualization.figure_axes import plain
 from hapticlink.visualization.figures.sweep_labels import axis
 
 if TYPE_CHECKING:
-    from hapticlink.analysis.maps import Map
+    from hapticlink.analysis.maps.stability_map import Map
 
 COLUMNS = 3
 FINE = 160

@@ -8,7 +8,7 @@ from textwrap import fill
 import numpy as np
 from matplotlib.figure import Figure
 
-from hapticlink.analysis.transparency import FORCE, HERTZ, Transparency
+from hapticlink.analysis.transparency.mobility_at_hand import FORCE, HERTZ, Transparency
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.figure_axes import plain
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.analysis import advise
-from hapticlink.analysis.advise import Measured, Method
+from hapticlink.analysis.advise import advise_method as advise
+from hapticlink.analysis.advise.advise_method import Measured, Method
 from hapticlink.analysis.advise.draws import FACTOR, draws
 from hapticlink.orchestrator import open_scene
 

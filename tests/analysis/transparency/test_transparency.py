@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis import transparency
 from hapticlink.analysis.stability.hands import spring
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.resting_scene import resting
-from hapticlink.analysis.transparency import FORCE, HERTZ
+from hapticlink.analysis.transparency import mobility_at_hand as transparency
+from hapticlink.analysis.transparency.mobility_at_hand import FORCE, HERTZ
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.control import Teleoperation, Topology
 from hapticlink.orchestrator import open_scene

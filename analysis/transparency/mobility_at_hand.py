@@ -1,0 +1,356 @@
+"""How a scene feels: what the hand meets at the handle, against the mechanism that it should meet.
+
+At a pose, with the hand cut off, the compliance X(w) of the handle (stability/port_response.py) is
+compared with that of the mechanism, -Lambda^-1/w^2, both scaled by S = diag(1, 1, L), L the mean
+link length (m), so that all entries are in m/N. With e_i and 1/m_i the eigenvectors and eigenvalues
+of S Lambda^-1 S, E = (e_i) the free directions, p_j the constrained ones, whose eigenvalues are 0,
+
+    M(w) = -(E' S X S E)^-1/w^2         M e_i is met when moving along e_i, ideally m_i e_i
+    error_i = |M e_i - m_i e_i|/m_i     of that force, in size, phase and direction
+    angle_i                             between Re M e_i and e_i
+    k_j(w) = 1/|p_j' S X S p_j|         felt stiffness (N/m), ideally infinite
+
+A force is right where its error is below the differential threshold of a person. Springs, dampers
+and gravity of the mechanism are not in the ideal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.stability.port_response import hand_port, response
+from hapticlink.analysis.stability.poses import evenly_spaced, simulated
+from hapticlink.analysis.stability.rates import whole_frames
+from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.tune.stability_limits import Judge
+from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.loop_names import MOBILITIES
+from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.scene import Scene
+
+FORCE = 0.1
+"""Differential threshold of a force, 5 to 10 % from 2.5 to 10 N: Pang, Tan, Durlach, Perception &
+Psychophysics 49 (1991), 531."""
+DIRECTION = 25.6
+"""That of the direction of a force (degrees), by touch alone: Barbagli, Salisbury, Ho, Spence, Tan,
+ACM Trans. Applied Perception 3 (2006), 125."""
+
+HERTZ = np.geomspace(0.5, 50.0, 41)
+"""The frequencies, up to the fastest that a hand is moved at and beyond."""
+SLOW = 2.0
+"""The frequency (Hz) of the numbers of a direction."""
+CONSTRAINED = 1e-6
+"""Of the largest scaled mobility, up to which a direction does not move."""
+RIGID = 1e7
+"""Stiffness (N/m) above which nothing gives way."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A free direction: a unit vector (m, m, rad times L), the mechanism's inertia (kg), and by
+    frequency the felt one (complex), the error of the force, and the angle of it (degrees)."""
+
+    along: Vector
+    inertia: float
+    felt: Complex
+    error: Vector
+    angle: Vector
+
+    @property
+    def right_up_to(self) -> float:
+        """The frequency (Hz) up to which force and direction are within what a person can tell."""
+        return first(np.maximum(self.error / FORCE, self.angle / DIRECTION))
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A constrained direction, a unit vector, and its felt stiffness (N/m) by frequency."""
+
+    along: Vector
+    stiffness: Vector
+
+    @property
+    def slow(self) -> float:
+        """The stiffness (N/m) at SLOW; infinite where nothing gives way."""
+        return at_slow(self.stiffness)
+
+
+@dataclass(frozen=True)
+class Transparency:
+    """How a scene feels at a pose of its run."""
+
+    title: str
+    pose: str
+    free: tuple[Direction, ...]
+    constrained: tuple[Constraint, ...]
+
+    @property
+    def right_up_to(self) -> float:
+        """The least frequency (Hz) up to which a free direction is right."""
+        return min((d.right_up_to for d in self.free), default=np.nan)
+
+    @property
+    def width(self) -> float:
+        """Z-width of the loop at SLOW: the impedance of the stiffest constrained direction, k/w,
+        over that of the lightest free one, w m."""
+        w, light = 2 * np.pi * SLOW, min((abs(at_slow(d.felt)) for d in self.free), default=np.nan)
+        return max((c.slow for c in self.constrained), default=np.nan) / (w * w * light)
+
+    def lines(self) -> Iterator[str]:
+        """The result as text."""
+        yield f"at {self.pose}:"
+        for d in self.free:
+            felt, w = complex(at_slow(d.felt)), 2 * np.pi * SLOW
+            inert = f"{short(felt.real)} kg"
+            if felt.real < 0.0:  # pressed against something
+                inert = f"a spring of {short(-felt.real * w * w)} N/m"
+            turned = f", turned by {short(float(at_slow(d.angle)))} degrees" * (felt.real > 0.0)
+            yield (
+                f"  along {_named(d.along)} a mechanism of {short(d.inertia)} kg is felt as "
+                f"{inert} and {short(-w * felt.imag)} N.s/m at {SLOW:g} Hz{turned}; right "
+                f"up to {_hertz(d.right_up_to)}"
+            )
+        for c in self.constrained:
+            stiff = "rigid" if np.isinf(c.slow) else f"{short(c.slow)} N/m at {SLOW:g} Hz"
+            yield f"  against {_named(c.along)}, which is constrained: {stiff}"
+        if self.constrained and self.free:
+            yield (
+                f"  Z-width (constrained over free impedance at {SLOW:g} Hz): {_width(self.width)}"
+            )
+
+    def record(self) -> dict[str, Any]:
+        """The part of transparency.json on this pose."""
+        return {
+            "pose": self.pose,
+            "right_up_to": self.right_up_to,
+            "frequencies": HERTZ.tolist(),
+            "free": [
+                {
+                    "along": d.along.tolist(),
+                    "inertia": d.inertia,
+                    "felt_inertia": d.felt.real.tolist(),
+                    "felt_damping": (0.0 - 2 * np.pi * HERTZ * d.felt.imag).tolist(),
+                    "error": d.error.tolist(),
+                    "angle": d.angle.tolist(),
+                    "right_up_to": d.right_up_to,
+                }
+                for d in self.free
+            ],
+            "constrained": [
+                {"along": c.along.tolist(), "stiffness": c.stiffness.tolist()}
+                for c in self.constrained
+            ],
+        }
+
+
+def transparency(
+    scene: str | Path | Scene, options: Sequence[str] = (), *, count: int = 2
+) -> list[Transparency]:
+    """How a scene feels at `count` poses of its own run, held there by a spring that is cut off
+    again, with frames of whole haptic periods. Raises InputFault for a scene without device,
+    controller or linkage, and where no pose has an equilibrium."""
+    read = open_scene.load(scene, options)
+    linkage = _linkage(read)
+    found, why = [], ""
+    given = tuple(options)
+    for pose in evenly_spaced(simulated(scene, given), linkage, count):
+        try:
+            found.append(at_pose(scene, pose.options(whole_frames(read, given)), pose.name))
+        except (InputFault, FmuFault) as fault:
+            why = f"{pose.name}: {fault}"
+    if not found:
+        raise InputFault(f"no pose of the run has an equilibrium: {why}")
+    return found
+
+
+def at_pose(scene: str | Path | Scene, options: Sequence[str], name: str) -> Transparency:
+    """How a scene feels where it is at rest. Raises InputFault where it is not."""
+    read = open_scene.load(scene, options)
+    with resting(scene, options) as place:
+        return _felt(read, place, name, {})
+
+
+def _felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
+    linear = place.period(scales).in_map
+    cut = response(place.map, linear, hand_port(place.map.system))
+    X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
+    return of(read.title, name, X, mobility(place), mean_link_length(_linkage(read)))
+
+
+def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Transparency:
+    """The transparency of a handle with the compliances X (k, 3, 3) at HERTZ, for a mechanism of a
+    mobility Lambda^-1 (3, 3) with links of a mean length (m)."""
+    S, w = np.diag([1.0, 1.0, length]), 2 * np.pi * HERTZ
+    values, vectors = np.linalg.eigh(S @ mobility @ S)
+    moves = values > CONSTRAINED * values[-1]
+    E, P = vectors[:, moves], vectors[:, ~moves].T
+    X = S @ X @ S
+    solved = np.linalg.inv(E.T @ X @ E)
+    M = np.asarray(-solved / (w * w)[:, None, None], np.complex128)
+    free = [
+        _direction(E[:, i], M[:, :, i], i, 1.0 / value) for i, value in enumerate(values[moves])
+    ]
+    gives = [np.abs(np.einsum("i,kij,j->k", p, X, p)) for p in P]
+    stiff = [np.where(x * RIGID > 1.0, 1.0 / np.maximum(x, 1e-300), np.inf) for x in gives]
+    constrained = [Constraint(p, k) for p, k in zip(P, stiff, strict=True)]
+    return Transparency(title, pose, tuple(free), tuple(constrained))
+
+
+def _direction(along: Vector, column: Complex, i: int, inertia: float) -> Direction:
+    """A direction from the column (k, n) of M."""
+    off = column.copy()
+    off[:, i] -= inertia
+    real = column.real
+    angle = np.degrees(np.arccos(np.clip(real[:, i] / np.linalg.norm(real, axis=1), -1.0, 1.0)))
+    return Direction(along, inertia, column[:, i], np.linalg.norm(off, axis=1) / inertia, angle)
+
+
+def mobility(place: RestingScene) -> Matrix:
+    """Lambda^-1 (3, 3) at an equilibrium. Raises InputFault where no FMU puts it out."""
+    for port in MOBILITIES:
+        if len(values := place.signal(port)) == 9:
+            return values.reshape(3, 3)
+    raise InputFault(f"no FMU puts out the mobility of the mechanism ({' or '.join(MOBILITIES)})")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """How a scene feels with a change, and `times`, the factor on its stiffnesses (dampings by its
+    root) up to which it is stable in spring hands, with `stiffest`, how it feels there; None
+    without gains or where it is not stable with any."""
+
+    change: str
+    felt: Transparency
+    times: float | None
+    stiffest: Transparency | None
+
+    def cells(self) -> tuple[str, ...]:
+        """The row of a table, without the change."""
+        kg = ", ".join(short(float(at_slow(d.felt).real)) for d in self.felt.free)
+        stiff, most = (_stiffness(f) if f else "-" for f in (self.felt, self.stiffest))
+        times = f"{short(self.times)} times" if self.times else "-"
+        width = _width(self.felt.width) if self.felt.constrained else "-"
+        widest = _width(self.stiffest.width) if self.stiffest and self.felt.constrained else "-"
+        return kg, _hertz(self.felt.right_up_to), stiff, width, times, most, widest
+
+    def record(self) -> dict[str, Any]:
+        """The part of transparency.json on this change."""
+        most = self.stiffest.record() if self.stiffest else None
+        return self.felt.record() | {"stable_up_to": self.times, "stiffest": most}
+
+
+def costs(
+    scene: str | Path | Scene, options: Sequence[str], tell: Callable[[str], object]
+) -> list[Cost]:
+    """How the scene feels at its start with other rates, delays and holds, and how stiff it can be
+    made."""
+    read, given = open_scene.load(scene, options), tuple(options)
+    pose = evenly_spaced(simulated(scene, given), _linkage(read), 1)[0]
+    rate = float(exact(read.haptics.rate))
+    late = {"motors": ("controller.F_motor",), "handle": ("haptic_device.x", "haptic_device.v")}
+    late["mechanism"] = ("virtual_mechanism.x", "virtual_mechanism.v")
+    changes: dict[str, dict[str, object]] = {"as it is": {}}
+    for name, factor in (("half", 0.5), ("twice", 2.0)):
+        changes[f"{name} the haptic rate"] = {"haptics.rate": factor * rate}
+        if read.graphics is not None and isinstance(read.graphics.rate, int | float | str):
+            changed_rate = factor * float(exact(read.graphics.rate))
+            changes[f"{name} the graphics rate"] = {"graphics.rate": changed_rate}
+    for name, ports in late.items():
+        changes[f"{name} a haptic period late"] = {"delays": dict.fromkeys(ports, 1.0 / rate)}
+    if read.graphics is not None:
+        changes |= {f"hold {n}": {"hold": n} for n in ("zoh", "foh", "second-order", "smooth")}
+    found = []
+    for name, change in changes.items():
+        try:
+            changed = (*given, *overrides.written(change))
+            told = pose.options(whole_frames(open_scene.load(scene, changed), changed))
+            with resting(scene, told) as place:
+                found.append(_cost(read, place, name))
+        except (InputFault, FmuFault) as fault:
+            tell(f"  {name}: {fault}")
+    return found
+
+
+def _cost(read: Scene, place: RestingScene, change: str) -> Cost:
+    felt = _felt(read, place, change, {})
+    try:
+        judge = Judge({change: place})
+        times = judge.margin({})
+        return Cost(
+            change, felt, times, _felt(read, place, change, dict.fromkeys(judge.laws, times))
+        )
+    except (InputFault, FmuFault):
+        return Cost(change, felt, None, None)
+
+
+HEADS = (
+    "", f"felt at {SLOW:g} Hz (kg)", "right up to", "constraint (N/m)", "Z-width",
+    "gains stable up to", "constraint then", "Z-width then",
+)  # fmt: skip
+
+
+def cost_lines(found: Sequence[Cost]) -> Iterator[str]:
+    """The costs as a table; what changes nothing in one row."""
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for cost in found:
+        rows.setdefault(cost.cells(), []).append(cost.change)
+    table = [HEADS, *((", ".join(names), *cells) for cells, names in rows.items())]
+    wide = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for row in table:
+        yield "  ".join(cell.ljust(n) for cell, n in zip(row, wide, strict=True)).rstrip()
+
+
+def _stiffness(felt: Transparency) -> str:
+    slow = [c.slow for c in felt.constrained]
+    return "none" if not slow else "rigid" if np.isinf(max(slow)) else short(max(slow))
+
+
+def _width(width: float) -> str:
+    return "infinite" if np.isinf(width) else short(width)
+
+
+def _linkage(read: Scene) -> Linkage:
+    if not (read.linkage and read.device and read.controller):
+        raise InputFault("no rendering to feel: a [linkage], [device] and [controller] are needed")
+    return read.linkage
+
+
+def first(ratio: Vector) -> float:
+    """The frequency (Hz) at which a ratio first reaches 1, on straight lines over the logarithm;
+    0 where it does at once, infinite where it never does."""
+    beyond = np.flatnonzero(ratio > 1.0)
+    if not len(beyond):
+        return float(np.inf)
+    i = int(beyond[0])
+    if i == 0:
+        return 0.0
+    share = (1.0 - ratio[i - 1]) / (ratio[i] - ratio[i - 1])
+    return float(HERTZ[i - 1] * (HERTZ[i] / HERTZ[i - 1]) ** share)
+
+
+def at_slow(values: Any) -> Any:
+    """The value at the frequency next to SLOW."""
+    return values[int(np.argmin(np.abs(HERTZ - SLOW)))]
+
+
+def _hertz(frequency: float) -> str:
+    if np.isinf(frequency):
+        return f"{HERTZ[-1]:g} Hz and beyond"
+    return f"{short(frequency)} Hz" if frequency else f"less than {HERTZ[0]:g} Hz"
+
+
+def _named(along: Vector) -> str:
+    x, y, turn = along if along[int(np.argmax(np.abs(along)))] > 0 else -along
+    return f"({x:.2f}, {y:.2f}; {turn:.2f})"

@@ -1,0 +1,186 @@
+"""Gains with which contact and joint constraint feel equally stiff, as stiff as a margin allows.
+
+**Margin.** The stability margin g is the factor on all stiffnesses together, dampings by its root,
+at which the linearised map of the co-simulation (stability/) becomes unstable, in the worst of the
+poses and hands that are judged (stability_limits.py). The default of 2 (6 dB) is the least gain
+margin that textbooks of control ask for (Astrom, Murray, Feedback Systems, 2008, section 9.3).
+
+**Felt stiffness** (felt_stiffness.py) is that of the handle under a wrench at 2 Hz, in one of these
+poses.
+
+**Along the run** (run_measures.py) the handle must stay near the operational point, too.
+
+**Search** (search.py). Frames are whole haptic periods on the way, whose map is short; the result
+is judged at the scene's own rates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hapticlink.analysis.stability.poses import Pose, at_equilibrium, evenly_spaced, simulated
+from hapticlink.analysis.stability.rates import whole_frames
+from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.analysis.tune.felt_stiffness import Feel
+from hapticlink.analysis.tune.run_measures import RunLimit, motion
+from hapticlink.analysis.tune.search import COARSE, search
+from hapticlink.analysis.tune.stability_limits import FINE, Judge
+from hapticlink.analysis.tune.tunable_scene import near_rates, required
+from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.overrides import Options
+
+MARGIN, POSES = 2.0, 5
+REMEDY = "take a higher graphics.rate or haptics.rate, or a smaller --margin"
+
+STEADY = "begin with smaller gains of controller.teleoperation and controller.topology"
+
+
+def tune(
+    scene: str | Path,
+    options: Options = (),
+    *,
+    margin: float = MARGIN,
+    tell: Callable[[str], object] | None = None,
+    keep: Callable[[Tuned], object] | None = None,
+) -> Tuned:
+    """The gains of a scene with which a contact and a joint constraint feel equally stiff, as stiff
+    as a stability margin allows in five poses of its own run and in a contact, if there is one.
+
+    `margin` is the factor on all stiffnesses up to instability. `tell` is called with what is done,
+    `keep` with the result so far, each time that it is better or knows more.
+
+    Raises InputFault for a margin below 1, a scene without a law to tune or a handle, one whose
+    contacts or constraints are not felt by these laws, and one in which no gains hold.
+    """
+    if not margin >= 1.0:
+        raise InputFault(f"margin {margin:g}: give 1 or more, the factor up to instability")
+    tell, keep = tell or (lambda text: None), keep or (lambda tuned: None)
+    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+        tuning = _Tuning(scene, overrides.written(options), margin, tell, keep)
+        scales = tuning.judge_at_own_rates(tuning.search())
+        tuning.judge_at_near_rates(scales)
+    return tuning.result
+
+
+class _Tuning:
+    """A tuning in progress, of a scene with the options `given`."""
+
+    result: Tuned
+    _resting: Sequence[Pose] = ()
+    """The poses in which the scene has an equilibrium, and its states there by the pose's name."""
+    _states: Mapping[str, Vector]
+
+    def __init__(
+        self,
+        scene: str | Path,
+        given: tuple[str, ...],
+        margin: float,
+        tell: Callable[[str], object],
+        keep: Callable[[Tuned], object],
+    ) -> None:
+        self._scene, self._given, self._margin = scene, given, margin
+        self._tell, self._keep = tell, keep
+        self._read = open_scene.load(scene, given)
+        self._linkage = required(self._read)
+
+    def search(self) -> dict[str, float]:
+        """The scales of the largest gains with which margin and run hold, with frames of whole
+        haptic periods."""
+        quick = whole_frames(self._read, self._given)
+        self._tell("the scene's own run, for its poses")
+        run = simulated(self._scene, self._given)
+        moments = evenly_spaced(run, self._linkage, POSES)
+        with at_equilibrium(self._scene, quick, moments, self._tell) as (resting, held):
+            pressed = [pose for pose in resting if pose.touches]
+            if any(pose.touches for pose in moments) and not pressed:
+                raise InputFault(
+                    f"the run touches, but no pose in contact has an equilibrium; {STEADY}"
+                )
+            self._resting = resting
+            self._states = {name: place.equilibrium for name, place in held.items()}
+            felt_at = (pressed or resting[:1])[-1].name
+            judge, feel = Judge(held), Feel.of(held[felt_at], self._linkage)
+            self._tell("the margin of the scene's own gains")
+            own = judge.margin({}, COARSE)
+            self._tell(f"  {own:.3g}")
+            start = dict.fromkeys(judge.laws, min(1.0, own / self._margin))
+            limit = RunLimit(run if own >= self._margin else self._run(feel, start))
+            self.result = Tuned(
+                run=replace(run, tables={}),
+                asked=self._margin,
+                poses=resting,
+                felt_at=felt_at,
+                along=feel.along,
+                margins={"scene": own},
+                felt={"scene": feel.felt(feel.compliance({}))},
+                motion={"scene": motion(run)},
+            )
+
+            def require(scales: dict[str, float]) -> None:
+                if why := judge.unstable(scales, self._margin):
+                    raise InputFault(why)
+                self.result.motion["tuned"] = limit.motion(self._run(feel, scales))
+                self._take(feel, scales)
+
+            self._tell("gains that keep the margin and the run")
+            try:
+                scales, self.result.limited_by = search(start, feel, require)
+            except InputFault as fault:
+                raise InputFault(f"{fault}; {REMEDY}") from None
+        return scales
+
+    def judge_at_own_rates(self, scales: dict[str, float]) -> dict[str, float]:
+        """The scales, lowered where the margin at the scene's own rates asks for it."""
+        self._tell("the margin at the scene's own rates")
+        with self._at_equilibrium(self._given) as (self.result.poses, held):
+            judge = Judge(held)
+            reached = judge.margin(scales)
+            if reached < self._margin * (1 - 2 * FINE):
+                scales = {law: s * reached / self._margin for law, s in scales.items()}
+                reached = judge.margin(scales)
+            self.result.margins["tuned"] = reached
+            self._take(Feel(held[self.result.felt_at], self.result.along), scales)
+        return scales
+
+    def judge_at_near_rates(self, scales: dict[str, float]) -> None:
+        """Adds the margins at neighbouring rates to the result, 0 where there is no equilibrium."""
+        margins = self.result.margins
+        for rate in near_rates(self._read):
+            near = (*self._given, rate)
+            near = whole_frames(open_scene.load(self._scene, near), near)
+            try:
+                with self._at_equilibrium(near) as (_, held):
+                    margins[rate] = Judge(held).margin(scales, COARSE)
+            except InputFault:
+                margins[rate] = 0.0
+            self._tell(f"margin at {rate}: {margins[rate]:.3g}")
+            self._keep(self.result)
+
+    def _take(self, feel: Feel, scales: dict[str, float]) -> None:
+        """These gains are the best so far."""
+        result = self.result
+        result.gains, X = feel.gains.options(scales), feel.compliance(scales)
+        result.compliance, result.felt["tuned"] = X, feel.felt(X)
+        felt = (f"{name} {value:.4g} N/m" for name, value in result.felt["tuned"].items())
+        times = (f"{scale:.3g} ({law})" for law, scale in scales.items())
+        self._tell(f"  {', '.join(felt)}: gains times {', '.join(times)}")
+        self._keep(result)
+
+    def _run(self, feel: Feel, scales: dict[str, float]) -> Results:
+        return simulated(self._scene, self._given, feel.gains.options(scales))
+
+    def _at_equilibrium(
+        self, options: tuple[str, ...]
+    ) -> AbstractContextManager[tuple[list[Pose], dict[str, RestingScene]]]:
+        return at_equilibrium(self._scene, options, self._resting, self._tell, self._states)
