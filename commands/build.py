@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands.options import Out, Scene, Set, default_folder
+from hapticlink.commands.progress import waiting
 from hapticlink.orchestrator.base.terminal_output import say
 
 AllPlatforms = Annotated[
@@ -47,14 +48,16 @@ def build(
     import hapticlink as hl
 
     folder = out or default_folder("fmus", scene)
-    paths = hl.build(
-        scene,
-        set or (),
-        out=folder,
-        all_platforms=all_platforms,
-        as_one=as_one,
-        without=without,
-        fmi=fmi,
-    )
+    what = "one FMU of all its blocks" if as_one else "its FMUs"
+    with waiting(f"{folder.name}: building {what}"):
+        paths = hl.build(
+            scene,
+            set or (),
+            out=folder,
+            all_platforms=all_platforms,
+            as_one=as_one,
+            without=without,
+            fmi=fmi,
+        )
     say(*paths.values(), sep="\n")
     return 0

@@ -60,10 +60,8 @@ def info(
         start = mechanism_outputs(system) if read.linkage else {}
         fetched = with_fetched(system).fmu
     say(f"{read.title}\n{read.description.strip()}".strip())
+    _starts(read, start)
     say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
-    if read.linkage and start:
-        for line in summary.moved(asdict(read.linkage), coordinates(start)):
-            say(f"  {line}")
     for fmu in system.fmus:
         timing = fmu.description.timing
         every, some = (len(of.description.outputs) for of in (fmu, fetched[fmu.name]))
@@ -80,16 +78,40 @@ def info(
         say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
     for line in summary.replaced(system.replacements):
         say(f"  {line}")
-    if read.device:
-        from hapticlink.analysis.findings import workspace
-
-        say("\ndevice's workspace")
-        for line in workspace.lines(read.device, _pose(start)):
-            say(f"  {line}")
     _needs(read, time)
     if draw or out:
         _draw(read, system, start, out or default_folder("info", scene))
     return 0
+
+
+def _starts(scene: Any, start: dict[str, float]) -> None:
+    """Where the handle starts, who holds it, and what can be touched."""
+    from hapticlink.analysis.findings import summary
+
+    if scene.linkage and start:
+        for line in summary.moved(asdict(scene.linkage), coordinates(start)):
+            say(f"  {line}")
+    if scene.device:
+        from hapticlink.analysis.findings import workspace
+
+        say("\ndevice's workspace")
+        for line in workspace.lines(scene.device, _pose(start)):
+            say(f"  {line}")
+    elif start:
+        pose = ", ".join(f"{round(value, 7) + 0.0:.4g}" for value in _pose(start))
+        say(f"\nthe operational point starts at ({pose})")
+    if scene.hand:
+        say(f"hand: {scene.hand.type}")
+    if scene.contacts and start:
+        from hapticlink.analysis.findings import contact_warnings
+        from hapticlink.components.contact.broad_phase import near
+
+        pairs = [
+            f"{pair.body} with {pair.obstacle}" for pair in near(scene.linkage, scene.contacts)
+        ]
+        say(f"contacts that can be reached: {', '.join(pairs) or 'none'}")
+        for line in contact_warnings.pressed(scene.linkage, scene.contacts, coordinates(start)):
+            say(f"  {line}")
 
 
 def _pose(start: dict[str, float]) -> list[float]:
@@ -120,21 +142,22 @@ def _needs(scene: Any, time: Timeline) -> None:
     from hapticlink.analysis.findings import block_costs, requirements
 
     parts = list(requirements.needs(scene))
-    for title, needed in (("needed", True), ("left out", False)):
-        say(f"\n{title}")
-        for need in parts:
-            if need.needed == needed:
-                say(f"  {need.part}: {need.why}")
+    say("\nneeded")
+    for need in parts:
+        if need.needed:
+            say(f"  {need.part}: {need.why}")
     say("\noperations of a step and its outputs, signals in and out")
-    rows = {}
-    for title, skip in (("as it is", True), ("nothing left out", False)):
-        rows[title] = block_costs.costs(scene, time, skip=skip)
-        say(f"  {title}")
-        for row in rows[title]:
-            ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())
-            say(f"    {row.name}: {row.cost.step} operations, {ports[0]} + {ports[1]} signals")
-        operations, signals = (sum(getattr(r, k) for r in rows[title]) for k in _PER_TICK)
-        say(f"    a haptic tick: {operations:.0f} operations, {signals:.0f} signals")
-
-
-_PER_TICK = ("operations", "signals")
+    rows = block_costs.costs(scene, time, skip=True)
+    for row in rows:
+        ports = sum(row.cost.inputs.values()), sum(row.cost.outputs.values())
+        say(f"  {row.name}: {row.cost.step} operations, {ports[0]} + {ports[1]} signals")
+    for title, all_rows in (
+        ("a haptic tick", rows),
+        ("with nothing left out", block_costs.costs(scene, time, skip=False)),
+    ):
+        operations, signals = (sum(getattr(r, k) for r in all_rows) for k in _PER_TICK)
+        say(f"  {title}: {operations:.0f} operations, {signals:.0f} signals")
+    say("\nleft out")
+    for need in parts:
+        if not need.needed:
+            say(f"  {need.part}: {need.why}")

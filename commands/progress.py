@@ -1,4 +1,4 @@
-"""A progress bar on stderr, if that is a terminal."""
+"""A progress bar on stderr if that is a terminal, else a line at the start of what is long."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from time import monotonic
 from hapticlink.orchestrator.base.faults import Fault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import printable, say
 
+SHORT = 2.0
+"""Duration (s) below which nothing is said of what is begun."""
 DURATIONS = "durations.json"
 """In the folder of the cache: minutes by command."""
 
@@ -25,8 +27,10 @@ def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], N
 @contextmanager
 def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int], None]]:
     """Gives a function to be called with what is done, and the numbers of finished and of all
-    steps."""
-    with _bar(title, hidden) as show:
+    steps. Where stderr is no terminal, a line tells at the start how long it took before."""
+    with _measured(title) as took, _bar(title, hidden) as show:
+        if not (hidden or show):
+            _tell(title, took)
         yield lambda what, done, of: show(done, of, what) if show else None
 
 
@@ -59,17 +63,28 @@ def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> I
 @contextmanager
 def waiting(what: str, hidden: bool = False) -> Iterator[None]:
     """Says what is being done, for as long as it takes, and how long it took before, where nothing
-    can be counted."""
+    can be counted; once at the start where stderr is no terminal."""
     with _measured(what) as took:
         if hidden or not sys.stderr.isatty():
+            if not hidden:
+                _tell(what, took)
             yield
             return
         from rich.console import Console
         from rich.markup import escape
 
-        before = "" if took is None else f", up to {60 * took:.0f} s before"
-        with Console(stderr=True).status(escape(printable(f"{what}{before}"))):
+        with Console(stderr=True).status(escape(printable(_said(what, took)))):
             yield
+
+
+def _said(what: str, took: float | None) -> str:
+    return what if took is None else f"{what}, up to {60 * took:.0f} s before"
+
+
+def _tell(what: str, took: float | None) -> None:
+    """Prints what is begun on stderr, unless it is known to take less than SHORT."""
+    if took is None or 60 * took >= SHORT:
+        say(_said(what, took), file=sys.stderr)
 
 
 @contextmanager

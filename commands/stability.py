@@ -90,6 +90,10 @@ def stability(
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 
+    passivity = None
+    if port:  # first, as what it refuses is known within seconds
+        with waiting(f"{name}: the user's port", quiet):
+            passivity = hl.passivity(scene, given)
     folder, bounds = out or changes.folder("runs", scene), Bounds(*drift)
     with steps(f"{name}: stability", hidden=quiet) as progress:
         judged: hl.Stability | hl.VaryingStability
@@ -98,9 +102,7 @@ def stability(
         else:
             judged = hl.stability(scene, given, poses=poses, bounds=bounds, progress=progress)
     record, lines = judged.record(), [*judged.lines()]
-    if port:
-        with waiting(f"{name}: the user's port", quiet):
-            passivity = hl.passivity(scene, given)
+    if passivity:
         record |= {"port": passivity.record()}
         lines += passivity.lines()
     if figure and isinstance(judged, hl.Stability):

@@ -12,6 +12,7 @@ from cyclopts import Parameter, validators
 
 from hapticlink.commands import completion, page_address
 from hapticlink.commands.options import UNCHANGED, Changes, Out, default_folder
+from hapticlink.commands.progress import waiting
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
@@ -124,7 +125,9 @@ def _written(scene: Scene, name: str, path: Path) -> int:
 
     if path.suffix.lower() != ".html":
         raise InputFault(f"--standalone {path}: name a file that ends in .html")
-    page.write(scene, default_folder("", name).name, path)
+    title = default_folder("", name).name
+    with waiting(f"{title}: compiling its page"):
+        page.write(scene, title, path)
     say(f"{path}: {path.stat().st_size / 1e3:.0f} kB; open it in a browser and drag")
     return 0
 

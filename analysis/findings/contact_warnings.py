@@ -3,7 +3,7 @@ rendered."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +28,8 @@ from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 ROWS = 500
 """Largest number of rows whose depths are computed."""
+PRESSED = 1e-4
+"""The depth (m) from which on a contact at the start is no rest on an obstacle."""
 
 
 def lines(results: Results) -> Iterator[str]:
@@ -41,6 +43,7 @@ def lines(results: Results) -> Iterator[str]:
     linkage = scene_part(results, "linkage", Linkage)
     contacts = scene_part(results, "contacts", Contacts)
     if JOINT_COORDINATES in table:  # both are recorded
+        yield from pressed(linkage, contacts, table[JOINT_COORDINATES][0])
         yield from _deep(results, linkage, contacts)
     mechanism = scene_part(results, "mechanism", Mechanism)
     method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
@@ -48,6 +51,17 @@ def lines(results: Results) -> Iterator[str]:
         rate = record.fmus[CONTACT_GAP.partition(".")[0]].rate
         step_s = record.clocks[rate].longest / mechanism.substeps
         yield from _stiff(linkage, contacts, step_s, method.bounded_by)
+
+
+def pressed(linkage: Linkage, contacts: Contacts, q: Sequence[float] | Vector) -> Iterator[str]:
+    """A line for the deepest contact at the joint coordinates with which a scene starts."""
+    found = [(pair, float(depth[0])) for pair, depth in depths(linkage, contacts, [list(q)])]
+    pair, depth = max(found, key=lambda item: item[1], default=(None, 0.0))
+    if pair and depth > PRESSED:
+        yield (
+            f"warning: the scene starts inside a contact, {pair.body} {short(1e3 * depth)} mm deep "
+            f"in {pair.obstacle}, which throws it out: move the obstacle, or linkage.start"
+        )
 
 
 def _tables(results: Results) -> Iterator[tuple[Vector, Table]]:

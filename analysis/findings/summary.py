@@ -260,6 +260,8 @@ def _real_time(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"{fmu} ran in the haptic loop: {why}"
 
 
+PULL = 5.0
+"""A spring hand's first force (N) from which on its target is told not to be where it starts."""
 SMALLEST_J = 1e-9
 """Energies below it have no line."""
 
@@ -343,6 +345,14 @@ def _start(run: Results) -> Iterator[str]:
         and device[WORKSPACE_MARGIN][0] < 0
     ):
         yield f"warning: {outside(device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0])}"
+    pulls = of_block(results, HAND_WRENCH, 3)
+    if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
+        pull = float(np.hypot(*pulls[HAND_WRENCH][0, :2])) if len(pulls["time"]) else 0.0
+        if pull > PULL:
+            yield (
+                f"warning: the hand's spring begins with a pull of {short(pull)} N: begin "
+                "hand.target where the handle starts, which `hapticlink info` prints"
+            )
     linkage = results.record.scene["linkage"]
     if not linkage:
         return

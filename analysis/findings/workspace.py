@@ -28,7 +28,7 @@ def lines(device: Device, start: Pose) -> Iterator[str]:
     if distance < 0:
         yield f"warning: {outside(start, distance)}"
     else:
-        pose = ", ".join(f"{value:.4g}" for value in start)
+        pose = ", ".join(f"{round(value, 7) + 0.0:.4g}" for value in start)  # no -3e-18
         yield f"the handle starts at ({pose}), {distance:.3g} m from the nearest stop"
 
 

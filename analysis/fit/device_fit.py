@@ -109,9 +109,10 @@ class _Shooting:
         self._path = ca.Function("path", [at, s, U], [path])
         self._slopes = ca.Function("slopes", [at, s, U], [ca.jacobian(path, both)])
         hand = np.zeros_like(log.pose) if log.hand is None else log.hand
-        # The motors hold their wrench from sample to sample, a hand does not.
+        # The motors hold their wrench from sample to sample, a hand of flesh does not.
         assert log.motors is not None
-        self._inputs = np.hstack([log.motors[:-1], (hand[:-1] + hand[1:]) / 2])
+        acts = hand[:-1] if log.held else (hand[:-1] + hand[1:]) / 2
+        self._inputs = np.hstack([log.motors[:-1], acts])
         self._measured = np.asarray(self._counts.map(len(log.pose))(log.pose.T)).T
 
     def first_states(self) -> Matrix:

@@ -27,12 +27,15 @@ STILL = ((0.0, 0.0, 0.0, 0.0),)
 class Fitted:
     """Estimates of [device] and [hand]. counts: root mean square of the errors that remain at the
     encoders; unexplained: by axis, the share of the variance of the hand's wrench that the arm does
-    not explain. None and empty where there was nothing to fit."""
+    not explain. None and empty where there was nothing to fit. start: the handle's pose at the
+    start of the log, which the hand keeps; left_out: what the log cannot say, in sentences."""
 
     estimates: tuple[Estimate, ...]
     counts: float | None
     unexplained: tuple[float, ...]
     arm: ArmHand
+    start: tuple[float, ...]
+    left_out: tuple[str, ...] = ()
 
     def lines(self) -> Iterator[str]:
         for estimate in self.estimates:
@@ -45,6 +48,7 @@ class Fitted:
         if self.unexplained:
             shares = ", ".join(f"{share:.2%}" for share in self.unexplained)
             yield f"variance of the hand's wrench that the arm does not explain: {shares}"
+        yield from self.left_out
 
     def record(self) -> dict[str, Any]:
         """The content of fit.json."""
@@ -52,6 +56,7 @@ class Fitted:
             "parameters": {e.key: e.record() for e in self.estimates},
             "encoder_errors_counts": self.counts,
             "unexplained": list(self.unexplained),
+            "left_out": list(self.left_out),
         }
 
     def scene(self) -> str:
@@ -66,7 +71,8 @@ class Fitted:
             hand.append(f"{name} = {toml(values, name)}")
         lines = ["[device]", *device, ""] if device else []
         if self.unexplained:
-            lines += ["[hand]", 'type = "arm"', *hand, "target = [[0.0, 0.0, 0.0, 0.0]]"]
+            target = ((0.0, *self.start),)
+            lines += ["[hand]", 'type = "arm"', *hand, f"target = {toml(target, 'target')}"]
         return "\n".join(lines) + "\n"
 
 
@@ -83,6 +89,7 @@ def fit(
     log: a CSV, an HDF5 file or the folder of a run with the columns `time`, `haptic_device.x`
     (m, m, rad), and `controller.F_motor`, `hand.F` or both (N, N, N.m). Without the motors' wrench
     the arm alone is fitted, without the hand's the device alone, which nobody may then hold.
+    In a run the hand's wrench is held over each haptic period, in other logs it acts all the time.
     Raises InputFault for a log that cannot be read or moves nothing, an unknown parameter, and a
     scene without a device.
     """
@@ -94,12 +101,25 @@ def fit(
     estimates: list[Estimate] = []
     counts: float | None = None
     unexplained: list[float] = []
+    left_out: list[str] = []
     if given.motors is not None:
         found, counts = fit_device(given, read.device, device)
         estimates += found
     if given.hand is not None:
-        found, unexplained = fit_arm(given, arm)
-        estimates += found
-    if not estimates:
+        if given.hand_type in ("", "arm"):
+            found, unexplained = fit_arm(given, arm)
+            estimates += found
+            fitted = {e.key[-2] for e in found}
+            left_out += [
+                f"hand: axis {axis} is left out, where the log has no motion or no change of force"
+                for axis in "012"
+                if axis not in fitted
+            ]
+        else:
+            left_out.append(f'hand: type = "{given.hand_type}" in this run, no arm to be fitted')
+    if given.motors is None and given.hand is None:
         raise InputFault(f"{log}: it has neither the motors' nor the hand's wrench")
-    return Fitted(tuple(estimates), counts, tuple(unexplained), arm)
+    if not estimates:
+        raise InputFault(f"{log}: nothing to fit: {'; '.join(left_out)}")
+    start = tuple(given.pose[0].tolist())
+    return Fitted(tuple(estimates), counts, tuple(unexplained), arm, start, tuple(left_out))

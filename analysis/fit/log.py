@@ -14,6 +14,7 @@ from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import HAND_WRENCH, MEASURED_HANDLE_POSE, MOTOR_WRENCH
+from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.tables import Table, read_table
 
 UNEVEN = 0.01
@@ -26,14 +27,18 @@ LEAST = 256
 class Log:
     """Samples that are `period` (s) apart.
 
-    pose: of the handle, (n, 3), m, m, rad. motors, hand: the wrenches that are held from each
-    sample on, (n, 3), N, N, N.m; None where the log has none.
+    pose: of the handle, (n, 3), m, m, rad. motors: the wrench that is held from each sample on;
+    hand: that of the hand, (n, 3), N, N, N.m; None where the log has none. held: the hand's wrench
+    is held as well, and comes of the handle's pose at the sample alone, as in a run; else it acts
+    all the time, as on a force sensor. hand_type: that of [hand] in a run, empty for other logs.
     """
 
     period: float
     pose: Matrix
     motors: Matrix | None
     hand: Matrix | None
+    held: bool = False
+    hand_type: str = ""
 
 
 def read(path: Path | str) -> Log:
@@ -44,6 +49,8 @@ def read(path: Path | str) -> Log:
         path = path / "haptics.csv"
     elif not text_files.exists(path):
         raise InputFault(f"{path}: cannot be read as a log: it is no file")
+    run = path.parent / "run.json"
+    of_run = path.name == "haptics.csv" and run.is_file()
     table = _hdf5(path) if path.suffix in (".h5", ".hdf5") else read_table(path)
     names = {
         name: name in table for name in ("time", MEASURED_HANDLE_POSE, MOTOR_WRENCH, HAND_WRENCH)
@@ -72,8 +79,18 @@ def read(path: Path | str) -> Log:
             f"{period:.4g} s on average: resample the log evenly"
         )
     return Log(
-        period, signals[MEASURED_HANDLE_POSE], signals.get(MOTOR_WRENCH), signals.get(HAND_WRENCH)
+        period=period,
+        pose=signals[MEASURED_HANDLE_POSE],
+        motors=signals.get(MOTOR_WRENCH),
+        hand=signals.get(HAND_WRENCH),
+        held=of_run,
+        hand_type=_hand_type(run) if of_run else "",
     )
+
+
+def _hand_type(run: Path) -> str:
+    """The type of [hand] in the record of a run."""
+    return str((json_file.read(run)["scene"].get("hand") or {}).get("type", ""))
 
 
 def _hdf5(path: Path) -> Table:

@@ -26,7 +26,7 @@ harmonic with the others let go, and from above by scales for them (absolute_sta
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -39,15 +39,17 @@ from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_w
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.analysis.stability.port_response import (
+    LARGEST,
     HandPort,
     MechanismPort,
     Response,
+    forces,
     hand_port,
     mechanism_port,
-    require_size,
     response,
 )
 from hapticlink.analysis.stability.poses import in_own_hand
+from hapticlink.analysis.stability.rates import rounded
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator.base.arrays import Complex, Vector
@@ -57,6 +59,8 @@ from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
 FREQUENCIES = 32
+SLOW = 1e-3
+"""The frequency (Hz) below which a damping is said to be needed in slow motion."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,8 @@ class Passivity:
     """Frequencies (Hz) and the damping that is necessary there."""
     two_port: TwoPort | None
     """The rendering between the hand and a virtual mechanism, None without one behind a device."""
+    rounded: str = ""
+    """Which rate is judged in place of one with which events hardly repeat; empty for none."""
 
     @property
     def passive(self) -> bool:
@@ -94,17 +100,26 @@ class Passivity:
             "damping_of_device": self.own,
             "least_passive_frequency": self.frequency,
             "damping_necessary_by_frequency": [list(pair) for pair in self.curve],
+            "rounded": self.rounded,
             "two_port": self.two_port.record() if self.two_port else None,
         }
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
         needed = between(max(0.0, self.at_least), max(0.0, self.needed))
+        slow = "in slow motion" if self.frequency < SLOW else f"at {self.frequency:.4g} Hz"
+        turning = f" and {max(0.0, self.turning):.4g} N.m.s/rad" if self.turning else ""
         yield (
-            f"user's port: {'passive' if self.passive else 'not passive'} for any hand; the device "
-            f"needs a damping of {needed} N.s/m"
-            + (f" and {max(0.0, self.turning):.4g} N.m.s/rad" if self.turning else "")
-            + f", it has {self.own:.4g}; least passive at {self.frequency:.4g} Hz"
+            f"user's port: {'passive' if self.passive else 'not passive'}: the device needs a "
+            f"damping of {needed} N.s/m{turning} and has {self.own:.4g}; most is needed {slow}"
+        )
+        if self.rounded:
+            yield f"  {self.rounded}"
+        yield (
+            "  no hand can take energy out of it"
+            if self.passive
+            else "  some hand, maybe none of flesh, could take energy out of it; softer gains and "
+            "contacts, a higher rate, or more damping of the device mend it"
         )
         if self.two_port:
             yield from self.two_port.lines()
@@ -116,16 +131,33 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     several users it is the first one's port, with the others in the hands of the scene.
 
     Raises InputFault for a scene without equilibrium in its own hand, one whose hand pushes no
-    device, or with a hyperperiod of more than 600 forces.
+    device, or with a hyperperiod of more than 600 forces, with frames of whole haptic
+    periods, too.
     """
-    given = overrides.written(options)
+    given, said = overrides.written(options), ""
+    read, hand, mechanism, count = _ports(scene, given)
+    if count > LARGEST and read.graphics is not None:
+        given, said = rounded(read, given)
+        read, hand, mechanism, count = _ports(scene, given)
+    if count > LARGEST:
+        raise InputFault(
+            f"user's port: {count} forces in a hyperperiod, at most {LARGEST}: take a higher "
+            f"graphics rate, such as --set graphics.rate={float(read.haptics.rate) / 16:g}"
+        )
+    with in_own_hand(scene, given) as (place, _):
+        found = of(read.title, place.map, place.period({}).in_map, hand, mechanism, place.T)
+    return replace(found, rounded=said)
+
+
+def _ports(
+    scene: str | Path | Scene, given: tuple[str, ...]
+) -> tuple[Scene, HandPort, MechanismPort | None, int]:
+    """A scene, its ports, and the entries of the forces there in a hyperperiod."""
     with linearisable(scene, given) as (read, system, _):
         hand = hand_port(system)
         mechanism = mechanism_port(system, hand)
         with lifted_map(long_enough(read, system), read) as map_:
-            require_size(map_, hand, mechanism)
-    with in_own_hand(scene, given) as (place, _):
-        return of(read.title, place.map, place.period({}).in_map, hand, mechanism, place.T)
+            return read, hand, mechanism, forces(map_, hand, mechanism)
 
 
 def of(

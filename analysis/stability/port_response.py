@@ -156,16 +156,12 @@ class Response:
         return float(np.abs(np.linalg.eigvals(self.A)).max(initial=0.0))
 
 
-def require_size(map_: LiftedMap, hand: HandPort, mechanism: MechanismPort | None) -> None:
-    """Raises InputFault for a hyperperiod with too many forces, which no frequency could take."""
+def forces(map_: LiftedMap, hand: HandPort, mechanism: MechanismPort | None) -> int:
+    """The entries of both stacked forces in a hyperperiod."""
     count = len(hand.moved) * map_.count(Set, hand.handle)
     if mechanism:
         count += len(mechanism.moved) * map_.count(Step, mechanism.fmu)
-    if count > LARGEST:
-        raise InputFault(
-            f"user's port: {count} forces in a hyperperiod, at most {LARGEST}: take a graphics "
-            "rate that divides the haptic one"
-        )
+    return count
 
 
 def response(

@@ -20,7 +20,6 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import in_poses
 from hapticlink.analysis.stability.hands import FREE, HANDS, OWN, OWN_FREE, UNHELD, holds, own_hand
-from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.margin_and_remedy import improvements
 from hapticlink.analysis.stability.mode_kinds import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import (
@@ -32,7 +31,7 @@ from hapticlink.analysis.stability.poses import (
     settled,
     simulated,
 )
-from hapticlink.analysis.stability.rates import frame_length, whole_frames
+from hapticlink.analysis.stability.rates import short
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
@@ -41,17 +40,13 @@ from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.faults import InputFault, shortened
-from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.timeline import timeline
 
 POSES, SPAN = 3, 3.0
 """Poses, evenly spaced in the first seconds of the scene's run."""
-EVENTS = 600
-"""Haptic periods after which all has to repeat in a scene that is judged at its own rates."""
 Progress = Callable[[str, int, int], object]
 Hands = Mapping[str, Hand | None]
 
@@ -80,7 +75,7 @@ def stability(
             "a rate that varies is judged in mean square, at the equilibrium of the scene: "
             "--equilibrium, with a hand that holds it"
         )
-    given, rounded = _short(read, given)
+    given, rounded = short(read, given)
     if read.hand is None or replaced(read):
         poses_at_rest = [_rest(scene, given, read)]
         return _judged(scene, given, poses_at_rest, {UNHELD: None}, bounds, progress, rounded)
@@ -118,7 +113,7 @@ def equilibrium_stability(
     hands: Hands = {UNHELD: None}
     if read.hand is not None and not replaced(read):
         hands = {OWN: own_hand(read.hand)}
-    given, rounded = _short(read, given)
+    given, rounded = short(read, given)
     return _judged(scene, given, [_rest(scene, given, read)], hands, bounds, progress, rounded)
 
 
@@ -129,19 +124,6 @@ def _require_bounds(bounds: Bounds) -> None:
         raise InputFault(
             f"drift up to {bounds.hertz:g} Hz and {bounds.growth:g} 1/s: give 0 or more"
         )
-
-
-def _short(read: Scene, given: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
-    """The options with which a scene is judged, and which rate is rounded in them: where its events
-    repeat only after more than EVENTS, as of 29.97 and 512 Hz after 100 s, frames are whole haptic
-    periods. Raises InputFault for a rate that varies."""
-    time = timeline(read)
-    period = time.seconds(hyperperiod(time))
-    if read.graphics is None or period * float(read.haptics.rate) <= EVENTS:
-        return given, ""
-    whole = float(exact(read.haptics.rate)) / frame_length(read)
-    why = f"with its own rates all repeats only after {period:.4g} s"
-    return whole_frames(read, given), f"judged with graphics at {whole:.5g} Hz: {why}"
 
 
 def _silent(what: str, done: int, of: int) -> None:

@@ -21,6 +21,13 @@ from hapticlink.analysis.stability.harmonics import Hybrid, hertz
 
 ROUNDING = 1e-6
 """Of the impedance: damping that is none, and harmonics that do not mix."""
+CONCLUSIONS = {
+    "absolutely stable": "no passive hand and mechanism make it unstable",
+    "not absolutely stable": "some passive hand and mechanism, maybe not those of "
+    "this scene, would make it unstable",
+    "undecided": "whether some passive hand and mechanism would make it unstable is not known",
+}
+"""By verdict, what a reader learns of it."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +86,7 @@ class TwoPort:
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
-        yield f"between hand and mechanism: {self.verdict}, for any passive hand and mechanism"
+        yield f"between hand and mechanism: {self.verdict}: {CONCLUSIONS[self.verdict]}"
         if not self.held:
             yield (
                 "  unstable by itself, with the hand gone and the mechanism held (spectral radius "
@@ -89,12 +96,12 @@ class TwoPort:
             yield f"  of the mechanism as at the equilibrium: {', '.join(self.kept)}"
         if self.needed > 0.0:
             yield (
-                f"  it takes a damping of {between(self.at_least, self.needed)} N.s/m"
+                f"  to rule that out takes a damping of {between(self.at_least, self.needed)} N.s/m"
                 + (f" and {self.turning:.3g} N.m.s/rad" if self.turning else "")
                 + f" at both ports ({max(0.0, self.hand):.4g} at the hand's, "
                 f"{max(0.0, self.mechanism):.4g} at the mechanism's "
-                f"whatever the other has); least passive at {self.frequency:.4g} Hz, no damping "
-                f"needed below {self.below:.3g} Hz"
+                f"whatever the other has), most at {self.frequency:.4g} Hz and none below "
+                f"{self.below:.3g} Hz; softer gains of the coupling and higher rates need less"
             )
 
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from hapticlink.components.specs.quantities import Length, Mass, MomentOfInertia, Point
 
+SAME = 1e-9
+"""The distance (m) up to which a centre of mass is that of a shape."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
@@ -34,15 +37,16 @@ class Body:
             return
         if not self.shape:
             raise ValueError(f"body {self.name!r} has no shape: give its `inertia`")
-        if self.center is not None:
-            raise ValueError(
-                f"body {self.name!r}: a centre of mass that is given is not that of a uniform "
-                "shape: give its `inertia` too, or leave out `center`"
-            )
         try:
             center, per_mass = uniform(self.shape, self.radius or 0.0)
         except OverflowError:
             raise ValueError(f"body {self.name!r}: its shape is too large (m)") from None
+        if self.center is not None and math.dist(self.center, center) > SAME:
+            raise ValueError(
+                f"body {self.name!r}: center = {list(self.center)} is not that of its uniform "
+                f"shape, {[round(x, 9) for x in center]}: give its `inertia` too, or leave out "
+                "`center`"
+            )
         object.__setattr__(self, "inertia", self.mass * per_mass)
         if center != (0.0, 0.0):
             object.__setattr__(self, "center", center)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from typing import ClassVar
 
 import numpy as np
@@ -43,6 +43,9 @@ class OfSamples(Hold):
     laws: ClassVar[tuple[Law, ...]]
     """The law while the hold has one sample, two, and so on."""
 
+    def __init_subclass__(cls) -> None:
+        _require_known(getattr(cls, "laws", ()), _ARGUMENTS)
+
     def __init__(self, context: HoldContext) -> None:
         self.size, self.seconds = context.size, context.seconds
         self.samples = History(self.depth)
@@ -72,6 +75,19 @@ _ARGUMENTS: dict[str, Callable[[OfSamples, float], Value]] = {
 """What the argument of a law is, `s` ticks after the newest stamp."""
 
 
+_OF_A_TRANSITION = ("y", "y1", "w", "wd", "r", "H")
+
+
+def _require_known(laws: Iterable[Law], known: Collection[str]) -> None:
+    """Raises TypeError for a law with an argument that has no meaning."""
+    for law in laws:
+        for name in arguments(law):
+            if name not in known:
+                raise TypeError(
+                    f"law {law.__name__!r}: no argument {name!r}; there are {', '.join(known)}"
+                )
+
+
 class Transition(Hold):
     """Base of holds that go from the value w which they have when a sample arrives to that sample,
     and reach it a period H later. Their laws take y, y1, w, wd, r and H."""
@@ -81,6 +97,9 @@ class Transition(Hold):
     """The law with one sample, that until the newest is reached (r < 1), and that from there on."""
     slopes: ClassVar[tuple[Law, ...] | None] = None
     """Laws of the slope (per tick), where those of the value need it."""
+
+    def __init_subclass__(cls) -> None:
+        _require_known((*getattr(cls, "laws", ()), *(cls.slopes or ())), _OF_A_TRANSITION)
 
     def __init__(self, context: HoldContext) -> None:
         self._samples = History(self.depth)

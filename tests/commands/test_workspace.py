@@ -30,6 +30,23 @@ def test_a_start_outside_is_told_by_info_and_by_a_run(
     assert OUTSIDE in capsys.readouterr().out
 
 
+def test_a_start_inside_a_contact_is_told_by_info_and_by_a_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The middle of a disc of 8 mm at the axis of link 2, of 3 mm radius: 11 mm deep."""
+    options = "--set", "contacts.disc.pin.center=[0.0445477, 0.0148492]"
+    hand = "--set", "hand={type='spring', stiffness=[300, 300, 0], damping=[1, 1, 0]}"
+    said = "the scene starts inside a contact, link2 11 mm deep in pin"
+    assert status("info", "obstacles", *options) == 0
+    assert said in capsys.readouterr().out
+    short = "--no-figures", "--out", tmp_path, "--set", "duration=0.02"
+    assert status("run", "obstacles", *short, *options, *hand) == 0
+    told = capsys.readouterr().out
+    assert said in told
+    pull = 300 * np.hypot(0.0445477, 0.0148492)
+    assert f"the hand's spring begins with a pull of {pull:.3g} N" in told
+
+
 def test_the_drawing_shows_the_device_at_the_start_with_units() -> None:
     start = (0.04, 0.01, 0.5)
     (axes,) = draw(Device(), start, "title").axes

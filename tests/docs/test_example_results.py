@@ -68,8 +68,16 @@ def test_an_own_controller_acts_as_the_scene_s_own_block(tmp_path: Path) -> None
     command = [build, "build", "-f", script.name]
     subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
     swap = {"fmu.+": {"replaces": "controller", "path": str(tmp_path / "SpringCoupling.fmu")}}
-    law = {"controller.impedance": False, "controller.topology": False}
-    own, built_in = (hl.run("closed-loop", {"duration": 0.5, **o}) for o in (swap, law))
+    law = {
+        "controller.impedance": False,
+        "controller.topology": False,
+        "controller.teleoperation.stiffness": [100.0, 100.0, 0.1],
+        "controller.teleoperation.damping": [5.0, 5.0, 0.005],
+    }
+    stiffer = swap | {"fmu.controller.start.k": 200.0}
+    own, built_in, k200 = (hl.run("closed-loop", o) for o in (swap, law, stiffer))
+    assert own.tracking().distance_mm.max() == pytest.approx(9.8, abs=0.05)
+    assert k200.tracking().distance_mm.max() == pytest.approx(5.9, abs=0.05)
     for signal in ("virtual_mechanism.x", "haptic_device.x_true", "controller.F_drift"):
         assert np.ptp(built_in[signal], axis=0).min() > 0
         np.testing.assert_allclose(own[signal], built_in[signal], rtol=1e-9, atol=1e-12)
@@ -95,6 +103,17 @@ def test_a_program_in_c_plus_plus_gets_the_pose_of_our_own_run(tmp_path: Path) -
     ours = hl.run("closed-loop", {"hand.wrench": [0.5, 0.0, 0.0], "packaging": "native"})
     pose = done.stdout.splitlines()[-1].split()
     assert [*map(float, pose)] == ours["virtual_mechanism.x"][-1].tolist()
+
+
+def test_fmpy_gets_the_pose_of_our_own_run_from_the_hand_s_force(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "fmus-elsewhere.md"
+    (script,) = (b.text for b in blocks(page, "python") if "hand.F[1]" in b.text)
+    hl.build("closed-loop", as_one=True, without="hand", out=tmp_path / "fmus")
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    ours = hl.run("closed-loop", {"hand.wrench": [0.5, 0.0, 0.0], "duration": 1.0})
+    assert float(done.stdout.split()[-1]) == ours["virtual_mechanism.x"][-1, 0]
 
 
 def test_libcosim_reaches_the_pose_of_our_jacobi(tmp_path: Path) -> None:

@@ -14,11 +14,17 @@ ABOUT = ("title", "description")
 
 def differing(runs: Sequence[Results]) -> dict[str, tuple[str, ...]]:
     """The keys of which the scenes have different values, with the value of each; entries of lists
-    of tables are named by their `name` or counted from 1."""
+    of tables are named by their `name` or counted from 1. Without the tables of blocks in whose
+    place a run had an FMU, which say nothing of it."""
+    unused = {block for run in runs for block in run.record.replaced}
     every = [dict(_leaves(run.record.scene)) for run in runs]
     keys = dict.fromkeys(key for leaves in every for key in leaves)
     values = {key: tuple(leaves.get(key, UNSET) for leaves in every) for key in keys}
-    return {k: v for k, v in values.items() if len(set(v)) > 1 and k not in ABOUT}
+    return {
+        k: v
+        for k, v in values.items()
+        if len(set(v)) > 1 and k not in ABOUT and k.partition(".")[0] not in unused
+    }
 
 
 def other_scenes(runs: Sequence[Results]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.analysis.fit.arm_fit import fit_arm
+from hapticlink.analysis.fit.arm_fit import NAMES, fit_arm
 from hapticlink.analysis.fit.device_fit import fit_device
 from hapticlink.analysis.fit.estimate import Estimate, standard_deviations
 from hapticlink.analysis.fit.log import Log
@@ -130,6 +130,43 @@ def test_the_command_writes_what_a_scene_takes(log: Log, tmp_path: Path, capsys)
     fitted = record["parameters"]["device.handle_mass"]["value"]
     assert read.device.handle_mass == pytest.approx(fitted, rel=1e-12)
     assert read.hand.type == "arm"
+
+
+def test_a_run_whose_hand_is_held_is_fitted_without_bias(tmp_path: Path) -> None:
+    """The device to rounding, as its equations are the same; the arm to what differences of the
+    pose leave of its velocity. Noise at the controller makes the motors shake."""
+    arm = {name: getattr(ARM, name) for name in NAMES}
+    options = {
+        "duration": 2.0,
+        "device.handle_mass": 0.2,
+        "device.motor_damping": 2e-3,
+        "hand": {"type": "arm", "target": [[0, 0.0445477, 0.0148492, -0.785398]], **arm},
+        "at": [{"time": 0.0, "noise": {"controller.x_D": 0.02}}],
+    }
+    hl.run("closed-loop", options, out=tmp_path)
+    found = hl.fit(tmp_path)
+    value = {e.key: e.value for e in found.estimates}
+    assert value["device.handle_mass"] == pytest.approx(0.2, rel=1e-6)
+    assert value["device.motor_damping"] == pytest.approx(2e-3, rel=1e-3)
+    for name in NAMES:
+        fitted = [value[f"hand.{name}[{axis}]"] for axis in range(3)]
+        assert fitted == pytest.approx(arm[name], rel=0.01), name
+    assert "target = [[0.0, 0.0445" in found.scene()
+
+
+def test_what_a_run_cannot_say_is_left_out_in_words(tmp_path: Path) -> None:
+    hl.run("closed-loop", {"duration": 1.0}, out=tmp_path)
+    found = hl.fit(tmp_path, device=["handle_mass"])
+    assert [e.key for e in found.estimates] == ["device.handle_mass"]
+    assert found.left_out == ('hand: type = "constant" in this run, no arm to be fitted',)
+    assert "[hand]" not in found.scene()
+
+
+def test_an_axis_whose_force_stays_is_left_out(log: Log, tmp_path: Path) -> None:
+    still = replace(log, hand=log.hand * [1, 1, 0], motors=None)
+    found = hl.fit(csv(still, tmp_path / "log.csv"))
+    assert {e.key.partition("[")[2] for e in found.estimates} == {"0]", "1]"}
+    assert "axis 2 is left out" in found.left_out[0]
 
 
 def test_hdf5_and_csv_are_one_log(log: Log, tmp_path: Path) -> None:

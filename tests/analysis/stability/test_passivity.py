@@ -73,10 +73,24 @@ def test_of_two_users_it_tells_what_is_left_as_at_the_equilibrium() -> None:
 
 
 def test_too_many_forces_are_refused_before_anything_is_searched() -> None:
-    """256 ticks and 15 frames, three entries each of the handle at every tick and of the
-    mechanism; a path that never rests would be the later fault."""
-    with pytest.raises(hl.InputFault, match="forces in a hyperperiod, at most 600"):
-        hl.passivity("two-users")
+    """256 haptic periods in a frame, three entries each; a path that never rests would be the later
+    fault. The remedy names a rate."""
+    with pytest.raises(hl.InputFault, match=r"at most 600: .* --set graphics\.rate=32"):
+        hl.passivity("two-users", {"graphics.rate": 2})
+
+
+def test_a_rate_that_hardly_repeats_is_judged_with_whole_frames() -> None:
+    """29.97 and 512 Hz repeat after 100 s; 17 haptic periods are a frame of 30.118 Hz."""
+    hold = {"stiffness": [100.0, 100.0, 0.1], "damping": [5.0, 5.0, 0.005]}
+    hand = {"type": "spring", "target": [[0.0, 0.035, 0.025, -0.785]]} | hold
+    found, whole = (
+        hl.passivity("closed-loop", {"graphics.rate": rate, "hand": hand})
+        for rate in (30, "512/17")
+    )
+    assert "30.118 Hz" in found.rounded
+    assert found.rounded in "".join(found.lines())
+    assert (found.needed, found.at_least) == (whole.needed, whole.at_least)
+    assert not whole.rounded
 
 
 def test_a_target_that_comes_to_rest_later_is_judged_from_there() -> None:

@@ -158,6 +158,23 @@ def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path: Path) -> None
     assert len((tmp_path / "0" / "haptics.csv").read_text().splitlines()) > 3
 
 
+def test_a_law_with_an_unknown_argument_is_the_plugin_s_error(tmp_path: Path) -> None:
+    law = (
+        "from hapticlink.orchestrator.holds import HOLDS\n"
+        "from hapticlink.orchestrator.holds.history import {base}\n"
+        "def law(y, speed): return y\n"
+        "class Mine({base}):\n    laws = (law,)\n"
+        'HOLDS.register("mine", Mine)\n'
+    )
+    write(tmp_path, of=law.format(base="OfSamples"), to=law.format(base="Transition"))
+    known = {"of": "y, y1, y2, yd, yd1, s, H,", "to": "y, y1, w, wd, r, H"}
+    lines = (f"hapticlink run pendulum --plugin {module}" for module in known)
+    for ended, (module, names) in zip(hapticlink(tmp_path, *lines), known.items(), strict=True):
+        assert ended.status == 2
+        said = f"{module}.py, line 4: TypeError: law 'law': no argument 'speed'; there are {names}"
+        assert said in ended.said
+
+
 def test_parts_that_fail_or_give_something_else(tmp_path: Path) -> None:
     integrator = (
         "from hapticlink.components.integrators.base import Integrator\n"

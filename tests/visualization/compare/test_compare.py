@@ -55,6 +55,17 @@ def test_settings_that_differ_are_all_of_them(root: Path) -> None:
     assert found == {"duration": ("1.0", "0.7"), "graphics.rate": ("10", "30")}
 
 
+def test_settings_of_a_block_that_was_replaced_are_not_listed(root: Path) -> None:
+    """Nor in the run that has the block: the other has nothing to compare them with."""
+    own = hl.load(root / "fast").run["scene"]
+    other = own | {"controller": own["controller"] | {"impedance": False}}
+    runs = [hl.load(root / "fast"), with_keys(root, "fast", scene=other)]
+    assert list(settings.differing(runs)) == ["controller.impedance"]
+    swapped = {"controller": {"lost": [], "unfed": [], "mapped": {}}}
+    runs[1] = with_keys(root, "fast", scene=other, replaced=swapped)
+    assert settings.differing(runs) == {}
+
+
 def test_errors_are_compared_until_the_first_end(root: Path) -> None:
     runs = [hl.load(root / name) for name in ("slow", "fast")]
     rows = {r.label: r.values for r in numbers.sections(runs)["Performance, all until 0.699 s"]}
