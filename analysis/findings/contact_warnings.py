@@ -55,7 +55,7 @@ def lines(results: Results) -> Iterator[str]:
 
 def pressed(linkage: Linkage, contacts: Contacts, q: Sequence[float] | Vector) -> Iterator[str]:
     """A line for the deepest contact at the joint coordinates with which a scene starts."""
-    found = [(pair, float(depth[0])) for pair, depth in depths(linkage, contacts, [list(q)])]
+    found = [(pair, float(depth[0])) for pair, depth in depths(linkage, contacts, np.array([q]))]
     pair, depth = max(found, key=lambda item: item[1], default=(None, 0.0))
     if pair and depth > PRESSED:
         yield (
