@@ -10,7 +10,7 @@ from time import perf_counter
 
 import numpy as np
 
-from hapticlink.orchestrator.base import interrupt, plugins
+from hapticlink.orchestrator.base import interpreter_state, interrupt, plugins
 from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
 from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.plan.plan import Plan
@@ -164,7 +164,8 @@ def _run_events(
             progress(time)
 
     try:
-        loop.run(turn)
+        with interpreter_state.restored():  # tables are written with all the depth that there is
+            loop.run(turn)
     finally:
         results.flush()
         outcome.wall_time = perf_counter() - begin

@@ -42,7 +42,7 @@ ACTS = RAISES | {
     "locale": "locale.setlocale(locale.LC_ALL, 'de_DE.UTF-8')",
     "deaf": "signal.signal(signal.SIGINT, signal.SIG_IGN)",
     "seterr": "numpy.seterr(all='raise')",
-    "recursion": "sys.setrecursionlimit(60)",
+    "recursion": "sys.setrecursionlimit(len(inspect.stack(0)) + 60)",
     "prints": "[print('%0100d' % i) for i in range(1000)]",
     "flood": "[self.log('x' * 1000, enums.Fmi2Status.error) for _ in range(1000)]",
     "long": "self.log('x' * 2**20, enums.Fmi2Status.error)",
@@ -58,7 +58,7 @@ ACTS = RAISES | {
     "queue": "self.log_queue.append(7)",
 }
 _SLAVE = """
-import ctypes, gc, locale, numpy, os, signal, sys, tempfile, threading, time, warnings
+import ctypes, gc, inspect, locale, numpy, os, signal, sys, tempfile, threading, time, warnings
 from pythonfmu{of} import Fmi{fmi}Causality, Fmi{fmi}Slave, {real}, enums
 if {fmi} == 3:
     enums.Fmi2Status = enums.Fmi3Status
