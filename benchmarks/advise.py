@@ -64,8 +64,8 @@ class Judged:
     def line(self) -> str:
         """The row of the table."""
         taken = self.advice.taken
-        told = "" if taken.admitted else " (keeps the limits in "
-        told += "" if taken.admitted else f"{taken.within} of {len(taken.error_mm)})"
+        limits = f" (keeps the limits in {taken.within} of {len(taken.error_mm)})"
+        told = "" if taken.admitted else limits
         return (
             f"| {self.seed} | {self.scene} | {taken.method.name}{told} | {self.kept} of {DRAWS} | "
             f"{self.best.name if self.best else f'none ({self.most} of {DRAWS} at most)'} | "

@@ -86,20 +86,17 @@ def info(
 
 def _starts(scene: Any, start: dict[str, float]) -> None:
     """Where the handle starts, who holds it, and what can be touched."""
-    from hapticlink.analysis.findings import summary
+    from hapticlink.analysis.findings import summary, workspace
 
     if scene.linkage and start:
         for line in summary.moved(asdict(scene.linkage), coordinates(start)):
             say(f"  {line}")
     if scene.device:
-        from hapticlink.analysis.findings import workspace
-
         say("\ndevice's workspace")
         for line in workspace.lines(scene.device, _pose(start)):
             say(f"  {line}")
     elif start:
-        pose = ", ".join(f"{round(value, 7) + 0.0:.4g}" for value in _pose(start))
-        say(f"\nthe operational point starts at ({pose})")
+        say(f"\nthe operational point starts at {workspace.placed(_pose(start))}")
     if scene.hand:
         say(f"hand: {scene.hand.type}")
     if scene.contacts and start:

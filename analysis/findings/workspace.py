@@ -28,8 +28,12 @@ def lines(device: Device, start: Pose) -> Iterator[str]:
     if distance < 0:
         yield f"warning: {outside(start, distance)}"
     else:
-        pose = ", ".join(f"{round(value, 7) + 0.0:.4g}" for value in start)  # no -3e-18
-        yield f"the handle starts at ({pose}), {distance:.3g} m from the nearest stop"
+        yield f"the handle starts at {placed(start)}, {distance:.3g} m from the nearest stop"
+
+
+def placed(pose: Pose) -> str:
+    """A pose as text, without what is rounding of 0."""
+    return f"({', '.join(f'{round(value, 7) + 0.0:.4g}' for value in pose)})"
 
 
 _TURN = (-math.pi, math.pi)

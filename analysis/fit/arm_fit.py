@@ -19,7 +19,7 @@ from scipy.ndimage import correlate1d
 from scipy.optimize import least_squares
 from scipy.signal import butter, cont2discrete, lfilter, sosfiltfilt, ss2tf
 
-from hapticlink.analysis.fit.estimate import Estimate, standard_deviations
+from hapticlink.analysis.fit.estimate import FROM_ZERO, Estimate, standard_deviations
 from hapticlink.analysis.fit.log import Log
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
@@ -41,8 +41,6 @@ UNITS = {
     "grip_stiffness": ("N/m", "N.m/rad"),
     "grip_damping": ("N.s/m", "N.m.s/rad"),
 }
-FROM_ZERO = 1e-3
-"""Where the search for a parameter begins that is 0 in the scene (SI units)."""
 RANGE = (1e-7, 1e7)
 """Between these it ends (SI units): no arm is beyond, and the model's numbers stay finite."""
 STILL = 1e-5
@@ -53,9 +51,8 @@ FORCELESS = 1e-9
 
 def fit_arm(log: Log, arm: ArmHand) -> tuple[list[Estimate], list[float]]:
     """Estimates of [hand] by axis, from `arm` on, and by axis the share of the wrench's variance
-    that is not explained. Axes without motion, or whose wrench
-    stays as it is, are left out. Raises InputFault for a log without
-    the hand's wrench."""
+    that is not explained. Axes without motion, or whose wrench stays as it is, are left out. Raises
+    InputFault for a log without the hand's wrench."""
     if log.hand is None:
         raise InputFault("hand: the log has no wrench of the hand")
     low = butter(4, min(2 * PASS * log.period, 0.9), output="sos")

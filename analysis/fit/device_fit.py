@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
-from hapticlink.analysis.fit.estimate import Estimate, standard_deviations
+from hapticlink.analysis.fit.estimate import FROM_ZERO, Estimate, standard_deviations
 from hapticlink.analysis.fit.log import Log
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.device import pantograph
@@ -34,8 +34,6 @@ FITTED = ("handle_mass", "handle_inertia", "motor_damping", "motor_friction")
 """What a log of any motion determines; masses of links act like those at handle and rotors."""
 WINDOW = 0.2
 """Length of a window (s)."""
-FROM_ZERO = 1e-3
-"""Where the search for a parameter begins that is 0 in the scene (SI units)."""
 
 
 def fit_device(

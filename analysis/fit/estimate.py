@@ -10,6 +10,8 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.results.numbers import short
 
+FROM_ZERO = 1e-3
+"""Where the search for a parameter begins that is 0 in the scene (SI units)."""
 LOOSE = 0.3
 """The relative spread from which on a log does not determine a parameter."""
 

@@ -20,7 +20,10 @@ from hapticlink.orchestrator.scene.scene import Scene
 
 COUNTING = 0.29
 """Root mean square (counts) of errors by counting alone, 1/sqrt(12)."""
-STILL = ((0.0, 0.0, 0.0, 0.0),)
+ORIGIN = ((0.0, 0.0, 0.0, 0.0),)
+DOUBTFUL = 0.05
+"""The share of an axis's variance that the arm does not explain from which on its values are
+doubted: docs/fit.md has what was found beyond."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,18 @@ class Fitted:
             shares = ", ".join(f"{share:.2%}" for share in self.unexplained)
             yield f"variance of the hand's wrench that the arm does not explain: {shares}"
         yield from self.left_out
+        yield from self.warnings
+
+    @property
+    def warnings(self) -> Iterator[str]:
+        """A line for each axis whose arm cannot be vouched for."""
+        axes = dict.fromkeys(e.key[-2] for e in self.estimates if e.key.startswith("hand."))
+        for axis, share in zip(axes, self.unexplained, strict=True):
+            if share > DOUBTFUL:
+                yield (
+                    f"warning: the arm leaves {share:.0%} of axis {axis} unexplained, so that its "
+                    "values are doubtful beyond their deviations: shake it by more encoder counts"
+                )
 
     def record(self) -> dict[str, Any]:
         """The content of fit.json."""
@@ -57,6 +72,7 @@ class Fitted:
             "encoder_errors_counts": self.counts,
             "unexplained": list(self.unexplained),
             "left_out": list(self.left_out),
+            "warnings": [*self.warnings],
         }
 
     def scene(self) -> str:
@@ -94,7 +110,7 @@ def fit(
     scene without a device.
     """
     read, given = open_scene.load(scene, options), logs.read(log)
-    arm = read.hand if isinstance(read.hand, ArmHand) else ArmHand(target=STILL)
+    arm = read.hand if isinstance(read.hand, ArmHand) else ArmHand(target=ORIGIN)
     if read.device is None:
         raise InputFault("fit: the scene has no [device]")
     assert isinstance(read.device, Device)

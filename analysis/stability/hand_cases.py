@@ -3,8 +3,7 @@ spring hand that stands still there, and held by every hand."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +16,8 @@ from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD, free, ho
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.mode_kinds import Bounds, kind
 from hapticlink.analysis.stability.modes import Mode, counted, leading, modes, verdict
-from hapticlink.analysis.stability.poses import Pose
-from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.poses import Pose, at_pose
+from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, user_of_block
@@ -158,7 +157,7 @@ def in_poses(
         if any(case.pose == pose.name for case in cases):
             continue
         try:
-            with at_pose(scene, given, pose, held=hands.keys() != {UNHELD}) as place:
+            with at_pose(scene, given, pose, held=hands.keys() != {UNHELD}) as (place, _):
                 # A constant wrench slides off what it presses on, whatever the loop does.
                 lasting = {
                     name: hand
@@ -172,26 +171,3 @@ def in_poses(
             without.pop(pose.name, None)
         progress(i + 1, len(poses))
     return cases, without
-
-
-@contextmanager
-def at_pose(
-    scene: str | Path | Scene,
-    given: Sequence[str],
-    pose: Pose,
-    held: bool = True,
-) -> Iterator[RestingScene]:
-    """The scene at rest in a pose, `held` there by a firm spring or as it is. A hand that slides
-    off what it touches presses lightly. Raises InputFault or FmuFault where there is no
-    equilibrium."""
-    with ExitStack() as stack:
-        try:
-            place = stack.enter_context(resting(scene, pose.options(given, held)))
-            if pose.touches and not place.touches:
-                raise InputFault("it comes off what it touches")
-        except (InputFault, FmuFault):
-            if not pose.touches:
-                raise
-            options = pose.lighter.options(given)
-            place = stack.enter_context(resting(scene, options))
-        yield place

@@ -13,9 +13,10 @@ Rotational values are assumed: LEVER times those of translation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
+from hapticlink.orchestrator.base.arrays import Vector
 
 SPRINGS = (100.0, 1000.0)
 """Stiffnesses (N/m): a light touch and a firm grip."""
@@ -80,6 +81,12 @@ def own_hand(hand: Hand) -> Hand:
 def holds(hand: Hand) -> bool:
     """Whether a hand has a stiffness."""
     return isinstance(hand, ArmHand | SpringHand)
+
+
+def standing(hand: ArmHand | SpringHand, pose: Sequence[float] | Vector) -> dict[str, object]:
+    """The [hand] table of a hand that stands still at a pose (m, m, rad)."""
+    table = {k: v for k, v in asdict(hand).items() if v is not None and k != "interpolation"}
+    return table | {"target": [[0.0, *map(float, pose)]]}
 
 
 def spring(pose: Sequence[float], wrench: Sequence[float], stiffness: float) -> dict[str, object]:

@@ -15,10 +15,10 @@ from typing import Any
 
 from hapticlink.analysis.stability.bisection import largest
 from hapticlink.analysis.stability.gains import LAWS
-from hapticlink.analysis.stability.hand_cases import Case, InHands, at_pose, in_poses
+from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.mode_kinds import Bounds
-from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.rates import frame_length, whole_frames
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.components.specs.hand import Hand
@@ -67,8 +67,8 @@ class Margin:
 
 @dataclass(frozen=True)
 class Remedy:
-    """Options with which all hands are stable in all poses, the growth rate (1/s) of the worst case
-    with them, and in how many of how many cases it is so."""
+    """Options, and the growth rate (1/s) of the worst case in all poses and hands with them.
+    stable: whether it decays by DECAY at least."""
 
     options: tuple[str, ...]
     growth: float
@@ -93,7 +93,7 @@ def improvements(
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
     search = _Search(scene, tuple(given), pose, held, bounds)
     stable = worst.free or worst.verdict != "unstable" or worst.drifts
-    with search.place() as place:
+    with search.place() as (place, _):
         margin = search.margin(place)
         candidates = () if stable else [*search.candidates(place, margin)]
     return margin, search.remedy(candidates, poses) if candidates else None
@@ -113,7 +113,9 @@ class _Search:
         self._read = open_scene.load(scene, given)
         self._haptic = exact(self._read.haptics.rate)
 
-    def place(self, change: Sequence[str] = ()) -> AbstractContextManager[RestingScene]:
+    def place(
+        self, change: Sequence[str] = ()
+    ) -> AbstractContextManager[tuple[RestingScene, Pose]]:
         """The scene with a change at rest in the pose, with frames of whole haptic periods."""
         held = self._hands.keys() != {UNHELD}
         return at_pose(self._scene, self._quick(change), self._pose, held)
@@ -166,7 +168,7 @@ class _Search:
         """With a change, the growth rate of a hand in the pose that is unstable, or of the worst
         one where none is; infinite where there is no equilibrium."""
         try:
-            with self.place(change) as place:
+            with self.place(change) as (place, _):
                 return InHands(place).worst(self._hands, self._bounds)
         except (InputFault, FmuFault):
             return float("inf")

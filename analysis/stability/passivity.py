@@ -131,8 +131,7 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     several users it is the first one's port, with the others in the hands of the scene.
 
     Raises InputFault for a scene without equilibrium in its own hand, one whose hand pushes no
-    device, or with a hyperperiod of more than 600 forces, with frames of whole haptic
-    periods, too.
+    device, or with a hyperperiod of more than 600 forces with frames of whole haptic periods, too.
     """
     given, said = overrides.written(options), ""
     read, hand, mechanism, count = _ports(scene, given)

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.stability.hands import FIRM, own_hand, spring
+from hapticlink.analysis.stability.hands import FIRM, own_hand, spring, standing
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.components.linkage.parameters import COORDINATES
@@ -89,10 +89,8 @@ class Pose:
         comes further away than NEAR; one that fails does."""
         if not isinstance(hand, ArmHand | SpringHand):
             return True
-        table = {k: v for k, v in asdict(hand).items() if v is not None and k != "interpolation"}
-        target = [float(x + off) for x, off in zip(self.point, OFF, strict=True)]
-        table["target"] = [[0.0, *target]]
-        changes = {"hand": table, "duration": LEAVING, "stop_when": ""}
+        beside = np.add(self.point, OFF)
+        changes = {"hand": standing(hand, beside), "duration": LEAVING, "stop_when": ""}
         run = simulated(scene, self.options(given, held=False), changes)
         moved = np.abs(_recorded(run)[POINT_POSE] - self.point).max(axis=0)
         return bool(run.record.fault) or bool((moved > NEAR).any())
@@ -258,6 +256,34 @@ def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
 
 
 @contextmanager
+def at_pose(
+    scene: str | Path | Scene,
+    given: Sequence[str],
+    pose: Pose,
+    held: bool = True,
+    start: Vector | None = None,
+) -> Iterator[tuple[RestingScene, Pose]]:
+    """The scene at rest in a pose, `held` there by a firm spring or as it is, and the pose as it is
+    pressed: a hand that slides off what it touches presses lightly. The equilibrium is searched
+    from the state `start`. Raises InputFault or FmuFault where there is none."""
+    with ExitStack() as stack:
+        try:
+            place = stack.enter_context(resting(scene, pose.options(given, held), start))
+            _require_touch(pose, place)
+        except (InputFault, FmuFault):
+            if not pose.touches:
+                raise
+            pose = pose.lighter
+            place = stack.enter_context(resting(scene, pose.options(given), start))
+        yield place, pose
+
+
+def _require_touch(pose: Pose, place: RestingScene) -> None:
+    if pose.touches and not place.touches:
+        raise InputFault("it comes off what it touches")
+
+
+@contextmanager
 def at_equilibrium(
     scene: str | Path,
     given: Sequence[str],
@@ -272,22 +298,17 @@ def at_equilibrium(
         at_rest: list[Pose] = []
         held_at: dict[str, RestingScene] = {}
         for pose in candidates:
-            for pressed in (pose, pose.lighter) if pose.touches else (pose,):
-                try:
-                    start = starts.get(pose.name)
-                    place = stack.enter_context(resting(scene, pressed.options(given), start))
-                    if pose.touches and not place.touches:
-                        raise InputFault("it comes off what it touches")
-                except (InputFault, FmuFault) as fault:
-                    why = fault
-                else:
-                    if pressed is not pose:
-                        tell(f"  pose at {pose.name}: the force slides off; {LIGHT:g} N are taken")
-                    at_rest.append(pressed)
-                    held_at[pose.name] = place
-                    break
-            else:
-                tell(f"  pose at {pose.name} is skipped: {why}")
+            found = at_pose(scene, given, pose, start=starts.get(pose.name))
+            try:
+                place, pressed = stack.enter_context(found)
+                _require_touch(pose, place)
+            except (InputFault, FmuFault) as fault:
+                tell(f"  pose at {pose.name} is skipped: {fault}")
+                continue
+            if pressed is not pose:
+                tell(f"  pose at {pose.name}: the force slides off; {LIGHT:g} N are taken")
+            at_rest.append(pressed)
+            held_at[pose.name] = place
         tell(f"  {len(held_at)} poses with an equilibrium")
         if not held_at:
             raise InputFault("the scene has no equilibrium in any pose of its run, in a firm grip")

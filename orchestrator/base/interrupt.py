@@ -76,8 +76,8 @@ def held(end: Action | None = None, after: Any = None) -> Iterator[None]:
         if _count == 1:
             return
         _end(end)
-        for ignored_name, handler in before.items():
-            signal.signal(ignored_name, handler)
+        for which, handler in before.items():
+            signal.signal(which, handler)
         signal.raise_signal(number)
 
     _count, _holding = 0, True

@@ -16,7 +16,6 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +23,9 @@ import numpy as np
 
 import hapticlink as hl
 from hapticlink.analysis.stability.hand_cases import Case
-from hapticlink.analysis.stability.hands import OWN
+from hapticlink.analysis.stability.hands import OWN, standing
 from hapticlink.analysis.stability.stability_verdict import Stability
+from hapticlink.components.specs.hand import ArmHand, SpringHand
 from hapticlink.orchestrator.base.loop_names import HANDLE_VELOCITY
 
 SECONDS = 60.0
@@ -81,10 +81,8 @@ def run_case(name: str, options: dict[str, Any], found: Stability, case: Case) -
     """stable or unstable, by a run in a pose and a hand."""
     pose = next(p for p in found.poses if p.name == case.pose)
     hand = found.hands[case.hand]
-    assert hand  # the free handle is no case here
-    table = {k: v for k, v in asdict(hand).items() if v is not None and k != "interpolation"}
-    target = [float(x + off) for x, off in zip(pose.point, OFF, strict=True)]
-    table["target"] = [[0.0, *target]]
+    assert isinstance(hand, ArmHand | SpringHand)  # the free handle is no case here
+    table = standing(hand, np.add(pose.point, OFF))
     changes = {"hand": table, "linkage.start": pose.joints, "linkage.start_velocity": {}}
     changed = {k: v for k, v in options.items() if not k.startswith("hand")}
     run = hl.run(name, {**changed, **changes, "duration": SECONDS}, figures=False)

@@ -11,9 +11,5 @@ from tests.visualization.page.served_page import Served
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    page = Served(tmp_path_factory.mktemp("view"))
-    try:
+    with Served(tmp_path_factory.mktemp("view")) as page:
         yield page
-    finally:
-        page.process.kill()
-        page.process.communicate()

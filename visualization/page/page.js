@@ -82,7 +82,7 @@ const HANDLERS = {
     if (message.light) show({ energy: message.light });
     if (sound.signal) sound.feel(loudness(sound.signal, message));
   },
-  map: (message) => show({ map: message }),
+  map: (message) => show({ map: { ...message, since: performance.now() } }),
   building({ said }) { view.building = said; note(); },
   refused(message) {
     view.refused = message.why;
@@ -101,18 +101,13 @@ function show(change) {
   $("energy").textContent = level ? `sampling energy: ${level}` : "sampling energy";
   $("verdict").className = `light ${{ stable: "green", marginal: "amber", unstable: "red" }[view.map?.verdict] ?? ""}`;
   $("verdict").hidden = !view.map;
-  computing();
   $("verdict").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${view.map?.why ?? ""}`;
 }
 
 // The verdict, or for how long it has been computed.
-let asked_at = null;
-function computing() {
-  const said = view.map?.said ?? "";
-  asked_at = said === "computing" ? asked_at ?? performance.now() : null;
-  const since = asked_at === null ? 0 : Math.floor((performance.now() - asked_at) / 1e3);
-  $("map").textContent = said && `stability: ${said}${since > 1 ? `, ${since} s` : ""}`;
-  if (asked_at !== null) setTimeout(computing, 1000);
+function verdict({ said, since }) {
+  const seconds = said === "computing" ? Math.floor((performance.now() - since) / 1e3) : 0;
+  return `stability: ${said}${seconds > 1 ? `, ${seconds} s` : ""}`;
 }
 
 function note() {
@@ -205,6 +200,7 @@ function draw() {
     tags($("tags"), [...view.frame.states.map(label), ...(b ? [[SECOND, second()]] : [])]);
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;
   }
+  if (view.map) $("map").textContent = verdict(view.map);
   charts.draw();
   requestAnimationFrame(draw);
 }

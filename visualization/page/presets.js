@@ -15,13 +15,13 @@ export function presets({ rate, holds, gains }) {
   if (rate && poses.length) {
     const slow = { type: "rate", value: Math.min(BUZZ_RATE, rate.max) }, fast = { type: "rate", value: Math.min(CALM_RATE, rate.max) };
     // A page in one file has no passive hold of the forces; zero-order holds shake less than first-order ones.
-    const [mended, holds] = passive.length
+    const [mended, mending] = passive.length
       ? ["the forces on the mechanism in a passive hold", held(passive, "passive")]
       : ["pose and velocity held (zoh)", held(poses, "zoh")];
     return [
       { name: "Calm", about: `mechanism at ${fast.value} Hz`, messages: [fast] },
       { name: "Buzz", about: `mechanism at ${slow.value} Hz, its pose and velocity extrapolated (foh)`, messages: [slow, ...held(poses, "foh")] },
-      { name: "Mend it", about: `still ${slow.value} Hz, but ${mended}`, messages: [slow, ...holds] },
+      { name: "Mend it", about: `still ${slow.value} Hz, but ${mended}`, messages: [slow, ...mending] },
     ];
   }
   if (!damping.length) return [];

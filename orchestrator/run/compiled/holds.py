@@ -84,11 +84,11 @@ def can(hold: Hold, repeats: bool) -> bool:
     """Whether there is C for a hold: not for classes of plugins, not for matrices whose hold needs
     more than their samples, and not for samples in transit or an energy account where steps are
     repeated."""
-    of = parts(hold)
-    if of.matrix and of.own.needs:
+    pieces = parts(hold)
+    if pieces.matrix and pieces.own.needs:
         return False
-    grows = of.link or isinstance(of.own, Account)
-    return type(of.own) in KINDS and not (grows and repeats)
+    grows = pieces.link or isinstance(pieces.own, Account)
+    return type(pieces.own) in KINDS and not (grows and repeats)
 
 
 class State:

@@ -18,7 +18,7 @@ from hapticlink.analysis.fit.log import Log
 from hapticlink.commands import main
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand
-from tests.analysis.fit.device_log import recorded
+from tests.analysis.fit import device_log
 
 STILL = ((0.0, 0.0, 0.0, 0.0),)
 DEVICE = Device(handle_mass=0.19, handle_inertia=1.5e-4, motor_damping=2e-3, motor_friction=6e-3)
@@ -36,7 +36,7 @@ NOISE = 0.05
 
 @pytest.fixture(scope="module")
 def log() -> Log:
-    return recorded(DEVICE, ARM, seconds=3.0, seed=3, noise=NOISE)
+    return device_log.recorded(DEVICE, ARM, seconds=3.0, seed=3, noise=NOISE)
 
 
 def truth(estimate: Estimate) -> float:
@@ -167,6 +167,22 @@ def test_an_axis_whose_force_stays_is_left_out(log: Log, tmp_path: Path) -> None
     found = hl.fit(csv(still, tmp_path / "log.csv"))
     assert {e.key.partition("[")[2] for e in found.estimates} == {"0]", "1]"}
     assert "axis 2 is left out" in found.left_out[0]
+
+
+def test_an_arm_that_is_shaken_by_few_counts_is_warned_of(
+    log: Log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An eighth of the motion: rotation comes out more than half off, with small deviations."""
+    assert [*hl.fit(csv(log, tmp_path / "log.csv")).warnings] == []
+    monkeypatch.setattr(device_log, "AMPLITUDES", device_log.AMPLITUDES / 8)
+    weak = device_log.recorded(DEVICE, ARM, seconds=3.0, seed=3, noise=NOISE)
+    found = hl.fit(csv(replace(weak, motors=None), tmp_path / "weak.csv"))
+    turned = [e for e in found.estimates if e.key.startswith("hand.") and e.key.endswith("[2]")]
+    assert max(abs(e.value / truth(e) - 1) for e in turned) > 0.5
+    (*_, last) = found.warnings
+    assert "of axis 2 unexplained" in last
+    assert last in found.lines()
+    assert last in found.record()["warnings"]
 
 
 def test_hdf5_and_csv_are_one_log(log: Log, tmp_path: Path) -> None:

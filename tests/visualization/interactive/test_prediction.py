@@ -27,12 +27,8 @@ QUICK = 120.0
 
 @pytest.fixture
 def page(tmp_path: Path) -> Iterator[Served]:
-    served = Served(tmp_path, *(f"--set={option}" for option in OPTIONS), scene=SCENE)
-    try:
+    with Served(tmp_path, *(f"--set={option}" for option in OPTIONS), scene=SCENE) as served:
         yield served
-    finally:
-        served.process.kill()
-        served.process.communicate()
 
 
 def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:

@@ -49,6 +49,13 @@ class Served:
         self.folder, self.port, self.path = folder, int(found[1]), found[2]
         self.url = f"http://127.0.0.1:{self.port}{self.path}"
 
+    def __enter__(self) -> Served:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.process.kill()
+        self.process.communicate()
+
     def window(self, origin: str | None = None) -> Window:
         """A websocket like that of a page."""
         own = f"http://127.0.0.1:{self.port}"

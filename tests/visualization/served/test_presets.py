@@ -18,12 +18,8 @@ from tests.visualization.page.served_page import Served
 
 @pytest.fixture(scope="module")
 def direct(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    page = Served(tmp_path_factory.mktemp("direct"), scene="closed-loop-direct")
-    try:
+    with Served(tmp_path_factory.mktemp("direct"), scene="closed-loop-direct") as page:
         yield page
-    finally:
-        page.process.kill()
-        page.process.communicate()
 
 
 @pytest.fixture(scope="module")

@@ -14,12 +14,8 @@ from tests.visualization.page.served_page import Served
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    page = Served(tmp_path_factory.mktemp("two"), scene="two-users")
-    try:
+    with Served(tmp_path_factory.mktemp("two"), scene="two-users") as page:
         yield page
-    finally:
-        page.process.kill()
-        page.process.communicate()
 
 
 def place(frame: dict[str, Any], user: str, port: str) -> np.ndarray:
