@@ -39,8 +39,13 @@ class Comparison:
 
     @property
     def note(self) -> str:
-        """A sentence where the runs are of different scenes or mechanisms, "" where not."""
-        return settings.other_scenes(list(self.runs.values()))
+        """A sentence where the runs are of different scenes or mechanisms, or recorded the same
+        rows, "" where neither."""
+        first, *others = self.runs.values()
+        if other_scenes := settings.other_scenes([first, *others]):
+            return f"warning: {other_scenes}"
+        same = all(run.has_rows_of(first) for run in others)
+        return "the runs recorded the same numbers in every row" if same else ""
 
     def values(self) -> dict[str, dict[str, dict[str, str]]]:
         """The values of each run by its name, by title and by label."""
@@ -58,8 +63,9 @@ class Comparison:
         return overlay.figures(self.runs)
 
     def __str__(self) -> str:
-        note = [f"warning: {self.note}"] if self.note else []
-        return "\n".join([*note, *text.lines(list(self.runs), self.tables)])
+        return "\n".join(
+            [*([self.note] if self.note else []), *text.lines(list(self.runs), self.tables)]
+        )
 
     def __repr__(self) -> str:
         return f"comparison of {', '.join(self.runs)}"

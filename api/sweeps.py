@@ -70,9 +70,12 @@ class Sweep:
         no column of numbers."""
         return sweep_figure.draw(self.rows, self.keys, metric)
 
+    def __str__(self) -> str:
+        """The lines of `hapticlink sweep`."""
+        return "\n".join(table.lines(self.rows, self.keys))
+
     def __repr__(self) -> str:
-        ends = f"{len(self.rows)} runs over {', '.join(self.keys)}, {len(self.failed)} failed"
-        return f"{ends}\n  {', '.join(self.columns)}\n  folder: {self.folder or 'none, in memory'}"
+        return f"{self}\n  columns: {', '.join(self.columns)}"
 
 
 def sweep(

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from hapticlink.commands import progress
 from hapticlink.commands.options import (
     UNCHANGED,
     Changes,
@@ -17,7 +18,6 @@ from hapticlink.commands.options import (
     default_folder,
     print_result,
 )
-from hapticlink.commands.progress import counted
 from hapticlink.commands.sweep import Jobs
 
 Draws = Annotated[int, Parameter(help="Hands and rates around the scene's own.")]
@@ -53,7 +53,7 @@ def advise(
 
     folder = folders.ensure(out or changes.folder("advice", scene))
     name, processes = default_folder("advice", scene).name, jobs or os.cpu_count() or 1
-    with counted(name, quiet) as show:
+    with progress.runs(f"{name}: methods on it and around it", quiet) as show:
         advice = find(
             scene,
             changes.options,

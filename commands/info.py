@@ -78,7 +78,7 @@ def info(
         say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
     for line in summary.replaced(system.replacements):
         say(f"  {line}")
-    _needs(read, time)
+    _needs(read, time, list(system.replacements))
     if draw or out:
         _draw(read, system, start, out or default_folder("info", scene))
     return 0
@@ -135,11 +135,12 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
 _PER_TICK = ("operations", "signals")
 
 
-def _needs(scene: Any, time: Timeline) -> None:
+def _needs(scene: Any, time: Timeline, replaced: list[str]) -> None:
     from hapticlink.analysis.findings import block_costs, requirements
 
     parts = list(requirements.needs(scene))
-    say("\nneeded")
+    own = f" (by the scene's own blocks, {', '.join(replaced)} among them)" if replaced else ""
+    say(f"\nneeded{own}")
     for need in parts:
         if need.needed:
             say(f"  {need.part}: {need.why}")

@@ -25,6 +25,13 @@ def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], N
 
 
 @contextmanager
+def runs(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """The same for what may be long, as `steps`."""
+    with steps(title, hidden) as show:
+        yield lambda done, of: show(f"{done} of {of} runs", done, of)
+
+
+@contextmanager
 def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int], None]]:
     """Gives a function to be called with what is done, and the numbers of finished and of all
     steps. Where stderr is no terminal, a line tells at the start how long it took before."""

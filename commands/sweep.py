@@ -8,8 +8,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from hapticlink.commands import progress
 from hapticlink.commands.options import Json, Out, Quiet, Scene, Set, default_folder, print_result
-from hapticlink.commands.progress import counted
 from hapticlink.orchestrator.base.terminal_output import say
 
 Vary = Annotated[
@@ -66,8 +66,9 @@ def sweep(
     from hapticlink.analysis.sweep.row import REFUSED
     from hapticlink.orchestrator.base.faults import InputFault
 
+    name = default_folder("sweeps", scene).name
     folder = out or default_folder("sweeps", scene)
-    with counted(scene, hidden=quiet) as count:
+    with progress.runs(f"{name}: sweep", quiet) as count:
         result = hl.sweep(
             scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
             scheduler=scheduler, metric=metric, progress=count,
@@ -76,10 +77,7 @@ def sweep(
         what = ", ".join(f"{k}={v}" for k, v in row.items() if k in result.keys)
         say(f"hapticlink: {what}: {row['end']}: {row['message']}", file=sys.stderr)
     runs_done, failed = len(result.rows), len(result.failed)
-    lines = (
-        f"{default_folder('sweeps', scene).name}: {runs_done} runs, {failed} of them failed",
-        f"  {folder}/: {', '.join(result.files)}",
-    )
+    lines = (f"{name}: {result}", f"  {folder}/: {', '.join(result.files)}")
     print_result(lines, {"folder": str(folder), "rows": result.rows}, quiet, json)
     if failed < runs_done:
         return 0

@@ -2,10 +2,10 @@
 
 A method is a hold of all connections across rates with gains of the virtual coupling. It is within
 the limits of a draw if the run reaches its end with tracking errors below APART and generates at
-the user's port at most SHARE of what the hand works (less than LEAST is not counted). A round runs
-the ROUND next best of the scene itself on all draws, until one is within the limits of each; with
-several, the one with the smallest median of log(error/mean of the draw) is advised, and those whose
-error is not larger in more than three quarters of the draws are within the spread.
+the user's port no more than is allowed (`findings/user_port.py`). A round runs the ROUND next best
+of the scene itself on all draws, until one is within the limits of each; with several, the one with
+the smallest median of log(error/mean of the draw) is advised, and those whose error is not larger
+in more than three quarters of the draws are within the spread.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.advise.methods import GAINS, HOLDS
-from hapticlink.analysis.findings.user_port import LEAST, SHARE, hand_work
+from hapticlink.analysis.findings.user_port import allowed, hand_work
 from hapticlink.analysis.sweep import row as sweep_row
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
@@ -33,6 +33,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 APART = 42.0, 1.0
 """Tracking errors (mm, the length of a link, and rad) from which on a run counts as unstable."""
 PEAK, WORK = "port_peak_J", "hand_work_J"
+ALIKE = 1.1
+"""Ratio of tracking errors up to which it does not matter which hold is taken."""
 ROUND = 8
 """Methods of a round."""
 OWN = "own"
@@ -95,6 +97,12 @@ class Advice:
         """The result as text."""
         if not self.taken.admitted:
             yield "nothing keeps the limits in every draw; take a higher rate. What comes nearest:"
+        own = [row[METRIC] for m, row in self.screened.items() if m.gains == OWN and within(row)]
+        if len(own) > 1 and max(own) <= ALIKE * min(own):
+            yield (
+                f"the hold matters little here: with the scene's own gains all {len(own)} leave "
+                f"{short(min(own))} to {short(max(own))} mm"
+            )
         yield f"take {self.taken.line}"
         yield from (f"  --set '{option}'" for option in self.taken.method.options)
         for name, found in (("within the spread", self.ties), ("others", self.others)):
@@ -205,7 +213,7 @@ def measured(experiment: Experiment) -> Row:
 
 def energy(row: Row) -> float:
     """The peak of the energy generated at the user's port, relative to what is allowed."""
-    return max(0.0, float(row.get(PEAK, 0.0))) / max(LEAST, SHARE * float(row.get(WORK, 0.0)))
+    return max(0.0, float(row.get(PEAK, 0.0))) / allowed(float(row.get(WORK, 0.0)))
 
 
 def within(row: Row) -> bool:

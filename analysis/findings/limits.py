@@ -13,6 +13,7 @@ EPISODES = {
 }
 """Kinds of episodes and their meaning."""
 NOTICEABLE_J = 1e-3
-"""Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz."""
+"""Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz, or that of one of 0.3 kg at
+8 cm/s."""
 FULL_TORQUE = 1 - 1e-6
 """Share of their largest torque from which on motors are at their limit."""

@@ -19,12 +19,14 @@ mobility modulates power. It needs the mechanism's own (`mechanism.directions`) 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.analysis.findings.port_blocks import by_block, needed
 from hapticlink.analysis.findings.tracking import (
     further_users,
@@ -52,21 +54,21 @@ from hapticlink.orchestrator.base.loop_names import (
 from hapticlink.orchestrator.results.run_record import BlockEnergy, PortEnergy
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
-SHARE, LEAST = 0.25, 1e-3
-"""What a rendering may generate: a share of the hand's work, or an energy (J), which moves the
-handle at 8 cm/s."""
+SHARE = 0.25
+"""Of the hand's work, which a rendering may generate."""
 
 
 class UserPort(NamedTuple):
     """Work of the hands and energy generated (J) at times (s), the mechanism's samples; that of
-    each block, of which the latter is the sum; and the works of single wrenches at the last of them
-    (J), by name."""
+    each block, of which the latter is the sum; the works of single wrenches at the last of them
+    (J), by name; and that of the hands until then, its absolute values summed (J)."""
 
     time_s: Vector
     put_in_J: Vector
     generated_J: Vector
     blocks_J: dict[str, Vector]
     works: dict[str, float]
+    hand_work_J: float
 
     @property
     def measured(self) -> PortEnergy:
@@ -81,6 +83,7 @@ class UserPort(NamedTuple):
                 for name, energy in self.blocks_J.items()
             },
             works=self.works,
+            hand_work=self.hand_work_J,
         )
 
 
@@ -96,17 +99,31 @@ def user_port(results: Results) -> UserPort | None:
         np.concatenate([port.generated_J for port in found]),
         {name: np.concatenate([p.blocks_J[name] for p in found]) for name in last.blocks_J},
         last.works,
+        last.hand_work_J,
     )
 
 
+def allowed(hand_work: float) -> float:
+    """The energy (J) that a rendering may generate where the hand works so much (J)."""
+    return max(NOTICEABLE_J, SHARE * hand_work)
+
+
 def hand_work(results: Results) -> float:
-    """The work (J) of the hand on the handle, its absolute values summed; 0 where one of them is
-    missing."""
-    table = results.haptics
-    if HANDLE_POSE not in table or HAND_WRENCH not in table:
-        return 0.0
-    moved = np.diff(table[HANDLE_POSE], axis=0)
-    return float(np.abs((table[HAND_WRENCH][:-1] * moved).sum(axis=1)).sum())
+    """The work (J) of the hands on their handles, its absolute values summed; none of a user whose
+    pose or wrench is missing, or has another rate."""
+    works = Works()
+    return deque((_hand_work(window, works) for window in results.windows()), maxlen=1).pop()
+
+
+def _hand_work(window: Results, works: Works) -> float:
+    """The same until the end of a window."""
+    total = 0.0
+    for user in ("", *further_users(window)):
+        pose, wrench = signal_of_user(HANDLE_POSE, user), signal_of_user(HAND_WRENCH, user)
+        moved = of_block(window, pose, 3)
+        if moved and wrench in moved:
+            total += works.absolute(window, wrench, pose)
+    return total
 
 
 def measured(windows: Iterable[UserPort | None]) -> PortEnergy | None:
@@ -187,7 +204,8 @@ def _port(window: Results, works: Works, start: float) -> UserPort | None:
     lacks = needed(window, put_in) & {*window.record.not_recorded}
     blocks = {} if lacks else by_block(window, works, time, stored - further, put_in)
     hands = further + sum(put_in.values())
-    return UserPort(time, hands, generated, blocks, _works(window, works, device, time))
+    single = _works(window, works, device, time)
+    return UserPort(time, hands, generated, blocks, single, _hand_work(window, works))
 
 
 def pushed_by_others(results: Results) -> list[str]:

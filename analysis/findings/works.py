@@ -175,12 +175,16 @@ class Works:
         self._window: Results | None = None
         self._found: dict[Key, tuple[Vector, Vector]] = {}
         """Of the window, which several ask for."""
+        self._begin()
+
+    def _begin(self) -> None:
         self._added, self._contacts = Held(), Ideal()
+        self._absolute: dict[str, float] = {}
 
     def again(self) -> None:
         """The second pass begins."""
         self._window = None
-        self._added, self._contacts = Held(), Ideal()
+        self._begin()
         for each in self._of.values():
             each.again()
 
@@ -214,6 +218,17 @@ class Works:
         acts, source = (each[np.searchsorted(to, times)] for each in found)
         self._found[key] = acts, source
         return acts, source
+
+    def absolute(self, window: Results, signal: str, position: str) -> float:
+        """The absolute values (J) of a wrench's work in the steps of a position of the same rate,
+        summed until the end of a window."""
+        moved = table_of(window, position)
+        assert moved
+        work = (moved[signal][:-1] * np.diff(moved[position], axis=0)).sum(axis=1)
+        steps = np.abs(work[window.within(moved["time"][1:])])
+        total = float(_running(self._absolute.get(signal, 0.0), steps)[-1])
+        self._absolute[signal] = total
+        return total
 
     def added(self, window: Results, force: Vector, device: Table, times: Vector) -> Vector:
         """The work (J) of forces at the rows of the device on its handle, without a meter."""

@@ -118,8 +118,8 @@ class Passivity:
         yield (
             "  no hand can take energy out of it"
             if self.passive
-            else "  some hand, maybe none of flesh, could take energy out of it; softer gains and "
-            "contacts, a higher rate, or more damping of the device mend it"
+            else "  for a person the verdict in hands decides; a hand without damping there could "
+            "take energy out of it, which softer gains, a higher rate or more damping mend"
         )
         if self.two_port:
             yield from self.two_port.lines()

@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-from hapticlink.analysis.sweep.row import Row
+from hapticlink.analysis.sweep.row import FAILED, METRIC, Row
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.text_table import aligned
 from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.files import write_json
+from hapticlink.orchestrator.results.numbers import short
 
 NOT_REPRODUCIBLE = "run_time_s"
+HEADS = {
+    "end": "end",
+    "end_time_s": "at (s)",
+    METRIC: "largest distance (mm)",
+    "port_peak_J": "energy at the port (J)",
+}
+"""Columns of the terminal."""
+MOST = 16
+"""Runs in the terminal."""
 
 
 class Rows:
@@ -40,6 +53,26 @@ def columns(rows: Sequence[Row]) -> list[str]:
     reproducible, comes last."""
     names = dict.fromkeys(name for row in rows for name in row)
     return sorted(names, key=lambda name: name == NOT_REPRODUCIBLE)
+
+
+def lines(rows: Sequence[Row], keys: Sequence[str]) -> Iterator[str]:
+    """The result as text: how many runs failed, and the main numbers of all, or of those with the
+    smallest and the largest METRIC."""
+    bad = sum(row["end"] in FAILED for row in rows)
+    yield f"{len(rows)} runs over {', '.join(keys)}, {bad} failed"
+    shown = {name: head for name, head in HEADS.items() if any(name in row for row in rows)}
+    cells = [[_cell(row.get(name, "")) for name in (*keys, *shown)] for row in rows]
+    if len(rows) > MOST:
+        order = sorted(range(len(rows)), key=lambda i: rows[i].get(METRIC, math.inf))
+        ends = *order[: MOST // 2], *order[-MOST // 2 :]
+        cells = [cells[i] for i in ends]
+        cells.insert(MOST // 2, ["..."] * len(cells[0]))
+    cells.insert(0, [*keys, *shown.values()])
+    yield from (f"  {line}" for line in aligned(cells))
+
+
+def _cell(value: Any) -> str:
+    return short(value) if isinstance(value, float) else str(value)
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:

@@ -35,6 +35,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import MOBILITIES
+from hapticlink.orchestrator.base.text_table import aligned
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene import overrides
@@ -307,9 +308,7 @@ def cost_lines(found: Sequence[Cost]) -> Iterator[str]:
     for cost in found:
         rows.setdefault(cost.cells(), []).append(cost.change)
     table = [HEADS, *((", ".join(names), *cells) for cells, names in rows.items())]
-    wide = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for row in table:
-        yield "  ".join(cell.ljust(n) for cell, n in zip(row, wide, strict=True)).rstrip()
+    yield from aligned(table)
 
 
 def _stiffness(felt: Transparency) -> str:

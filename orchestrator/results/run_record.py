@@ -238,12 +238,14 @@ class BlockEnergy:
 
 @dataclass(frozen=True)
 class PortEnergy(BlockEnergy):
-    """Energy (J) generated at the user's port, when it was largest (s), that of each block, and the
-    works of single wrenches (`analysis/findings/user_port.py`)."""
+    """Energy (J) generated at the user's port, when it was largest (s), that of each block, the
+    works of single wrenches, and that of the hand on the handle, its absolute values summed
+    (`analysis/findings/user_port.py`)."""
 
     time_of_peak: float
     blocks: dict[str, BlockEnergy]
     works: dict[str, float]
+    hand_work: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -121,6 +121,14 @@ class Results:
             int(np.searchsorted(times, self.end, "right")),
         )
 
+    def has_rows_of(self, other: Results) -> bool:
+        """Whether both recorded the same signals with the same numbers."""
+        pairs = ((self.tables[n], other.tables[n]) for n in self.tables if n in other.tables)
+        return [*self.tables] == [*other.tables] and all(
+            mine.columns == its.columns and np.array_equal(mine.rows, its.rows, equal_nan=True)
+            for mine, its in pairs
+        )
+
     @cached_property
     def record(self) -> RunRecord:
         """The content of run.json as a record. Raises InputFault where it is of another version, or

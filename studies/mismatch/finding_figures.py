@@ -10,12 +10,14 @@ from textwrap import fill
 
 import numpy as np
 
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
+from hapticlink.analysis.findings.user_port import SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import CONTINUOUS, DIRECT, MOBILITY, REFERENCE, mapped
 from studies.mismatch.figures import Panel, Point, lines, short
 from studies.mismatch.findings import COMPENSATION, Found, both
 from studies.mismatch.measure import COUPLING, KICK, MARGIN, RUN, draw, stable
-from studies.mismatch.method_choice import LEAST, SHARE, energy, margin, within
+from studies.mismatch.method_choice import energy, margin, within
 from studies.mismatch.methods import (
     BIAS,
     COLUMNS,
@@ -145,7 +147,7 @@ def _energy(folder: Path, found: Found) -> Iterator[str]:
     unit = "peak generated (% of what is allowed)"
     made = lines(folder, "energy.png", title, drawn, unit, NAMED, hollow=SOME)
     text = (
-        f"{title}: {SHARE:.0%} of the hand's work, and at least {1e3 * LEAST:g} mJ. `foh` "
+        f"{title}: {SHARE:.0%} of the hand's work, and at least {1e3 * NOTICEABLE_J:g} mJ. `foh` "
         f"generates less than `zoh` at {_fewer(drawn)} rates. A stable run is not yet a passive "
         "one, which tracking errors do not show."
     )

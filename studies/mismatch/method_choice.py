@@ -1,8 +1,8 @@
 """The choice of a method in each cell of rate and model, by comparisons within draws.
 
 A method is admitted to a cell if every draw ends within its limits: stable, and with a peak of the
-energy generated at the user's port of at most SHARE of the hand's work (less than LEAST is not
-counted). Where a lifted map vouches for it, that one must be stable on every linkage, too.
+energy generated at the user's port of at most SHARE of the hand's work (less than NOTICEABLE_J is
+not counted). Where a lifted map vouches for it, that one must be stable on every linkage, too.
 
 Of the admitted methods the one with the smallest median of log(error/mean of the draw) is advised.
 Those that it does not beat beyond the spread, by a smaller error in more than three quarters of the
@@ -26,7 +26,8 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.user_port import LEAST, SHARE
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
+from hapticlink.analysis.findings.user_port import SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import MOBILITY, of_map
 from studies.mismatch.measure import COUPLING, MARGIN, PEAK, WORK, draw, stable
@@ -65,7 +66,7 @@ def margins(rows: Iterable[Row]) -> Margins:
 
 def energy(row: Row, share: float = SHARE) -> float:
     """The peak of the energy generated at the user's port, relative to what is allowed."""
-    return max(0.0, float(row[PEAK])) / max(LEAST, share * row[WORK])
+    return max(0.0, float(row[PEAK])) / max(NOTICEABLE_J, share * row[WORK])
 
 
 def within(row: Row, share: float = SHARE) -> bool:

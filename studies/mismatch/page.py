@@ -9,6 +9,8 @@ from textwrap import fill
 
 import numpy as np
 
+from hapticlink.analysis.findings.limits import NOTICEABLE_J
+from hapticlink.analysis.findings.user_port import SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch import finding_figures, held_out_draws
 from studies.mismatch.cases import SEEDS
@@ -17,10 +19,8 @@ from studies.mismatch.figures import short
 from studies.mismatch.findings import COMPENSATION, Found, both, named
 from studies.mismatch.measure import APART, COUPLING, MARGIN, floor, stable
 from studies.mismatch.method_choice import (
-    LEAST,
     LEVEL,
     NEAR,
-    SHARE,
     Choice,
     choice,
     energy,
@@ -238,9 +238,10 @@ def _limits(found: Found) -> Iterator[str]:
         f"{APART[0]:g} mm and {APART[1]:g} rad apart. A method is "
         "advised if every draw is stable, the energy at the user's port peaks at most "
         f"at {SHARE:.0%} of the hand's work (its absolute values summed; peaks below "
-        f"{1e3 * LEAST:g} mJ, which moves the handle at 8 cm/s, do not count), and the lifted map, "
-        f"where it has one, is stable on {both(['five-bar', 'four-bar', 'serial arm'])}. A "
-        "quarter: the continuous runs, which no hold disturbs, generate up to "
+        f"{1e3 * NOTICEABLE_J:g} mJ, which moves the handle at 8 cm/s, do not count), and the "
+        f"lifted map, where it has one, is stable on "
+        f"{both(['five-bar', 'four-bar', 'serial arm'])}. A quarter: the continuous "
+        "runs, which no hold disturbs, generate up to "
         f"{_continuous(found):.0%} without Coriolis compensation, and a limit below that would "
         "refuse the ideal. Tried at "
         f"{both(FEW)} Hz without Coriolis compensation alone: all holds, the report's gains, and, "

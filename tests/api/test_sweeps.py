@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.sweep import table
 from hapticlink.analysis.sweep.points import points
 from tests.shared_fixtures import status
 
@@ -60,11 +61,21 @@ def test_a_sweep_is_that_of_the_command(
     assert found["end_time_s"].dtype == float
     assert len(found.failed) == sum(r["end"] == "refused" for r in rows) == 2
     assert "4 runs over hold, haptics.rate, 2 failed" in repr(found)
+    (row,) = (line for line in str(found).splitlines() if line.split()[:2] == ["zoh", "200"])
+    assert row.split()[2:] == ["duration", "0.1"]
     figure = found.figure("end_time_s")
     assert figure is not None
     assert figure.axes[0].get_ylabel() == "end of the run (s)"
     with pytest.raises(KeyError, match="did you mean 'end_time_s'"):
         found["end_time"]
+
+
+def test_of_many_runs_the_best_and_the_worst_are_shown() -> None:
+    rows = [{"k": str(i), "end": "duration", "tracking_max_mm": float(-i % 40)} for i in range(40)]
+    _, _, *shown = table.lines(rows, ("k",))
+    assert [line.split()[0] for line in shown] == [
+        "0", *(str(i) for i in range(39, 32, -1)), "...", *(str(i) for i in range(8, 0, -1)),
+    ]  # fmt: skip
 
 
 def test_a_frame_has_a_row_a_run(bar: Path) -> None:

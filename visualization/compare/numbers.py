@@ -149,5 +149,7 @@ def _point_distances(runs: Sequence[Results]) -> list[Row]:
         point = [np.interp(time, table["time"], table[POINT_POSE][:, i]) for i in (0, 1)]
         offset = np.array(point) - first[POINT_POSE][: len(time), :2].T
         distances.append(short(1e3 * float(np.hypot(*offset).max())))
+    if not any(map(float, distances[1:])):
+        return []
     label = "operational point from that of the first run, largest (mm)"
     return [Row(label, tuple(distances))]

@@ -33,14 +33,14 @@ def port_curve(results: Results) -> UserPort | None:
     *_, last = parts
     blocks = {name: np.concatenate([p.blocks_J[name] for p in parts]) for name in last.blocks_J}
     time, hands, generated = (np.concatenate([port[i] for port in parts]) for i in range(3))
-    return UserPort(time, hands, generated, blocks, last.works)
+    return UserPort(time, hands, generated, blocks, last.works, last.hand_work_J)
 
 
 def _thinned_port(port: UserPort, windows: int) -> UserPort:
     curves = *port[:3], *port.blocks_J.values()
     time, hands, generated, *blocks = _thinned(curves, windows)
     by_name = dict(zip(port.blocks_J, blocks, strict=True))
-    return UserPort(time, hands, generated, by_name, port.works)
+    return UserPort(time, hands, generated, by_name, port.works, port.hand_work_J)
 
 
 def _thinned(curve: Curve, windows: int) -> Curve:

@@ -20,7 +20,7 @@ export function presets({ rate, holds, gains }) {
       : ["pose and velocity held (zoh)", held(poses, "zoh")];
     return [
       { name: "Calm", about: `mechanism at ${fast.value} Hz`, messages: [fast] },
-      { name: "Buzz", about: `mechanism at ${slow.value} Hz, its pose and velocity extrapolated (foh)`, messages: [slow, ...held(poses, "foh")] },
+      { name: "Buzz", about: `mechanism at ${slow.value} Hz, its pose and velocity extrapolated (foh): pull far and fast`, messages: [slow, ...held(poses, "foh")] },
       { name: "Mend it", about: `still ${slow.value} Hz, but ${mended}`, messages: [slow, ...mending] },
     ];
   }

@@ -52,6 +52,15 @@ def test_the_smallest_error_within_the_limits_of_all_draws_is_advised() -> None:
     assert next(none.lines()).startswith("nothing keeps the limits")
 
 
+@pytest.mark.parametrize(("worst", "matters"), [(1.09, False), (1.11, True)])
+def test_a_hold_that_matters_little_is_no_advice(worst: float, matters: bool) -> None:
+    rows = {Method("zoh", "own"): row(1.0), Method("foh", "own"): row(worst)}
+    rows |= {Method("exact", "own"): row(9.0, end="diverged"), Method("foh", "soft"): row(5.0)}
+    taken = Measured(Method("zoh", "own"), np.ones(2), np.zeros(2), 2)
+    lines = list(advise.Advice("", taken, (), (), rows).lines())
+    assert ("all 2 leave 1 to 1.09 mm" in lines[0]) is not matters
+
+
 @pytest.mark.parametrize("scene", ["closed-loop-direct", "closed-loop-b1", "enclosure"])
 def test_draws_are_other_hands_of_the_same_kind(scene: str) -> None:
     read = open_scene.load(scene)

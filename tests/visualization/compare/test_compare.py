@@ -85,6 +85,18 @@ def test_other_scenes_are_told(root: Path, capsys: pytest.CaptureFixture[str]) -
     assert "operational point from that of the first run" not in said
 
 
+def test_runs_that_are_equal_in_every_row_are_said_to_be(root: Path, tmp_path: Path) -> None:
+    said = "the runs recorded the same numbers in every row"
+    again, other = tmp_path / "again", tmp_path / "other"
+    for copy in (again, other):
+        shutil.copytree(root / "slow", copy)
+    table = other / "haptics.csv"
+    *rows, last = table.read_text().splitlines()
+    table.write_text("\n".join([*rows, last.replace("1", "2", 1)]) + "\n")
+    assert str(hl.compare([root / "slow", again])).startswith(said)
+    assert said not in str(hl.compare([root / "slow", other]))
+
+
 def test_the_command_draws_and_prints_json(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
