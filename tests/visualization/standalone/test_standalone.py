@@ -34,13 +34,13 @@ def dragged(page: Page, folder: Path) -> tuple[list[str], np.ndarray]:
     """What the page saves of a run of a second with a drag: the names and the rows."""
     page.page.click("#pause")
     page.page.click("#record")
-    page.until("view.state.recording && view.frame.t === 0 && view.stage.limits")
+    page.until("view.state.recording && view.frame?.t === 0 && view.stage.limits")
     page.pull(0.02, -0.02)
     page.page.keyboard.press("Space")
-    page.until("view.frame.t > 0.4")
+    page.until("view.frame?.t > 0.4")
     x, y, scale = page.page.evaluate(AT)
     page.page.mouse.move(x + 0.03 * scale, y - 0.01 * scale, steps=5)
-    page.until("view.frame.t > 1.1")
+    page.until("view.frame?.t > 1.1")
     page.page.mouse.up()
     with page.page.expect_download() as download:
         page.page.click("#record")
