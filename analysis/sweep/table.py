@@ -21,7 +21,7 @@ NOT_REPRODUCIBLE = "run_time_s"
 HEADS = {
     "end": "end",
     "end_time_s": "at (s)",
-    METRIC: "largest distance (mm)",
+    METRIC: "largest tracking error (mm)",
     "port_peak_J": "energy at the port (J)",
 }
 """Columns of the terminal."""
