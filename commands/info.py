@@ -139,8 +139,8 @@ def _needs(scene: Any, time: Timeline, replaced: list[str]) -> None:
     from hapticlink.analysis.findings import block_costs, requirements
 
     parts = list(requirements.needs(scene))
-    own = f" (by the scene's own blocks, {', '.join(replaced)} among them)" if replaced else ""
-    say(f"\nneeded{own}")
+    own = f" by the scene's own {', '.join(replaced)}; an FMU in its place may need other parts"
+    say(f"\nneeded{own * bool(replaced)}")
     for need in parts:
         if need.needed:
             say(f"  {need.part}: {need.why}")

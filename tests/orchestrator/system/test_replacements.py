@@ -237,4 +237,6 @@ def test_info_does_not_run_another_s_mechanism(
     """Its coordinates are its own, and it may hang."""
     swap = f"virtual_mechanism={spring(tmp_path, output='x')}"
     assert status("info", "closed-loop", "--swap", swap) == 0
-    assert "virtual_mechanism has no ports for" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "virtual_mechanism has no ports for" in said
+    assert "needed by the scene's own virtual_mechanism" in said
