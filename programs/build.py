@@ -6,7 +6,7 @@ import re
 import shutil
 import tempfile
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from hapticlink.fmus.archive import digest, write
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import CompilerError, FmuError
+from hapticlink.fmus.model_description import CAPABILITIES
 from hapticlink.fmus.native.compiler import (
     FLAGS,
     PLATFORMS,
@@ -28,6 +29,7 @@ from hapticlink.fmus.native.compiler import (
 )
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -35,7 +37,7 @@ from hapticlink.orchestrator.system.step_sizes import sizes
 from hapticlink.programs import description, description_fmi3
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolved import Resolved, resolved
-from hapticlink.programs.sources import fmi3_sources, sources
+from hapticlink.programs.sources import fmi3_sources, identifiers, sources
 
 OPTIONS = ("-DEXPORT=",)
 """The functions of the loop are not exported."""
@@ -102,24 +104,29 @@ def program_files(
         blocks_of_members = components(program)
         variables = ports(program, blocks_of_members)
         texts = sources(program, blocks_of_members, variables)
+        capable, resources = capabilities(program), dict(_resources(program))
         haptic = program.system.timeline.clocks[0]
         step_size = program.system.timeline.seconds(haptic.longest)
     if fmi == 3:
         texts |= fmi3_sources(variables)
-    compiled = sorted(name for name in texts if name.endswith(".c"))
+    compiled = sorted(name for name in texts if name.endswith(".c") and "/" not in name)
     described = description_fmi3.described if fmi == 3 else description.described
-    about = partial(described, scene, identifier, variables, step_size=step_size, files=compiled)
-    content = {f"sources/{name}": text.encode() for name, text in texts.items()}
+    about = partial(
+        described, scene, identifier, variables,
+        capable=capable, step_size=step_size, files=compiled,
+    )  # fmt: skip
+    content = {f"sources/{name}": text.encode() for name, text in texts.items()} | resources
     guid = f"{{{uuid.UUID(digest({**content, **about(guid='')})[:32])}}}"
     content["sources/scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["sources/scene.h"]
     return content | about(guid=guid)
 
 
 def components(program: Resolved) -> dict[str, Component]:
-    """The component of each member, with the step sizes of the scene."""
+    """The component of each member that is a block of this project, with the step sizes of the
+    scene."""
     timeline, plans = program.system.timeline, {b.name: b for b in blocks(program.scene).built}
     by_member = {}
-    for name in program.members:
+    for name in (n for n in program.members if n not in program.foreign):
         plan = plans[name]
         known = component(plan.block, plan.settings)
         steps = sizes(timeline.of[name], timeline)
@@ -128,15 +135,36 @@ def components(program: Resolved) -> dict[str, Component]:
     return by_member
 
 
+def capabilities(program: Resolved) -> dict[str, str]:
+    """What of CAPABILITIES the FMUs of others leave a program, as FMI 2.0 calls it."""
+    flags = [foreign.description.flags for foreign in program.foreign.values()]
+    capable = dict(CAPABILITIES)
+    for name in (STATE["2"], SERIALISED["2"]):
+        capable[name] = str(all(name in of for of in flags)).lower()
+    capable[ONCE] = str(any(ONCE in of for of in flags)).lower()
+    if flags:
+        capable["canNotUseMemoryManagementFunctions"] = "false"
+    return capable
+
+
+def _resources(program: Resolved) -> Iterator[tuple[str, bytes]]:
+    """The resources of FMUs of others, each in a folder of its own."""
+    for fmu, id_ in identifiers(program.members).items():
+        if fmu in program.foreign:
+            for name, content in program.foreign[fmu].resources.items():
+                yield f"resources/{id_}/{name}", content
+
+
 def _built(
     files: Mapping[str, bytes], identifier: str, platforms: Sequence[str], folder: Path
 ) -> Path:
     """The FMU with a binary for each platform, written once FMPy finds nothing wrong with it."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room, entries = Path(name), dict(files)
-        for entry in files:
-            if entry.startswith("sources/"):
-                (room / Path(entry).name).write_bytes(files[entry])
+        for entry in (e for e in files if e.startswith("sources/")):
+            path = room / entry.removeprefix("sources/")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(files[entry])
         texts = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
         entries |= binaries(texts, identifier, room, platforms, OPTIONS)
     target = folder / f"{identifier}.fmu"

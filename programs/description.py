@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from xml.etree import ElementTree as ET
 
+from hapticlink.components.base_units import BASES
 from hapticlink.fmus.archive import icon
 from hapticlink.fmus.documentation import STYLE
-from hapticlink.fmus.model_description import CAPABILITIES, LOG_CATEGORIES
+from hapticlink.fmus.model_description import LOG_CATEGORIES
 from hapticlink.fmus.units import base_unit
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.ports import Port
 
 PAGE = "documentation/index.html"
+SECOND = "s"
+"""Of the variable `time` of FMI 3.0."""
 CAUSALITY = {
     "INPUT": "input",
     "OUTSIDE": "input",
@@ -30,20 +33,22 @@ def described(
     identifier: str,
     ports: Sequence[Port],
     *,
+    capable: Mapping[str, str],
     guid: str,
     step_size: float,
     files: Iterable[str],
 ) -> dict[str, bytes]:
-    """The files that describe the program, the same for the same arguments. step_size (s): of the
-    default experiment. files: the C files of the program, in sources/."""
+    """The files that describe the program, the same for the same arguments. capable: its
+    capabilities, as FMI 2.0 calls them. step_size (s): of the default experiment. files: the C
+    files to compile, in sources/."""
     told = of_model(scene, identifier)
     root = ET.Element("fmiModelDescription", told, fmiVersion="2.0", guid=guid)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
-    simulation = ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
+    simulation = ET.SubElement(root, "CoSimulation", runs | {**capable})
     listed = ET.SubElement(simulation, "SourceFiles")
     for name in files:
         ET.SubElement(listed, "File", name=name)
-    definitions(root, scene, {port.unit for port in ports}, step_size)
+    definitions(root, scene, ports, step_size)
     _variables(root, ports)
     _structure(root, ports)
     return {
@@ -54,14 +59,16 @@ def described(
 
 
 def of_model(scene: Scene, identifier: str) -> dict[str, str]:
-    """The attributes of the program in modelDescription.xml."""
+    """The attributes of the program in modelDescription.xml. FMUs of others name their variables as
+    they like."""
+    naming = "flat" if any(fmu.path for fmu in scene.fmu) else "structured"
     return {
         "modelName": identifier,
         "description": scene.title,
         "version": version("hapticlink"),
         "license": "MIT",
         "generationTool": f"hapticlink {version('hapticlink')}",
-        "variableNamingConvention": "structured",
+        "variableNamingConvention": naming,
     }
 
 
@@ -71,12 +78,19 @@ def as_text(root: ET.Element) -> bytes:
     return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
 
 
-def definitions(root: ET.Element, scene: Scene, units: Iterable[str], step_size: float) -> None:
+def definitions(root: ET.Element, scene: Scene, ports: Sequence[Port], step_size: float) -> None:
     """Units, categories of messages and the default experiment, as FMI 2.0 and 3.0 have them."""
-    defined = ET.SubElement(root, "UnitDefinitions")
-    for unit in sorted(units):
-        exponents = {base: str(power) for base, power in base_unit(unit).items()}
-        ET.SubElement(ET.SubElement(defined, "Unit", name=unit), "BaseUnit", exponents)
+    units = {SECOND: None} | {port.unit: port.defined for port in ports if port.unit}
+    parent = ET.SubElement(root, "UnitDefinitions")
+    for name, unit in sorted(units.items()):
+        element = ET.SubElement(parent, "Unit", name=name)
+        if unit is None:
+            powers = {base: str(power) for base, power in base_unit(name).items()}
+            ET.SubElement(element, "BaseUnit", powers)
+        elif unit.base is not None:
+            powers = {b: str(n) for b, n in zip(BASES, unit.base, strict=True) if n}
+            shift = {"factor": repr(unit.factor), "offset": repr(unit.offset)}
+            ET.SubElement(element, "BaseUnit", powers | shift)
     categories = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", name=name, description=text)
@@ -101,7 +115,9 @@ def _variables(root: ET.Element, ports: Sequence[Port]) -> None:
     for reference, port in enumerate(ports):
         name = {"name": port.name, "valueReference": str(reference)}
         told = name | {"description": port.description} | about(port)
-        real = ET.SubElement(ET.SubElement(parent, "ScalarVariable", told), "Real", unit=port.unit)
+        real = ET.SubElement(ET.SubElement(parent, "ScalarVariable", told), "Real")
+        if port.unit:
+            real.set("unit", port.unit)
         if port.start is not None:
             real.set("start", repr(float(port.start)))
         if port.max is not None:

@@ -7,13 +7,15 @@ them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
 from hapticlink.fmus.archive import icon
+from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE, VARIABLE_STEP
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.description import (
     PAGE,
+    SECOND,
     about,
     as_text,
     definitions,
@@ -23,11 +25,10 @@ from hapticlink.programs.description import (
 from hapticlink.programs.ports import Array, Port, arrays
 
 CAPABILITIES = {
-    "canBeInstantiatedOnlyOncePerProcess": "false",
-    "canGetAndSetFMUState": "true",
-    "canSerializeFMUState": "true",
-    "canHandleVariableCommunicationStepSize": "true",
-}
+    ONCE: ONCE, STATE["3"]: STATE["2"], SERIALISED["3"]: SERIALISED["2"],
+    VARIABLE_STEP: VARIABLE_STEP,
+}  # fmt: skip
+"""Those of FMI 3.0, with what FMI 2.0 calls them."""
 TIME = "time"
 
 
@@ -36,13 +37,16 @@ def described(
     identifier: str,
     ports: Sequence[Port],
     *,
+    capable: Mapping[str, str],
     guid: str,
     step_size: float,
     files: Iterable[str],
 ) -> dict[str, bytes]:
     """As `description.described`. guid: the instantiation token."""
     variables = [*arrays(ports)]
-    text = _model_description(scene, identifier, variables, token=guid, step_size=step_size)
+    text = _model_description(
+        scene, identifier, ports, variables, capable=capable, token=guid, step_size=step_size
+    )
     return {
         "modelDescription.xml": text,
         "terminalsAndIcons/terminalsAndIcons.xml": _terminals(variables),
@@ -53,18 +57,26 @@ def described(
 
 
 def _model_description(
-    scene: Scene, identifier: str, arrays: Sequence[Array], *, token: str, step_size: float
+    scene: Scene,
+    identifier: str,
+    ports: Sequence[Port],
+    arrays: Sequence[Array],
+    *,
+    capable: Mapping[str, str],
+    token: str,
+    step_size: float,
 ) -> bytes:
     told = of_model(scene, identifier)
     root = ET.Element("fmiModelDescription", told, fmiVersion="3.0", instantiationToken=token)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
-    ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
-    definitions(root, scene, {"s", *(p.unit for a in arrays for p in a.entries)}, step_size)
+    capabilities = {name: capable[of_fmi2] for name, of_fmi2 in CAPABILITIES.items()}
+    ET.SubElement(root, "CoSimulation", runs | capabilities)
+    definitions(root, scene, ports, step_size)
     variables = ET.SubElement(root, "ModelVariables")
     holder = {p.name: a for a in arrays for p in a.entries}
     for array in arrays:
         _variable(variables, array, holder)
-    time = {"causality": "independent", "variability": "continuous", "unit": "s"}
+    time = {"causality": "independent", "variability": "continuous", "unit": SECOND}
     last = sum(len(a.entries) for a in arrays)
     described = {"name": TIME, "valueReference": str(last), "description": "Simulation time."}
     ET.SubElement(variables, "Float64", described | time)
@@ -87,7 +99,7 @@ def _variable(variables: ET.Element, array: Array, holder: dict[str, Array]) -> 
         described = f"{described.rstrip('.')} ({', '.join(units)})"
     told = {"name": array.name, "valueReference": str(array.reference), "description": described}
     told |= about(first)
-    if len(set(units)) == 1:
+    if len(set(units)) == 1 and units[0]:
         told["unit"] = units[0]
     if first.start is not None:
         told["start"] = " ".join(repr(float(port.start or 0.0)) for port in array.entries)

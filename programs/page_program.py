@@ -12,7 +12,9 @@ import casadi as ca
 from hapticlink.components.component import Component
 from hapticlink.fmus.native.compiler import compile_webassembly
 from hapticlink.fmus.native.source import functions
+from hapticlink.programs import refusals
 from hapticlink.programs.build import OPTIONS
+from hapticlink.programs.foreign import write_texts
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolved import Resolved
 from hapticlink.programs.sources import HERE, prefixed, sources, table
@@ -32,7 +34,9 @@ class Drawing:
 def webassembly_files(
     program: Resolved, components: Mapping[str, Component], ports: Sequence[Port], drawing: Drawing
 ) -> dict[str, str]:
-    """The C files of the module, whose functions are those of page.c."""
+    """The C files of the module, whose functions are those of page.c. Raises InputFault for FMUs of
+    others with resources."""
+    refusals.of_page(program.foreign, program.scene.title)
     texts = sources(program, components, ports)
     texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
     texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')
@@ -44,8 +48,7 @@ def webassembly(texts: Mapping[str, str], folder: Path) -> bytes:
     """The module of these files, compiled in `folder`. Raises CompilerError."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
-        for file, text in texts.items():
-            (room / file).write_text(text)
+        write_texts(texts, room)
         files = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
         return compile_webassembly(files, room, OPTIONS)
 

@@ -8,12 +8,18 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Literal
 
+from hapticlink.components.base_units import BASES
 from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component, Variable
+from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.model_description import feed_through, scalars
+from hapticlink.fmus.units import base_unit
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.units import Unit
+from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.system.system import System
 from hapticlink.programs.resolved import Resolved
 
@@ -48,6 +54,12 @@ class Port:
     """The inputs of the program that an output depends on at a communication point."""
     shape: tuple[int, ...] = ()
     """That of the vector or matrix of which it is an entry."""
+    type: str = "Real"
+    """What it is in its block: Real, Integer or Boolean; here all are numbers."""
+    defined: Unit | None = None
+    """Its unit where an FMU of others defines it; "" has none."""
+    is_set: bool = True
+    """Whether its start value is set, which an FMU of others may have by itself."""
 
 
 @dataclass(frozen=True)
@@ -77,14 +89,21 @@ def arrays(ports: Sequence[Port]) -> Iterator[Array]:
 
 
 def ports(resolved: Resolved, components: Mapping[str, Component]) -> list[Port]:
-    """The variables, in the order of their value references. components: by member."""
-    return [
+    """The variables, in the order of their value references. components: of the members that are
+    blocks of this project."""
+    every = [
         *_inputs(resolved, components),
         *_parameters(resolved, components),
         *_outputs(resolved, components),
         *_energies(resolved),
         *_step_errors(resolved),
     ]
+    units: dict[str, Unit | None] = {}
+    return [
+        port if units.setdefault(port.unit, port.defined) == port.defined else
+        replace(port, unit="", defined=None)
+        for port in every
+    ]  # fmt: skip
 
 
 def fed(system: System, fmu: str) -> set[str]:
@@ -101,13 +120,21 @@ def _inputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator
         names = {s.port: s.name for s in outputs}  # of the last entry
         for place, (scalar, start) in enumerate(zip(outputs, values, strict=True), span.start):
             if scalar.name in used:
-                name, unit = f"{resolved.outside}.{scalar.name}", scalar.unit or "1"
+                name = f"{resolved.outside}.{scalar.name}"
+                unit, defined = _unit(resolved.system.fmu[resolved.outside].description, scalar)
                 text = f"{scalar.port} of the {resolved.outside}, which is left out."
                 last = names[scalar.port].removeprefix(scalar.port)
                 shape = tuple(map(int, re.findall(r"\d+", last)))
-                yield Port("OUTSIDE", name, unit, text, place=place, start=start, shape=shape)
-    for member, (fmu, component) in enumerate(components.items()):
+                yield Port(
+                    "OUTSIDE", name, unit, text, place=place, start=start, shape=shape,
+                    defined=defined,
+                )  # fmt: skip
+    for member, fmu in enumerate(resolved.members):
         taken = fed(resolved.system, fmu)
+        if fmu in resolved.foreign:
+            yield from _settable(resolved, fmu, member, "input")
+            continue
+        component = components[fmu]
         for reference, (v, name, unit, start) in enumerate(scalars(component.inputs)):
             if name not in taken:
                 yield Port(
@@ -118,7 +145,11 @@ def _inputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator
 
 def _parameters(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
     """Parameters that no connection sets; step sizes are those of the scene."""
-    for member, (fmu, component) in enumerate(components.items()):
+    for member, fmu in enumerate(resolved.members):
+        if fmu in resolved.foreign:
+            yield from _settable(resolved, fmu, member, "parameter")
+            continue
+        component = components[fmu]
         taken = fed(resolved.system, fmu) | {STEP_SIZE, FRAME_SIZE}
         first = len(component.start_inputs)
         given = dict((s.name, float(v)) for s, v in resolved.system.fmu[fmu].starts)
@@ -134,7 +165,11 @@ def _parameters(resolved: Resolved, components: Mapping[str, Component]) -> Iter
 def _outputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
     """The outputs that the scene records, all by default."""
     signals, chosen = resolved.simulation.signals, resolved.recorded
-    for member, (fmu, component) in enumerate(components.items()):
+    for member, fmu in enumerate(resolved.members):
+        if fmu in resolved.foreign:
+            yield from _foreign_outputs(resolved, fmu, member)
+            continue
+        component = components[fmu]
         places = {s.name: s.reference for s in resolved.system.fmu[fmu].description.outputs}
         taken, through = fed(resolved.system, fmu), feed_through(component)
         inputs = [name for _, name, _, _ in scalars(component.inputs)]
@@ -151,6 +186,53 @@ def _outputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterato
                 derivative_of=f"{fmu}.{of}" if of and f"{fmu}.{of}" in chosen else None,
                 depends=tuple(f"{fmu}.{u}" for u in depends if u not in taken), shape=v.shape,
             )  # fmt: skip
+
+
+def _settable(resolved: Resolved, fmu: str, member: int, causality: str) -> Iterator[Port]:
+    """The real inputs or parameters of an FMU of others that no connection sets."""
+    description, taken = resolved.foreign[fmu].description, fed(resolved.system, fmu)
+    given = {s.name: float(v) for s, v in resolved.system.fmu[fmu].starts if s.type == "Real"}
+    for s in description.scalars:
+        if s.causality != causality or s.type != "Real" or not s.settable or s.name in taken:
+            continue
+        unit, defined = _unit(description, s)
+        yield Port(
+            "INPUT" if causality == "input" else "PARAMETER", f"{fmu}.{s.name}", unit,
+            f"{s.name} of {description.path.name}.", member, s.reference,
+            start=given.get(s.name, s.start), fixed=s.variability == "fixed", defined=defined,
+            is_set=s.name in given,
+        )  # fmt: skip
+
+
+def _foreign_outputs(resolved: Resolved, fmu: str, member: int) -> Iterator[Port]:
+    description, signals = resolved.foreign[fmu].description, resolved.simulation.signals
+    taken = fed(resolved.system, fmu)
+    inputs = [s for s in description.scalars if s.causality == "input" and s.type == "Real"]
+    free = [s for s in inputs if s.name not in taken]
+    for s in description.outputs:
+        if f"{fmu}.{s.name}" not in resolved.recorded:
+            continue
+        unit, defined = _unit(description, s)
+        sampled = description.timing == "sampled"
+        yield Port(
+            "OUTPUT", f"{fmu}.{s.name}", unit, f"{s.name} of {description.path.name}.", member,
+            s.reference, signals.scalar(fmu, s.name), sampled=sampled or s.type != "Real",
+            depends=() if sampled
+            else tuple(f"{fmu}.{u.name}" for u in free if description.follows(s, [u])),
+            type=s.type, defined=defined,
+        )  # fmt: skip
+
+
+def _unit(description: Description, scalar: Scalar) -> tuple[str, Unit | None]:
+    """The unit of a variable: its name, and what it is where that is not what it says."""
+    unit = description.unit(scalar)
+    if unit is None or description.block is not None:
+        return scalar.unit or ("" if description.block is None else "1"), None
+    try:
+        powers = tuple(base_unit(unit.name).get(base, 0) for base in BASES)
+    except FmuError:
+        powers = None
+    return unit.name, None if unit == Unit(unit.name, powers) and powers else unit
 
 
 def _bases(component: Component) -> dict[str, str]:

@@ -1,7 +1,8 @@
 /* The FMI 2.0.5 co-simulation interface of a scene as one program.
  *
  * The run is the project's own loop (loop.h) on the data of scene.h, which Python has resolved; the
- * blocks are linked in, each with the FMI functions of fmus/native/fmi2.c under its own prefix.
+ * blocks are linked in, each with its FMI functions under its own prefix: those of fmus/native/fmi2.c,
+ * or of an FMU of others (foreign.py).
  *
  *     fmi2DoStep   all events from where the program stands up to, but not at, the last tick at or
  *                  before the end of the step: what happens at a tick needs the inputs of that tick
@@ -28,13 +29,25 @@ typedef const fmi2ValueReference *References;
 
 typedef enum { INPUT, OUTSIDE, PARAMETER, OUTPUT, ENERGY, STEP_ERROR } VariableKind;
 
+typedef enum { REAL, INTEGER, BOOLEAN, STRING } VariableType; /* in its block; here all are numbers */
+
 typedef struct {
     VariableKind kind;
+    VariableType type;
     int member, fixed;
     fmi2ValueReference reference;
     int64_t place; /* in the vector of signals */
     const char *name;
 } Variable;
+
+/* A start value that a scene gives to a block of others. */
+typedef struct {
+    int member;
+    VariableType type;
+    fmi2ValueReference reference;
+    double value;
+    const char *text;
+} Given;
 
 /* A window of communication points begins again after `n` of them, `ticks` later. */
 typedef struct {
@@ -47,55 +60,37 @@ typedef struct {
     int64_t first, n, dticks, slopes, key[8];
 } Family;
 
-enum { GET_REAL, SET_REAL, DO_STEP, GET_STATE, SET_STATE, FREE_STATE };
+enum {
+    GET_REAL, SET_REAL, GET_INTEGER, SET_INTEGER, GET_BOOLEAN, SET_BOOLEAN, DO_STEP, GET_STATE, SET_STATE,
+    FREE_STATE
+};
 
+/* The functions of a block that are called. */
+#define FUNCTIONS(X, id)                                                                            \
+    X(id, Instantiate, instantiate) X(id, FreeInstance, free) X(id, SetupExperiment, setup)         \
+    X(id, EnterInitializationMode, enter) X(id, ExitInitializationMode, exit)                       \
+    X(id, Terminate, terminate) X(id, Reset, reset) X(id, GetReal, get) X(id, SetReal, set)         \
+    X(id, GetInteger, get_integer) X(id, SetInteger, set_integer)                                   \
+    X(id, GetBoolean, get_boolean) X(id, SetBoolean, set_boolean) X(id, SetString, set_string)      \
+    X(id, DoStep, step) X(id, GetBooleanStatus, boolean_status)                                     \
+    X(id, GetRealStatus, real_status) X(id, GetFMUstate, get_state) X(id, SetFMUstate, set_state)   \
+    X(id, FreeFMUstate, free_state) X(id, SerializedFMUstateSize, state_size)                       \
+    X(id, SerializeFMUstate, serialize) X(id, DeSerializeFMUstate, deserialize)
+
+#define FIELD(id, function, field) fmi2##function##TYPE *field;
 typedef struct {
-    const char *name, *guid;
-    fmi2InstantiateTYPE *instantiate;
-    fmi2FreeInstanceTYPE *free;
-    fmi2SetupExperimentTYPE *setup;
-    fmi2EnterInitializationModeTYPE *enter;
-    fmi2ExitInitializationModeTYPE *exit;
-    fmi2TerminateTYPE *terminate;
-    fmi2ResetTYPE *reset;
-    fmi2GetRealTYPE *get;
-    fmi2SetRealTYPE *set;
-    fmi2DoStepTYPE *step;
-    fmi2GetFMUstateTYPE *get_state;
-    fmi2SetFMUstateTYPE *set_state;
-    fmi2FreeFMUstateTYPE *free_state;
-    fmi2SerializedFMUstateSizeTYPE *state_size;
-    fmi2SerializeFMUstateTYPE *serialize;
-    fmi2DeSerializeFMUstateTYPE *deserialize;
+    const char *id, *name, *guid;
+    FUNCTIONS(FIELD, )
 } Member;
 
 #include "scene.h"
 
-#define DECLARE(id, name, guid)                                                                     \
-    extern fmi2InstantiateTYPE id##_fmi2Instantiate;                                                \
-    extern fmi2FreeInstanceTYPE id##_fmi2FreeInstance;                                              \
-    extern fmi2SetupExperimentTYPE id##_fmi2SetupExperiment;                                        \
-    extern fmi2EnterInitializationModeTYPE id##_fmi2EnterInitializationMode;                        \
-    extern fmi2ExitInitializationModeTYPE id##_fmi2ExitInitializationMode;                          \
-    extern fmi2TerminateTYPE id##_fmi2Terminate;                                                    \
-    extern fmi2ResetTYPE id##_fmi2Reset;                                                            \
-    extern fmi2GetRealTYPE id##_fmi2GetReal;                                                        \
-    extern fmi2SetRealTYPE id##_fmi2SetReal;                                                        \
-    extern fmi2DoStepTYPE id##_fmi2DoStep;                                                          \
-    extern fmi2GetFMUstateTYPE id##_fmi2GetFMUstate;                                                \
-    extern fmi2SetFMUstateTYPE id##_fmi2SetFMUstate;                                                \
-    extern fmi2FreeFMUstateTYPE id##_fmi2FreeFMUstate;                                              \
-    extern fmi2SerializedFMUstateSizeTYPE id##_fmi2SerializedFMUstateSize;                          \
-    extern fmi2SerializeFMUstateTYPE id##_fmi2SerializeFMUstate;                                    \
-    extern fmi2DeSerializeFMUstateTYPE id##_fmi2DeSerializeFMUstate;
+#define DECLARE_ONE(id, function, field) extern fmi2##function##TYPE id##_fmi2##function;
+#define DECLARE(id, name, guid) FUNCTIONS(DECLARE_ONE, id)
 MEMBERS(DECLARE)
 
-#define ROW(id, name, guid)                                                                         \
-    {name, guid, id##_fmi2Instantiate, id##_fmi2FreeInstance, id##_fmi2SetupExperiment,             \
-     id##_fmi2EnterInitializationMode, id##_fmi2ExitInitializationMode, id##_fmi2Terminate,         \
-     id##_fmi2Reset, id##_fmi2GetReal, id##_fmi2SetReal, id##_fmi2DoStep, id##_fmi2GetFMUstate,     \
-     id##_fmi2SetFMUstate, id##_fmi2FreeFMUstate, id##_fmi2SerializedFMUstateSize,                  \
-     id##_fmi2SerializeFMUstate, id##_fmi2DeSerializeFMUstate},
+#define NAME(id, function, field) id##_fmi2##function,
+#define ROW(id, name, guid) {#id, name, guid, FUNCTIONS(NAME, id)},
 static const Member members[] = {MEMBERS(ROW)};
 
 int hapticlink_events(Loop *l, Events *e);
@@ -104,6 +99,7 @@ enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP_MODE = 4, ENDED = 8, FAILURE =
 enum { SWEEPS = 50 };
 static const double TOLERANCE = 1e-12; /* of start values: run/initialize.py */
 static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/output_bounds.py */
+static const double SHARE = 1e-6;      /* of a step that is whole: fmi/termination.py */
 static const double NEAR = 1e-3;       /* of a tick, by which a time may be before it */
 
 enum { MOST_POINTS = 64 }; /* of the window of a clock whose rate was changed */
@@ -159,9 +155,12 @@ static int has_ended(const Model *m) { return m->now.mode == ENDED; }
 /* Messages of a block, with its name. */
 static void member_logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
                           fmi2String category, fmi2String message, ...) {
-    char text[2200];
-    snprintf(text, sizeof text, "%s: %s", name, message);
-    say(environment, status, text);
+    char text[1024];
+    va_list arguments;
+    va_start(arguments, message);
+    vsnprintf(text, sizeof text, message, arguments);
+    va_end(arguments);
+    fail(environment, status > fmi2Fatal ? fmi2OK : status, "%s: %s", name, text);
     (void)category;
 }
 
@@ -175,6 +174,10 @@ static const void *function(const Member *member, int which) {
     switch (which) {
     case GET_REAL: return (const void *)member->get;
     case SET_REAL: return (const void *)member->set;
+    case GET_INTEGER: return (const void *)member->get_integer;
+    case SET_INTEGER: return (const void *)member->set_integer;
+    case GET_BOOLEAN: return (const void *)member->get_boolean;
+    case SET_BOOLEAN: return (const void *)member->set_boolean;
     case DO_STEP: return (const void *)member->step;
     case GET_STATE: return (const void *)member->get_state;
     case FREE_STATE: return (const void *)member->free_state;
@@ -195,7 +198,20 @@ static void relocate(Model *m) {
     use_chosen(m);
 }
 
-static void restart(Model *m) {
+static fmi2Status give(Model *m, const Given *g) {
+    const Member *member = members + g->member;
+    fmi2Component c = m->members[g->member];
+    const int whole = (int)g->value;
+    switch (g->type) {
+    case REAL: return member->set(c, &g->reference, 1, &g->value);
+    case INTEGER: return member->set_integer(c, &g->reference, 1, &whole);
+    case BOOLEAN: return member->set_boolean(c, &g->reference, 1, &whole);
+    default: return member->set_string(c, &g->reference, 1, &g->text);
+    }
+}
+
+/* As the scene begins, with blocks that are as they are instantiated. */
+static fmi2Status restart(Model *m) {
     memset(&m->now, 0, sizeof m->now);
     memcpy(m->now.guid, GUID, sizeof GUID);
     memcpy(&m->now.scene, &initial, sizeof initial);
@@ -204,9 +220,15 @@ static void restart(Model *m) {
     relocate(m);
     for (int i = 0; i < N_SETTABLE; i++) {
         const Variable *v = variables + i;
+        if (isnan(starts[i])) continue; /* the block has it by itself */
         if (v->kind == OUTSIDE) m->now.scene.loop_values[v->place] = starts[i];
-        else members[v->member].set(m->members[v->member], &v->reference, 1, starts + i);
+        else if (members[v->member].set(m->members[v->member], &v->reference, 1, starts + i) > fmi2Warning)
+            return fail(m, fmi2Error, "%s does not take its start value", v->name);
     }
+    for (int i = 0; i < N_GIVEN; i++)
+        if (give(m, given + i) > fmi2Warning)
+            return fail(m, fmi2Error, "%s does not take its start values", members[given[i].member].name);
+    return fmi2OK;
 }
 
 static double seconds(const Model *m, int64_t tick) { return tick_time(&m->now.scene.loop, tick); }
@@ -218,6 +240,11 @@ static int agrees(double value, double before) {
     return fabs(value - before) <= TOLERANCE + TOLERANCE * fabs(before);
 }
 
+static fmi2Status unsettled(const Model *m, int fmu) {
+    return fail(m, fmi2Error, "%s gives no outputs or takes no inputs in initialisation",
+                members[fmu_members[fmu]].name);
+}
+
 /* Sets inputs and reads outputs until they agree. */
 static fmi2Status settle(Model *m) {
     Scene *s = &m->now.scene;
@@ -226,15 +253,15 @@ static fmi2Status settle(Model *m) {
     int last = -1;
     if (m->now.settled) return fmi2OK;
     for (int i = 0; i < N_FMUS; i++)
-        if (fmu_get(l->fmus + i, 0, &at)) return fmi2Error;
+        if (fmu_get(l->fmus + i, 0, &at)) return unsettled(m, i);
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
         memcpy(m->before, l->values, sizeof m->before);
         for (int i = 0; i < N_START_SETTERS; i++) {
             for (int k = 0; k < N_HOLDS; k++)
                 for (int64_t j = 0; j < l->holds[k]->n; j++)
                     l->holds[k]->held[j] = l->values[l->holds[k]->sources[j]];
-            if (fmu_set(START_SETTERS(s) + i, l->values, &at)) return fmi2Error;
-            if (fmu_get(l->fmus + start_fmus[i], 0, &at)) return fmi2Error;
+            if (fmu_set(START_SETTERS(s) + i, l->values, &at)) return unsettled(m, start_fmus[i]);
+            if (fmu_get(l->fmus + start_fmus[i], 0, &at)) return unsettled(m, start_fmus[i]);
         }
         last = -1;
         for (int i = 0; i < N_VALUES && last < 0; i++)
@@ -338,6 +365,30 @@ static int judge(Model *m, Fmu *f) {
     return 1;
 }
 
+/* Whether a block has discarded a step because it ends the simulation there: it is then the last one
+ * of the block. 0, with a message, where it failed or ends within the step: in_process_fmi2.py. */
+static int took_its_last_step(Model *m, int64_t fmu, fmi2Status status) {
+    const Member *member = members + fmu_members[fmu];
+    fmi2Component c = m->members[fmu_members[fmu]];
+    Place *p = m->now.scene.loop.fmus[fmu].place;
+    fmi2Boolean ends = fmi2False;
+    double end;
+    if (status != fmi2Discard || member->boolean_status(c, fmi2Terminated, &ends) || !ends) {
+        fail(m, fmi2Error, "%s failed in its step from t = %.17g s", member->name, p->begin);
+        return 0;
+    }
+    if (member->real_status(c, fmi2LastSuccessfulTime, &end)) end = p->begin;
+    if (end >= p->begin + (1.0 - SHARE) * p->size) {
+        p->ended = 1;
+        p->time = p->end;
+        return 1;
+    }
+    m->now.mode = ENDED;
+    m->now.tick = m->now.scene.events.tick;
+    fail(m, fmi2Discard, "%s ends the simulation at t = %.17g s, within its step", member->name, end);
+    return 0;
+}
+
 /* Does what the loop returned to its caller for; 0 where it cannot go on. */
 static int serve(Model *m, int code) {
     Scene *s = &m->now.scene;
@@ -378,8 +429,21 @@ static int serve(Model *m, int code) {
             return 1;
         }
         if ((op->code == SAMPLE || op->code == MOVE) && meter_fold(l->meters[op->a])) return 1;
+        if (op->code == STEP && l->fmus[op->a].place->ended) {
+            m->now.mode = ENDED;
+            m->now.tick = s->events.tick;
+            fail(m, fmi2Discard, "%s has ended the simulation", members[fmu_members[op->a]].name);
+            return 0;
+        }
+        if (op->code == SET) {
+            fail(m, fmi2Error, "an integer input cannot have its value at t = %.17g s", time);
+            return 0;
+        }
         break;
-    case FAILED: case STEPPED: case UNSAVED: case UNRESTORED:
+    case STEPPED:
+        at->op++;
+        return took_its_last_step(m, op->a, at->status);
+    case FAILED: case UNSAVED: case UNRESTORED:
         fail(m, fmi2Error, "%s failed at t = %.17g s", members[fmu_members[op->a]].name, time);
         return 0;
     case GROW:
@@ -404,9 +468,21 @@ void fmi2FreeInstance(fmi2Component c) {
     Model *m = c;
     if (!m) return;
     for (int i = 0; i < N_SLOTS; i++)
-        members[slot_members[i]].free_state(m->members[slot_members[i]], m->slots + i);
+        if (m->slots[i]) members[slot_members[i]].free_state(m->members[slot_members[i]], m->slots + i);
     for (int i = 0; i < N_MEMBERS; i++) if (m->members[i]) members[i].free(m->members[i]);
     free(m);
+}
+
+/* A block, whose resources are in a folder of those of the program. */
+static fmi2Component instantiated(Model *m, const Member *member, fmi2String resources, fmi2Boolean logging) {
+    const size_t n = resources ? strlen(resources) : 0, room = n + strlen(member->id) + 2;
+    char *location = calloc(room, 1);
+    if (!location) return NULL;
+    if (n) snprintf(location, room, "%s%s%s", resources, resources[n - 1] == '/' ? "" : "/", member->id);
+    fmi2Component c = member->instantiate(member->name, fmi2CoSimulation, member->guid, location,
+                                          &m->member_callbacks, fmi2False, logging);
+    free(location);
+    return c;
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
@@ -417,15 +493,15 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     const fmi2CallbackFunctions own = {member_logger, calloc, free, NULL, m};
     memcpy(&m->member_callbacks, &own, sizeof own);
     for (int i = 0; i < N_MEMBERS; i++) {
-        m->members[i] = members[i].instantiate(members[i].name, fmi2CoSimulation, members[i].guid, "",
-                                               &m->member_callbacks, fmi2False, fmi2False);
+        m->members[i] = instantiated(m, members + i, resources, logging);
         if (m->members[i]) continue;
-        fail(m, fmi2Error, "no memory for %s", members[i].name);
+        fail(m, fmi2Error, "%s cannot be instantiated", members[i].name);
         fmi2FreeInstance(m);
         return NULL;
     }
-    restart(m);
-    return m;
+    if (restart(m) == fmi2OK) return m;
+    fmi2FreeInstance(m);
+    return NULL;
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
@@ -439,10 +515,10 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     Model *m = c;
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
-    for (int i = 0; i < N_MEMBERS; i++) {
-        members[i].setup(m->members[i], fmi2False, 0.0, 0.0, fmi2False, 0.0);
-        members[i].enter(m->members[i]);
-    }
+    for (int i = 0; i < N_MEMBERS; i++)
+        if (members[i].setup(m->members[i], fmi2False, 0.0, 0.0, fmi2False, 0.0) > fmi2Warning ||
+            members[i].enter(m->members[i]) > fmi2Warning)
+            return fail(m, fmi2Error, "%s does not enter initialisation mode", members[i].name);
     m->now.mode = INITIALIZATION;
     return fmi2OK;
 }
@@ -457,7 +533,8 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
                         m->now.scene.loop.values[i]);
     m->now.mode = FAILURE;
     for (int i = 0; i < N_MEMBERS; i++)
-        if (members[i].exit(m->members[i]) > fmi2Warning) return fmi2Error;
+        if (members[i].exit(m->members[i]) > fmi2Warning)
+            return fail(m, fmi2Error, "%s does not leave initialisation mode", members[i].name);
     if (begin(m)) return fail(m, fmi2Error, "holds and meters cannot take the samples of t = 0");
     m->now.mode = STEP_MODE;
     return fmi2OK;
@@ -466,20 +543,35 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 fmi2Status fmi2Terminate(fmi2Component c) {
     Model *m = c;
     if (out_of_order(m, __func__, STEP_MODE | ENDED)) return fmi2Error;
-    for (int i = 0; i < N_MEMBERS; i++) members[i].terminate(m->members[i]);
     m->now.mode = TERMINATED;
+    for (int i = 0; i < N_MEMBERS; i++)
+        if (members[i].terminate(m->members[i]) > fmi2Warning)
+            return fail(m, fmi2Error, "%s cannot be terminated", members[i].name);
     return fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
     Model *m = c;
     if (!m) return fmi2Error;
-    for (int i = 0; i < N_MEMBERS; i++) members[i].reset(m->members[i]);
-    restart(m);
-    return fmi2OK;
+    for (int i = 0; i < N_MEMBERS; i++)
+        if (members[i].reset(m->members[i]) > fmi2Warning)
+            return fail(m, fmi2Error, "%s cannot be reset: instantiate again", members[i].name);
+    return restart(m);
 }
 
 /* --- values --------------------------------------------------------------------------------- */
+
+/* A variable of a block as a number. */
+static fmi2Status number_of(const Model *m, const Variable *v, double *value) {
+    const Member *member = members + v->member;
+    fmi2Component c = m->members[v->member];
+    int whole = 0;
+    if (v->type == REAL) return member->get(c, &v->reference, 1, value);
+    const fmi2Status status = (v->type == INTEGER ? member->get_integer : member->get_boolean)(
+        c, &v->reference, 1, &whole);
+    *value = whole;
+    return status;
+}
 
 static fmi2Status value_of(Model *m, const Variable *v, double *value) {
     const Loop *l = &m->now.scene.loop;
@@ -494,7 +586,7 @@ static fmi2Status value_of(Model *m, const Variable *v, double *value) {
             *value = t->block[1 + v->place - (t->view - l->values)];
             return fmi2OK;
         }
-    default: return members[v->member].get(m->members[v->member], &v->reference, 1, value);
+    default: return number_of(m, v, value);
     }
 }
 
@@ -523,7 +615,8 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
     for (size_t i = 0; i < n; i++) {
         const Variable *v = variables + vr[i];
         if (v->kind == OUTSIDE) m->now.scene.loop_values[v->place] = value[i];
-        else if (members[v->member].set(m->members[v->member], &v->reference, 1, value + i)) return fmi2Error;
+        else if (members[v->member].set(m->members[v->member], &v->reference, 1, value + i) > fmi2Warning)
+            return fail(m, fmi2Error, "%s cannot be set to %.17g", v->name, value[i]);
     }
     m->now.settled = 0;
     return fmi2OK;
@@ -548,7 +641,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
             return fmi2Discard;
         }
         m->now.mode = FAILURE;
-        return fmi2Error;
+        return m->now.scene.events.at.status == fmi2Fatal ? fmi2Fatal : fmi2Error;
     }
     m->now.time = end;
     return fmi2OK;
@@ -556,9 +649,15 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
 
 /* --- FMU state ------------------------------------------------------------------------------ */
 
+/* Whether `member`, if there is one, lacks what `call` needs of all. */
+static int lacks(const Model *m, const char *call, const char *member) {
+    if (member) fail(m, fmi2Error, "%s: %s is an FMU that does not offer this", call, member);
+    return member != NULL;
+}
+
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Model *m = c;
-    if (is_null(m, __func__, 1, state, state)) return fmi2Error;
+    if (is_null(m, __func__, 1, state, state) || lacks(m, __func__, WITHOUT_STATE)) return fmi2Error;
     if (!*state) *state = calloc(1, sizeof(Saved));
     if (!*state) return fail(m, fmi2Error, "no memory for an FMU state");
     Saved *saved = *state;
@@ -599,6 +698,7 @@ static size_t member_state_size(const Model *m, int i, const Saved *saved) {
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     Model *m = c;
     if (is_null(m, __func__, 1, state, size) || !is_ours(m, state)) return fmi2Error;
+    if (lacks(m, __func__, WITHOUT_BYTES)) return fmi2Error;
     *size = sizeof(State);
     for (int i = 0; i < N_MEMBERS; i++) *size += member_state_size(m, i, state);
     return fmi2OK;
@@ -632,7 +732,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     Model *m = c;
     size_t needed, at = sizeof(State);
     fmi2FMUstate own = NULL;
-    if (is_null(m, __func__, 1, bytes, state)) return fmi2Error;
+    if (is_null(m, __func__, 1, bytes, state) || lacks(m, __func__, WITHOUT_BYTES)) return fmi2Error;
     if (!is_ours(m, size >= sizeof(State) ? bytes : NULL)) return fmi2Error;
     if (fmi2GetFMUstate(c, &own) != fmi2OK) return fmi2Error; /* for the sizes of the blocks' states */
     if (fmi2SerializedFMUstateSize(c, own, &needed) != fmi2OK || size != needed) {

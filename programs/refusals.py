@@ -11,19 +11,17 @@ from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
+from hapticlink.programs.foreign import Foreign, read
 
 
 def of_scene(scene: Scene) -> None:
-    """Raises InputFault for FMUs that are given as files, for what only Python does, and where
-    there is no compiled loop, on whose structures a program is resolved."""
+    """Raises InputFault for what only Python does, and where there is no compiled loop, on whose
+    structures a program is resolved."""
     try:
         load()
     except Unavailable as why:
         _refuse(scene.title, [f"there is no compiled loop here: {why}"])
-    given = [fmu for fmu in scene.fmu if fmu.path]
-    reasons = [f"{fmu.name} ({fmu.path}) is an FMU that exists already" for fmu in given]
-    if reasons:
-        reasons.append("only blocks of this project are compiled into a program, no other FMUs")
+    reasons = []
     if scene.at:
         reasons.append("[[at]]: what happens at given times is done by Python")
     reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]
@@ -34,12 +32,24 @@ def of_scene(scene: Scene) -> None:
     _refuse(scene.title, reasons)
 
 
-def of_system(system: System, outside: str | None, title: str) -> None:
-    """Raises InputFault for a block to leave out that the scene does not have."""
+def of_system(system: System, outside: str | None, scene: Scene) -> dict[str, Foreign]:
+    """The FMUs of others that a program holds. Raises InputFault where one cannot be compiled in,
+    and for a block to leave out that the scene does not have."""
     if outside is not None and outside not in system.fmu:
-        raise InputFault(f"{title}: {unknown('block', outside, [*system.fmu])}")
+        raise InputFault(f"{scene.title}: {unknown('block', outside, [*system.fmu])}")
     if outside is not None and len(system.fmus) == 1:
-        raise InputFault(f"{title}: without {outside} there is no block left")
+        raise InputFault(f"{scene.title}: without {outside} there is no block left")
+    foreign, reasons = dict[str, Foreign](), []
+    for name in (fmu.name for fmu in scene.fmu if fmu.path and fmu.name != outside):
+        description = system.fmu[name].description
+        try:
+            foreign[name] = read(description)
+        except InputFault as why:
+            reasons.append(f"{name} ({description.path}) is an FMU that exists already, and {why}")
+    if reasons:
+        reasons.append(f"an FMU can be left out: --without {reasons[0].partition(' ')[0]}")
+    _refuse(scene.title, reasons)
+    return foreign
 
 
 def of_simulation(simulation: Simulation, title: str) -> None:
@@ -53,8 +63,8 @@ def of_simulation(simulation: Simulation, title: str) -> None:
         if name in simulation.isolated:
             continue
         assert isinstance(instance, InProcess)
-        if instance.retry or any(t.type != "Real" for t in instance.gets):
-            reasons.append(f"{name} has variables or repeats steps that a program does not have")
+        if instance.retry:
+            reasons.append(f"{name} repeats steps, which a program does not")
     _refuse(title, reasons)
 
 
@@ -67,6 +77,14 @@ def of_start(simulation: Simulation, title: str) -> None:
 def of_machine(in_python: Mapping[str, str], title: str) -> None:
     """Raises InputFault for operations that the compiled loop leaves to Python."""
     _refuse(title, [f"{operation}: {why}" for operation, why in in_python.items()])
+
+
+def of_page(foreign: Mapping[str, Foreign], title: str) -> None:
+    """Raises InputFault for FMUs that read files, which a page does not have."""
+    _refuse(
+        title,
+        (f"{n} has resources, files that a page lacks" for n in foreign if foreign[n].resources),
+    )
 
 
 def _refuse(title: str, reasons: Iterable[str]) -> None:

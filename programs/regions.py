@@ -15,6 +15,7 @@ from hapticlink.orchestrator.run.compiled.structures import POINTERS
 NUMBERS: dict[str, Any] = {
     "double": ctypes.c_double,
     "int64_t": ctypes.c_int64,
+    "int32_t": ctypes.c_int32,
     "int16_t": ctypes.c_int16,
     "uint32_t": ctypes.c_uint32,
 }
@@ -62,6 +63,16 @@ def is_structure(type_: str) -> bool:
     return type_ not in NUMBERS and not type_.endswith("*")
 
 
+def target(type_: str, field: str, entry: Any) -> str:
+    """The type that a pointer of a structure leads to: numbers as an FMU has them are doubles, or
+    integers of 32 bits, which Booleans of FMI 2.0 are too."""
+    pointer = POINTERS[type_][field]
+    kind = pointer.type
+    if kind == "void":
+        kind = "double" if entry.kind.type == structures.DOUBLE else "int32_t"
+    return kind + " *" * (pointer.stars - 1)
+
+
 class Regions:
     """The regions that the structures at `roots` lead to, in the order in which they are reached.
 
@@ -95,13 +106,13 @@ class Regions:
             return
         self._reached[key] = region
         if region.type.endswith("*"):
-            target = region.type[:-1].strip()
+            pointed = region.type[:-1].strip()
             for i, address in enumerate(
                 (ctypes.c_void_p * region.count).from_address(region.address)
             ):
                 if address:
                     name = f"{region.name.removesuffix('s')}_{i}"
-                    self._visit(Region(target, address, 1, name), parents)
+                    self._visit(Region(pointed, address, 1, name), parents)
         elif is_structure(region.type):
             for i in range(region.count):
                 entry = of_type(region.type).from_address(region.address + i * size(region.type))
@@ -115,9 +126,8 @@ class Regions:
             address = getattr(entry, field)
             if field in APART or not address:
                 continue
-            target = "double" if pointer.type == "void" else pointer.type
             count = pointer.width * self._number(pointer.count, known)
-            kind = target + " *" * (pointer.stars - 1)
+            kind = target(type_, field, entry)
             self._visit(Region(kind, address, count, f"{name}_{field}"), known)
         for field, class_ in embedded(type_):
             if issubclass(class_, ctypes.Structure):

@@ -18,6 +18,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.ticks import Timeline, exact
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.plan.operations import Event, Push
@@ -39,6 +40,7 @@ from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
 from hapticlink.programs.changes import CLOCK, LEAST_RATE, NONE, Changes, changes
+from hapticlink.programs.foreign import Foreign
 
 NO_END = 2**61
 """The end (ticks) of a program's timeline: as far as its times are exact it has none."""
@@ -68,6 +70,8 @@ class Resolved:
     simulation: Simulation
     outside: str | None
     """The block that is left out, whose outputs are inputs."""
+    foreign: Mapping[str, Foreign]
+    """The FMUs of others among the members."""
     roots: list[tuple[str, str, int, int]]
     """Name, type, address and count of the structures from which all others are reached."""
     counts: Mapping[str, int]
@@ -125,7 +129,7 @@ def resolved(
     with built(scene) as every, ExitStack() as stack:
         fetched = with_fetched(every)
         system = replace(fetched, recording=Recording(outputs=()))
-        refusals.of_system(system, outside, scene.title)
+        foreign = refusals.of_system(system, outside, scene)
         plan = Plan(system)
         plan.check()
         room = stack.enter_context(temporary_folders.room())
@@ -135,7 +139,8 @@ def resolved(
         refusals.of_simulation(simulation, scene.title)
         simulation.start()
         refusals.of_start(simulation, scene.title)
-        yield _resolved(scene, plan, simulation, outside, rooms, _recorded(fetched), changing)
+        recorded = _recorded(fetched)
+        yield _resolved(scene, plan, simulation, outside, foreign, rooms, recorded, changing)
 
 
 def _recorded(system: System) -> frozenset[str]:
@@ -171,6 +176,7 @@ def _resolved(
     plan: Plan,
     simulation: Simulation,
     outside: str | None,
+    foreign: Mapping[str, Foreign],
     rooms: Mapping[str, int],
     recorded: frozenset[str],
     changing: bool,
@@ -199,8 +205,7 @@ def _resolved(
     fmus, memory = machine.names("fmu"), Memory()
     into = [n for n in fmus if any(c.target == n for c in system.connections)]
     setters = (structures.Setter * len(into))()
-    for c, fmu in zip(setters, into, strict=True):
-        _start_setter(simulation, fmu, c, memory)
+    kept = [_start_setter(simulation, fmu, c, memory) for c, fmu in zip(setters, into, strict=True)]
     rows = _newest_rows(machine, simulation)
     meters = (ctypes.POINTER(structures.Meter) * len(machine.names("meter"))).from_address(
         machine.loop.meters
@@ -212,6 +217,7 @@ def _resolved(
         system=system,
         simulation=simulation,
         outside=outside,
+        foreign=foreign,
         roots=[
             ("loop", "Loop", ctypes.addressof(machine.loop), 1),
             ("events", "Events", ctypes.addressof(events.c), 1),
@@ -229,7 +235,7 @@ def _resolved(
         start_values=start_values,
         changes=possible,
         tables=machine.names("table"),
-        kept=(machine, events, setters, memory, rows),
+        kept=(machine, events, setters, kept, memory, rows),
     )
 
 
@@ -284,14 +290,17 @@ def _newest_rows(machine: Machine, simulation: Simulation) -> list[object]:
     return arrays
 
 
-def _start_setter(simulation: Simulation, fmu: str, c: structures.Setter, memory: Memory) -> None:
-    """Fills `c`, which sets the inputs of an FMU in initialisation mode, from all connections."""
+def _start_setter(simulation: Simulation, fmu: str, c: structures.Setter, memory: Memory) -> Setter:
+    """Fills `c`, which sets the inputs of an FMU in initialisation mode, from all connections. What
+    is returned has to be kept."""
     instance = simulation.instances[fmu]
     assert isinstance(instance, InProcess)
     incoming = [c for c in simulation.system.connections if c.target == fmu]
     scalars = [s for c in incoming for s in c.inputs]
     places = [p for c in incoming for p in simulation.signals.places(c)]
-    compiled_fmus.of_setter(instance.connect(scalars, places), instance, c, memory)
+    setter = instance.connect(scalars, places)
+    compiled_fmus.of_setter(setter, instance, c, memory)
+    return setter
 
 
 def _kinds(timeline: Timeline) -> Iterator[Event]:

@@ -18,8 +18,10 @@ from hapticlink.components.component import Component
 from hapticlink.fmus.native.archive import COMMON, FMI3, WRAPPER
 from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.run.compiled import build as loop
+from hapticlink.programs.foreign import HEADERS
 from hapticlink.programs.ports import Port, arrays
 from hapticlink.programs.regions import Regions
 from hapticlink.programs.resolved import Resolved
@@ -29,11 +31,14 @@ HERE = Path(__file__).parent
 OWN = ("program.h", "program.c", "changes.h", "platform.c", "latencies.c")
 REPLACED = ("platform.c", "process_state.c", "python_errors.c")
 """Files of the loop in whose place a program has its own platform.c."""
-HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 HEADERS_3 = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")
 FUNCTIONS = {
     "fmi2GetReal": "GET_REAL",
     "fmi2SetReal": "SET_REAL",
+    "fmi2GetInteger": "GET_INTEGER",
+    "fmi2SetInteger": "SET_INTEGER",
+    "fmi2GetBoolean": "GET_BOOLEAN",
+    "fmi2SetBoolean": "SET_BOOLEAN",
     "fmi2DoStep": "DO_STEP",
     "fmi2GetFMUstate": "GET_STATE",
     "fmi2SetFMUstate": "SET_STATE",
@@ -44,18 +49,23 @@ FUNCTIONS = {
 def sources(
     resolved: Resolved, components: Mapping[str, Component], ports: Sequence[Port]
 ) -> dict[str, str]:
-    """All C files by name; scene.h lacks the GUID. components: by member."""
+    """All C files by name; scene.h lacks the GUID. components: of the members that are blocks of
+    this project."""
     files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in REPLACED}
     files[COMMON.name] = COMMON.read_text()
     files["hold_laws.h"] = loop.LAWS["text"]()
     files |= {name: (HERE / name).read_text() for name in OWN}
     headers = Path(fmpy.__file__).parent / "c-code"
     files |= {name: (headers / name).read_text(errors="replace") for name in HEADERS}
-    ids = _identifiers(components)
-    guids = {}
-    for fmu, component in components.items():
-        guids[fmu], own = _member(ids[fmu], component)
-        files |= own
+    ids, guids = identifiers(resolved.members), {}
+    required = {f"fmi2{name}" for name in re.findall(r"X\(id, (\w+),", files["program.c"])}
+    for fmu, id_ in ids.items():
+        if fmu in resolved.foreign:
+            guids[fmu] = resolved.foreign[fmu].description.guid
+            files |= resolved.foreign[fmu].sources(id_, required)
+        else:
+            guids[fmu], own = _member(id_, components[fmu])
+            files |= own
     files["scene.h"] = _scene(resolved, ports, ids, guids)
     return files
 
@@ -83,7 +93,7 @@ def fmi3_sources(ports: Sequence[Port]) -> dict[str, str]:
     return files | {"fmi3_rest.h": "\n".join(rest) + "\n"}
 
 
-def _identifiers(names: Iterable[str]) -> dict[str, str]:
+def identifiers(names: Iterable[str]) -> dict[str, str]:
     """A C identifier for each block, by which its functions begin."""
     return {name: f"{re.sub(r'[^A-Za-z0-9]', '_', name)}_{i}" for i, name in enumerate(names)}
 
@@ -125,7 +135,8 @@ def _scene(
     described = [(fmu, resolved.system.fmu[fmu].description) for fmu in resolved.signal_order]
     outputs = [s for _, description in described for s in description.outputs]
     names = [f"{fmu}.{s.name}" for fmu, description in described for s in description.outputs]
-    unbounded = [s.unit is None for s in outputs]
+    unbounded = [s.unit is None or s.type != "Real" for s in outputs]
+    given = [*_given(resolved, members)]
     sizes = {
         "N_MEMBERS": len(members),
         "N_FMUS": len(resolved.fmus),
@@ -134,6 +145,7 @@ def _scene(
         "N_SIGNALS": len(names),
         "N_SETTABLE": len(settable),
         "N_VARIABLES": len(ports),
+        "N_GIVEN": len(given),
         "N_LATENCIES": len(latencies),
         "N_CHECKED": max((len(c.scales) for c in checks), default=0),
         "N_START_SETTERS": len(resolved.start_fmus),
@@ -160,6 +172,8 @@ def _scene(
             "/* The data of the scene, as Python has resolved it. */",
             *(f"#define {name} {value}" for name, value in sizes.items()),
             f"#define START_SETTERS(s) {setters}",
+            f"#define WITHOUT_STATE {_lacking(resolved, STATE['2'])}",
+            f"#define WITHOUT_BYTES {_lacking(resolved, SERIALISED['2'])}",
             f"#define ALTERNATIVES(s) {'(s)->alternatives' if changes.choices else '((Hold **)0)'}",
             "#define MEMBERS(X) " + " ".join(
                 f"X({ids[fmu]}, {json.dumps(fmu)}, {json.dumps(guids[fmu])})" for fmu in members
@@ -189,7 +203,9 @@ def _scene(
                 for s, none in zip(outputs, unbounded, strict=True))),
             *_changes(resolved, regions),
             table("Variable variables", map(_variable, ports)),
-            table("double starts", (number(p.start or 0.0) for p in settable)),
+            table("double starts", (
+                number(p.start or 0.0) if p.is_set else "NAN" for p in settable)),
+            table("Given given", given),
             "",
         ]
     )  # fmt: skip
@@ -242,8 +258,28 @@ def table(declared: str, entries: Iterable[str]) -> str:
     return "\n".join([f"static const {declared}[] = {{", *rows, f"    {zero}}};"])
 
 
+def _given(resolved: Resolved, members: Sequence[str]) -> Iterator[str]:
+    """The start values that a scene gives to FMUs of others, but for those of the program's own
+    variables."""
+    for fmu in resolved.foreign:
+        for s, value in resolved.system.fmu[fmu].starts:
+            if s.type == "Real" and s.settable:
+                continue
+            text, value = (json.dumps(value), 0) if isinstance(value, str) else ("NULL", value)
+            place = f"{members.index(fmu)}, {s.type.upper()}, {s.reference}"
+            yield f"{{{place}, {number(float(value))}, {text}}}"
+
+
+def _lacking(resolved: Resolved, capability: str) -> str:
+    """The name of a member that has not a capability, NULL where all have it."""
+    for fmu, foreign in resolved.foreign.items():
+        if capability not in foreign.description.flags:
+            return json.dumps(fmu)
+    return "NULL"
+
+
 def _variable(port: Port) -> str:
-    place = f"{port.member}, {int(port.fixed)}, {port.reference}, {port.place}"
+    place = f"{port.type.upper()}, {port.member}, {int(port.fixed)}, {port.reference}, {port.place}"
     return f"{{{port.kind}, {place}, {json.dumps(port.name)}}}"
 
 

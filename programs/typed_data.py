@@ -19,6 +19,7 @@ from hapticlink.programs.regions import (
     is_structure,
     of_type,
     size,
+    target,
 )
 
 
@@ -65,9 +66,9 @@ class TypedData:
         addresses = (ctypes.c_void_p * region.count).from_address(region.address)
         for i, address in enumerate(addresses):
             if address:
-                target = self._regions.entry_at(region.type[:-1].strip(), address)
-                assert target
-                self.pointers.append((_place(region, i, True), _place(*target)))
+                there = self._regions.entry_at(region.type[:-1].strip(), address)
+                assert there
+                self.pointers.append((_place(region, i, True), _place(*there)))
 
     def _structure(self, type_: str, entry: Any, place: str, member: int | None) -> str:
         """The initialiser of a structure at `place`, whose pointers are noted."""
@@ -77,8 +78,8 @@ class TypedData:
         if type_ == "Check":
             member = self._of_check[ctypes.addressof(entry)]
         for field in pointers:
-            if address := getattr(entry, field):
-                self._pointer(type_, field, address, f"{place}.{field}", member)
+            if getattr(entry, field):
+                self._pointer(type_, field, entry, f"{place}.{field}", member)
         rows = []
         for field, class_ in embedded(type_):
             value = getattr(entry, field)
@@ -92,20 +93,17 @@ class TypedData:
                 rows.append(f".{field} = {text}")
         return f"{{{', '.join(rows) or '0'}}}"
 
-    def _pointer(
-        self, type_: str, field: str, address: int, place: str, member: int | None
-    ) -> None:
+    def _pointer(self, type_: str, field: str, entry: Any, place: str, member: int | None) -> None:
+        address = getattr(entry, field)
         if field not in APART:
-            pointer = POINTERS[type_][field]
-            kind = "double" if pointer.type == "void" else pointer.type
-            target_type = kind + " *" * (pointer.stars - 1)
-            target = self._regions.entry_at(target_type, address)
-            if target is None:
+            kind = target(type_, field, entry)
+            there = self._regions.entry_at(kind, address)
+            if there is None:
                 return
-            if pointer.type == "Check":
+            if kind == "Check":
                 assert member is not None
                 self._of_check[address] = member
-            self.pointers.append((place, _place(*target)))
+            self.pointers.append((place, _place(*there)))
             return
         assert member is not None
         if field == "fmu":

@@ -50,6 +50,7 @@ FLAGS = ("-fPIC", "-std=gnu11", "-O2", *_ARITHMETIC, "-g0", "-fvisibility=hidden
 LINK = ("-shared", "-s")
 WEBASSEMBLY = "wasm32-wasi"
 WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
+_ZIG = (sys.executable, "-m", "ziglang")
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
@@ -142,22 +143,47 @@ def _compiled(
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     if target == WEBASSEMBLY:
         link = ["-mexec-model=reactor", "-s"]
+    objects = _objects(source, own_folder, target, options)
+    # A Mach-O file contains the path that it was written to, so this is the same everywhere.
+    _zig([*link, *options, "-o", "library", *objects], own_folder, target)
+    return (own_folder / "library").read_bytes()
+
+
+def _objects(
+    source: Path | str | Iterable[Path], folder: Path, target: str, options: Sequence[str]
+) -> list[str]:
+    """Compiles C files side by side, and returns the names of the object files in `folder`."""
     jobs = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for file in [Path(source)] if isinstance(source, (Path, str)) else source:
             command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
-            jobs[f"{file.stem}.o"] = pool.submit(_zig, command, own_folder, target)
+            jobs[f"{file.stem}.o"] = pool.submit(_zig, command, folder, target)
     for job in jobs.values():
         job.result()
-    # A Mach-O file contains the path that it was written to, so this is the same everywhere.
-    _zig([*link, *options, "-o", "library", *jobs], own_folder, target)
-    return (own_folder / "library").read_bytes()
+    return [*jobs]
+
+
+def global_names(source: Iterable[Path], folder: Path) -> list[str]:
+    """The names that C files define for the linker, compiled in `folder` for Linux on x86-64. They
+    are in the index of an archive of the object files, the entry "/": their count, as many
+    big-endian offsets, and the names, each ended by a zero. Raises as `compile_library`."""
+    compiler_version()
+    objects = _objects(source, folder, TARGETS["x86_64-linux"][0], ())
+    archive = folder / "names.a"
+    command = [*_ZIG, "ar", "--format=gnu", "rcs", archive.name, *objects]
+    subprocess.run(command, cwd=folder, capture_output=True, check=True)
+    content = archive.read_bytes()
+    first, index = content[8:68], content[68:]  # behind "!<arch>\n"
+    if first[:16].strip() != b"/":
+        return []
+    count, size = struct.unpack_from(">I", index)[0], int(first[48:58])
+    names = index[4 + 4 * count : size].split(b"\0")[:count]
+    return sorted({name.decode() for name in names})
 
 
 def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
     flags = WEBASSEMBLY_FLAGS if target == WEBASSEMBLY else FLAGS
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags]
-    command += [f"-I{_HEADERS}", *arguments]
+    command = [*_ZIG, "cc", "-target", target, *flags, f"-I{_HEADERS}", *arguments]
     with tempfile.TemporaryDirectory(dir=folder) as local:
         # zig keeps its own C library in its cache, but not our code.
         compiles = nullcontext({CHOICE: local}) if "-c" in command else linker_cache(target)

@@ -4,6 +4,7 @@
  * An array is the scalars of FMI 2.0 from its value reference on, row by row; time follows the last.
  * fmi3_rest.h, generated, has the sizes of the variables, and those functions of the standard that need
  * event mode, clocks, other types or another kind of FMU: they fail. */
+#include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -72,6 +73,18 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean on, size_t n, 
     return fmi3OK;
 }
 
+/* The URI of a folder (RFC 8089), as FMI 2.0 has it, of its path, as FMI 3.0 has it; NULL without memory. */
+static char *uri_of(fmi3String path) {
+    const size_t n = path ? strlen(path) : 0;
+    char *uri = calloc(3 * n + sizeof "file:///", 1), *to = uri;
+    if (!n || !uri) return uri;
+    to += sprintf(to, *path == '/' ? "file://" : "file:///");
+    for (const char *c = path; *c; c++)
+        if (isalnum((unsigned char)*c) || strchr("/-._~:", *c)) *to++ = *c;
+        else to += sprintf(to, *c == '\\' ? "/" : "%%%02X", (unsigned char)*c);
+    return uri;
+}
+
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
                                          fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean event_mode,
                                          fmi3Boolean early, const fmi3ValueReference intermediate[],
@@ -86,8 +99,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     i->logging = logging;
     i->early = early;
     i->call = __func__;
+    char *uri = uri_of(resources);
     if (event_mode) lacks(i, "event mode");
-    else i->program = fmi2Instantiate(name, fmi2CoSimulation, token, "", &i->callbacks, visible, logging);
+    else i->program = fmi2Instantiate(name, fmi2CoSimulation, token, uri, &i->callbacks, visible, logging);
+    free(uri);
     if (i->program) return i;
     free(i);
     return NULL;

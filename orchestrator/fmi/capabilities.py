@@ -8,6 +8,8 @@ VARIABLE_STEP = "canHandleVariableCommunicationStepSize"
 INPUT_DERIVATIVES = "canInterpolateInputs"
 NEEDS_TOOL = "needsExecutionTool"
 STATE = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
+SERIALISED = {"2": "canSerializeFMUstate", "3": "canSerializeFMUState"}
+ONCE = "canBeInstantiatedOnlyOncePerProcess"
 """FMI 2.0.5 section 4.3.1, FMI 3.0 section 4.3.1."""
 DIRECTIONAL_DERIVATIVES = {
     "2": "providesDirectionalDerivative",

@@ -39,7 +39,8 @@ def program(
 ) -> Path:
     """The FMU of a scene."""
     files = program_files(open_scene.load(scene, options), "program", without, fmi)
-    library = compiled({Path(n).name: c for n, c in files.items() if n.startswith("sources/")})
+    sources = (n for n in files if n.startswith("sources/"))
+    library = compiled({n.removeprefix("sources/"): files[n] for n in sources})
     place = platform if fmi == 2 else platform_tuple
     whole = {**files, f"binaries/{place}/program{sharedLibraryExtension}": library}
     path = Path(tempfile.mkdtemp(dir=_folder())) / "program.fmu"
@@ -51,14 +52,17 @@ def program(
 
 def compiled(sources: dict[str, bytes], flags: Sequence[str] = FLAGS) -> bytes:
     """The shared library of C files, as `cc *.c` makes it."""
-    shared = sorted(n for n in sources if n.endswith(".h") and n not in DATA_OF.values())
+    foreign = {n for n in sources if "/" in n}
+    headers_alone = {n for n in sources if n.endswith(".h")} - {*DATA_OF.values()}
+    shared = sorted(foreign | headers_alone)
     headers = b"".join(sources[n] for n in shared if not n.startswith("fmi3"))
     objects = []
     with tempfile.TemporaryDirectory(dir=_folder()) as name:
         room = Path(name)
         for file, content in sources.items():
+            (room / file).parent.mkdir(parents=True, exist_ok=True)
             (room / file).write_bytes(content)
-        for file in sorted(n for n in sources if n.endswith(".c")):
+        for file in sorted(n for n in sources if n.endswith(".c") and n not in foreign):
             uses = sources[DATA_OF[file]] if file in DATA_OF else b""
             key = sha256(b"\0".join([sources[file], headers, uses, *map(str.encode, flags)]))
             kept = _folder() / f"{key.hexdigest()}.o"
