@@ -1,7 +1,5 @@
 """C files of the tests as shared libraries."""
 
-from __future__ import annotations
-
 import tempfile
 from functools import cache
 from pathlib import Path

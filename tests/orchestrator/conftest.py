@@ -8,7 +8,7 @@ from hapticlink.orchestrator.run import crash_monitor
 
 
 @pytest.fixture(autouse=True)
-def crash_monitor_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def crash_monitor_of_runs(monkeypatch):
     """Runs in the process of the tests start no watchdog, which acts only where that process
     crashes. The tests of run/test_faults.py and run/test_interrupt.py, which have it, replace
     this fixture."""
@@ -16,5 +16,5 @@ def crash_monitor_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _fmus_stay_unpacked(fmus_unpacked_once: None) -> None:
+def _fmus_stay_unpacked(fmus_unpacked_once):
     """From one run to the next."""

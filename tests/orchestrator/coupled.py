@@ -1,7 +1,5 @@
 """Small systems of real FMUs for tests of couplings, with answers known in closed form."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -57,7 +55,7 @@ def gain(name: str, factor: float, offset: float, timing: str = "continuous") ->
     return block.component(
         name,
         "feed-through",
-        timing,  # type: ignore[arg-type]
+        timing,
         initial={"z": ca.SX(0.0)},
         step={"z": block.u["w"]},
         output={"y": factor * block.u["u"] + offset, "z": block.x["z"]},
@@ -98,7 +96,7 @@ def system(
         units,
         connections,
         timeline,
-        Coupling(coupling, substeps=dict.fromkeys(fmus, substeps), **others),  # type: ignore[arg-type]
+        Coupling(coupling, substeps=dict.fromkeys(fmus, substeps), **others),
         energy=EnergyPorts(power, springs),
     )
 
@@ -143,7 +141,7 @@ def iterated(
     """Both masses, whose steps are repeated until the values between them agree."""
     return system(
         fmus, rows, "iterated", Fraction(1, rate), until, between=between, iteration=iteration,
-        get_after_set=("one", "two"), **others,  # type: ignore[arg-type]
+        get_after_set=("one", "two"), **others,
     )  # fmt: skip
 
 

@@ -1,7 +1,5 @@
 """FMUs of others for tests: pythonfmu's and pythonfmu3's, and one in C that fails on demand."""
 
-from __future__ import annotations
-
 import sys
 import uuid
 import zipfile

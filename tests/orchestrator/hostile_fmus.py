@@ -1,7 +1,5 @@
 """FMUs of hostile_fmu.c, which behave badly on demand, of FMI 2.0 and FMI 3.0."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """An FMU of pythonfmu or pythonfmu3 that behaves badly on demand, with the ports of hostile_fmu.c
 and the same names of instances: "<place>_<act>_<step>"."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 RAISES = {

@@ -1,7 +1,5 @@
 """The two masses of `oscillator` as compiled FMUs that take inputs varying within a step."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path

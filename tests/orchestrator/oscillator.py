@@ -5,8 +5,6 @@ with m = 1, k = k_c = 100, c = c_c = 1, x = (0, 1), v = (1, 0) at WARM. `one` ta
 Until WARM both follow the exact solution of the whole, so that every hold has its history.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm

@@ -1,7 +1,5 @@
 """Every number that the shipped scenes may hold, and values that it cannot have."""
 
-from __future__ import annotations
-
 import copy
 import math
 import typing

@@ -1,7 +1,5 @@
 """SSPs of others, written out: systems, connections and parameters as SSP 1.0 spells them."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Connections of small systems for tests, made and held as those of a run are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -23,7 +21,7 @@ def system_of(scene: object, *options: str) -> System:
 
 def with_coupling(system: System, **settings: object) -> System:
     """The system with other settings of its coupling."""
-    return replace(system, coupling=replace(system.coupling, **settings))  # type: ignore[arg-type]
+    return replace(system, coupling=replace(system.coupling, **settings))
 
 
 def connected(

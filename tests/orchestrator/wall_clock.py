@@ -1,7 +1,5 @@
 """A wall clock for tests of runs in real time: it goes on only while somebody waits for it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 

@@ -1,7 +1,5 @@
 """The names that results and views look up are those of the FMUs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from hapticlink.components.blocks import BLOCKS
@@ -21,7 +19,7 @@ def _outputs(scene: str, options: tuple[str, ...]) -> Iterator[str]:
         yield from (f"{fmu.name}.{s.port}" for s in fmu.description.outputs)
 
 
-def test_every_name_is_a_block_or_an_output_of_one() -> None:
+def test_every_name_is_a_block_or_an_output_of_one():
     options = ("mechanism.directions=true", "controller.passivity=true")
     midpoint = ("mechanism.integrator=passive-midpoint",)
     scenes = {"closed-loop": (), "obstacles": options, "pendulum": midpoint}
@@ -30,7 +28,7 @@ def test_every_name_is_a_block_or_an_output_of_one() -> None:
     assert not missing, missing
 
 
-def test_names_of_users() -> None:
+def test_names_of_users():
     assert block_of_user("controller", "left") == "controller_left"
     assert block_of_user("virtual_mechanism", "left") == "virtual_mechanism"
     assert signal_of_user("controller.F_drift", "left") == "controller_left.F_drift"

@@ -56,7 +56,7 @@ def write(folder: Path, **files: str) -> None:
         (folder / f"{name}.py").write_text(text)
 
 
-def test_modules_that_are_no_plugins(tmp_path: Path) -> None:
+def test_modules_that_are_no_plugins(tmp_path):
     write(tmp_path, mine=HOLD.format(name="mine"), lacks="import not_there", empty="x = 1")
     write(tmp_path, broken="\n\n1 / 0\n", taken=HOLD.format(name="foh"), misspelt="x = 1\nx = = 2")
     messages = {
@@ -101,7 +101,7 @@ HOLDS, METHODS, BLOCKS, FAMILIES, SCHEMES, COMMANDS, FORCES = (
 )  # fmt: skip
 
 
-def test_parts_of_another_kind_are_refused_where_they_are_registered(tmp_path: Path) -> None:
+def test_parts_of_another_kind_are_refused_where_they_are_registered(tmp_path):
     vague = "from hapticlink.orchestrator.holds import Hold\nclass Vague(Hold): needs = 'speed'"
     speed = (
         "from hapticlink.orchestrator.holds.zero_order import ZeroOrder\n"
@@ -133,7 +133,7 @@ def test_parts_of_another_kind_are_refused_where_they_are_registered(tmp_path: P
         assert len(ended.said.splitlines()) == 1
 
 
-def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path: Path) -> None:
+def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path):
     late = "if self.pushed > 3: 1 / 0\n        return np.ones(self.size)"
     values = {
         late: "plugin mine0: {}/mine0.py, line 11: ZeroDivisionError: division by zero",
@@ -158,7 +158,7 @@ def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path: Path) -> None
     assert len((tmp_path / "0" / "haptics.csv").read_text().splitlines()) > 3
 
 
-def test_a_law_with_an_unknown_argument_is_the_plugin_s_error(tmp_path: Path) -> None:
+def test_a_law_with_an_unknown_argument_is_the_plugin_s_error(tmp_path):
     law = (
         "from hapticlink.orchestrator.holds import HOLDS\n"
         "from hapticlink.orchestrator.holds.history import {base}\n"
@@ -175,7 +175,7 @@ def test_a_law_with_an_unknown_argument_is_the_plugin_s_error(tmp_path: Path) ->
         assert said in ended.said
 
 
-def test_parts_that_fail_or_give_something_else(tmp_path: Path) -> None:
+def test_parts_that_fail_or_give_something_else(tmp_path):
     integrator = (
         "from hapticlink.components.integrators.base import Integrator\n"
         "class Mine(Integrator):\n    order = 1\n"
@@ -218,7 +218,7 @@ def test_parts_that_fail_or_give_something_else(tmp_path: Path) -> None:
         assert message.format(tmp_path) in ended.said
 
 
-def test_a_part_is_known_where_its_plugin_is_named(tmp_path: Path) -> None:
+def test_a_part_is_known_where_its_plugin_is_named(tmp_path):
     write(tmp_path, mine=HOLD.format(name="mine"), yours=HOLD.format(name="yours"))
     line = f"{EXPLAIN} --set hold=mine --set downsampling=latest"
     without, before, after, other = hapticlink(
@@ -231,7 +231,7 @@ def test_a_part_is_known_where_its_plugin_is_named(tmp_path: Path) -> None:
     assert "yours" not in without.said
 
 
-def test_an_installed_plugin(tmp_path: Path) -> None:
+def test_an_installed_plugin(tmp_path):
     """By the entry points of a distribution; its commands too."""
     site, folder = tmp_path / "site", tmp_path / "here"
     about = site / "my_parts-1.2.dist-info"
@@ -265,7 +265,7 @@ COMMANDS.register("greet", greet)
     assert "hapticlink: plugin parts of my-parts: " in ended.said
 
 
-def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path: Path) -> None:
+def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path):
     """x = t^2/2 of 1 kg pushed with 1 N; a sweep runs again, a hold alone leaves the FMU."""
     (tmp_path / "scene.toml").write_text(SCENE)
     write(tmp_path, push=PUSH, mine=HOLD.format(name="mine"))
@@ -273,13 +273,13 @@ def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path: Path) -> None:
     run = "hapticlink run scene.toml --plugin push --no-figures"
     cache = tmp_path / "cache"
 
-    def reached(line: str) -> float:
+    def reached(line):
         (ended,) = hapticlink(tmp_path, line, cache=cache)
         assert ended.status == 0, ended.said
         last = (tmp_path / "runs" / "scene" / "haptics.csv").read_text().splitlines()
         return float(last[-1].split(",")[last[0].split(",").index("virtual_mechanism.x[1]")])
 
-    def rows() -> int:
+    def rows():
         hapticlink(tmp_path, sweep, cache=cache)
         return len([*(tmp_path / "sweeps" / "scene" / "rows").iterdir()])
 
@@ -294,7 +294,7 @@ def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path: Path) -> None:
     assert rows() == 4
 
 
-def test_keys_of_a_force(tmp_path: Path) -> None:
+def test_keys_of_a_force(tmp_path):
     write(tmp_path, push=PUSH)
     entry = '[[linkage.force]]\ntype = "push"\nname = "push"\n'
     assert SCENE.endswith(entry)  # its lines are 16 to 18
@@ -324,9 +324,7 @@ def test_keys_of_a_force(tmp_path: Path) -> None:
         ("class E(Exception):\n    def __str__(self): raise ValueError\nraise E", "cannot be read"),
     ],
 )
-def test_a_plugin_cannot_end_a_command_without_a_word(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, said: str
-) -> None:
+def test_a_plugin_cannot_end_a_command_without_a_word(tmp_path, monkeypatch, text, said):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     name = f"ends_{abs(hash(text))}"
@@ -336,6 +334,6 @@ def test_a_plugin_cannot_end_a_command_without_a_word(
 
 
 @pytest.mark.parametrize("name", ["../x", ".", "..", "x y", "a..b", "/x"])
-def test_what_is_no_name_of_a_module_is_said(name: str) -> None:
+def test_what_is_no_name_of_a_module_is_said(name):
     with pytest.raises(InputFault, match="no name of a module"):
         plugins.load([name])

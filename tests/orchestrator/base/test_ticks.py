@@ -22,17 +22,17 @@ from hapticlink.orchestrator.base.ticks import (
 rates = st.fractions(min_value=Fraction(1, 10), max_value=5000, max_denominator=1001)
 
 
-def test_report_rates_meet_on_1_over_7680_s() -> None:
+def test_report_rates_meet_on_1_over_7680_s():
     assert common_base([Fraction(1, 512), Fraction(1, 30)]) == Fraction(1, 7680)
 
 
-def test_a_rate_is_the_rational_that_was_written() -> None:
+def test_a_rate_is_the_rational_that_was_written():
     assert exact(29.97) == Fraction(2997, 100)
     assert exact("30000/1001") == Fraction(30000, 1001)
 
 
 @given(rates, rates)
-def test_base_divides_every_period_and_no_coarser_one_does(a: Fraction, b: Fraction) -> None:
+def test_base_divides_every_period_and_no_coarser_one_does(a, b):
     base = common_base([1 / a, 1 / b])
     ticks = [1 / a / base, 1 / b / base]
     assert all(t.denominator == 1 for t in ticks)
@@ -40,15 +40,13 @@ def test_base_divides_every_period_and_no_coarser_one_does(a: Fraction, b: Fract
 
 
 @given(rates, st.integers(0, 10**7))
-def test_seconds_round_the_exact_time_once(rate: Fraction, tick: int) -> None:
+def test_seconds_round_the_exact_time_once(rate, tick):
     base = 1 / rate
     assert Timeline(base, tick, ()).seconds(tick) == float(tick * base)
 
 
 @given(rates, st.fractions(Fraction(1, 50), 1, max_denominator=997), st.integers(1, 300))
-def test_aligned_frames_end_on_the_first_tick_at_or_after(
-    fast: Fraction, ratio: Fraction, end: int
-) -> None:
+def test_aligned_frames_end_on_the_first_tick_at_or_after(fast, ratio, end):
     base, slow = 1 / fast, fast * ratio
     frames = aligned(1 / slow, base, end)
     for i, tick in enumerate(frames):
@@ -57,7 +55,7 @@ def test_aligned_frames_end_on_the_first_tick_at_or_after(
 
 
 @given(st.integers(0, 2**32), st.integers(1, 2000))
-def test_variable_periods_stay_in_their_bounds_and_follow_the_seed(seed: int, end: int) -> None:
+def test_variable_periods_stay_in_their_bounds_and_follow_the_seed(seed, end):
     base = Fraction(1, 512)
     starts = variable(Fraction(10), Fraction(60), seed, base, end)
     periods = [b - a for a, b in pairwise(starts)]
@@ -67,12 +65,12 @@ def test_variable_periods_stay_in_their_bounds_and_follow_the_seed(seed: int, en
     assert starts == variable(Fraction(10), Fraction(60), seed, base, end)
 
 
-def test_bounds_without_a_whole_tick_between_them_are_refused() -> None:
+def test_bounds_without_a_whole_tick_between_them_are_refused():
     with pytest.raises(ValueError, match="no period between"):
         variable(Fraction(60), Fraction(60), 0, Fraction(1, 512), 10)
 
 
-def test_listed_times_go_to_ticks_and_two_on_one_are_refused() -> None:
+def test_listed_times_go_to_ticks_and_two_on_one_are_refused():
     base = Fraction(1, 512)
     assert listed([Fraction(0), Fraction(1, 30), Fraction(1, 10)], base) == (0, 18, 52)
     with pytest.raises(ValueError, match="falls on tick 18"):
@@ -85,9 +83,7 @@ def test_listed_times_go_to_ticks_and_two_on_one_are_refused() -> None:
     st.fractions(0, 1, max_denominator=9),
     st.integers(1, 300),
 )
-def test_steps_that_are_made_when_asked_for_tell_their_bounds(
-    fast: Fraction, ratio: Fraction, phase: Fraction, end: int
-) -> None:
+def test_steps_that_are_made_when_asked_for_tell_their_bounds(fast, ratio, phase, end):
     """Longest and shortest come from one round of the frames, not from all of them."""
     base, period = 1 / fast, 1 / (fast * ratio)
     first = max(phase * period, base)
@@ -104,11 +100,11 @@ def test_steps_that_are_made_when_asked_for_tell_their_bounds(
             assert (clock.longest, clock.shortest) == (max(steps), min(steps[1:]))
 
 
-def test_more_periods_than_are_drawn_are_refused() -> None:
+def test_more_periods_than_are_drawn_are_refused():
     with pytest.raises(ValueError, match="at most 1000000 are: take a shorter duration"):
         variable(Fraction(10), Fraction(60), 0, Fraction(1, 512), 512 * 10**9)
 
 
-def test_a_period_off_the_base_is_refused() -> None:
+def test_a_period_off_the_base_is_refused():
     with pytest.raises(ValueError, match="not a whole number of ticks"):
         periodic(Fraction(1, 30), Fraction(1, 512), 10)

@@ -1,10 +1,6 @@
 """Declarations of ports in the annotation: read back as written; malformed ones are refused."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Callable
-from pathlib import Path
 
 import casadi as ca
 import pytest
@@ -46,12 +42,12 @@ def declaring(**replaced: Variable) -> Component:
 
 
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fmu(tmp_path_factory):
     return build(declaring(), tmp_path_factory.mktemp("declaring"))
 
 
 @pytest.mark.parametrize("make", [build, build_native])
-def test_what_a_component_declares_comes_back(tmp_path: Path, make: Callable[..., Path]) -> None:
+def test_what_a_component_declares_comes_back(tmp_path, make):
     found = describe(make(declaring(), tmp_path))
     assert found.timing == "sampled"
     assert found.kinds == {"P": "projector", "rows": "table", "turned": "angle"}
@@ -62,7 +58,7 @@ def test_what_a_component_declares_comes_back(tmp_path: Path, make: Callable[...
     assert found.derivative(found.port("v", "output")) is None
 
 
-def test_a_derivative_of_nothing_is_refused_at_build(tmp_path: Path) -> None:
+def test_a_derivative_of_nothing_is_refused_at_build(tmp_path):
     wrong = declaring(v=Variable("v", (2,), derivative_of="F"))
     with pytest.raises(FmuError, match="`v` is declared the derivative of `F`, which is no output"):
         build(wrong, tmp_path)
@@ -94,13 +90,11 @@ def test_a_derivative_of_nothing_is_refused_at_build(tmp_path: Path) -> None:
         ("<Spring", "<Sprung", "no element 'Sprung'; did you mean 'Spring'"),
     ],
 )
-def test_what_is_malformed_or_does_not_fit_is_told(
-    fmu: Path, tmp_path: Path, old: str, new: str, why: str
-) -> None:
+def test_what_is_malformed_or_does_not_fit_is_told(fmu, tmp_path, old, new, why):
     changed = tmp_path / "declaring.fmu"
     changed.write_bytes(fmu.read_bytes())
 
-    def change(text: str) -> str:
+    def change(text):
         assert text.count(old) == 1
         return text.replace(old, new)
 
@@ -108,7 +102,7 @@ def test_what_is_malformed_or_does_not_fit_is_told(
         describe(edited(changed, change))
 
 
-def test_the_annotation_of_another_tool_says_nothing(tmp_path: Path) -> None:
+def test_the_annotation_of_another_tool_says_nothing(tmp_path):
     other = '<VendorAnnotations><Tool name="other"><Block timing="?"><Port/></Block></Tool>'
     path = python_fmu(tmp_path, "Other")
     found = describe(
@@ -121,12 +115,10 @@ def test_the_annotation_of_another_tool_says_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("convention", "known"), [("structured", {"y": "der(y)"}), ("flat", {})])
-def test_der_is_a_derivative_where_names_are_structured(
-    tmp_path: Path, convention: str, known: dict[str, str]
-) -> None:
+def test_der_is_a_derivative_where_names_are_structured(tmp_path, convention, known):
     """FMI 2.0.5 section 2.2.9; the FMU's own derivative of y says nothing of the names."""
 
-    def change(text: str) -> str:
+    def change(text):
         text = re.sub(
             r'variableNamingConvention="\w+"', f'variableNamingConvention="{convention}"', text
         )

@@ -4,7 +4,6 @@ import os
 import re
 import stat
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -64,7 +63,7 @@ def link(path: Path) -> Path:
         (lambda p: fmu(p, DESCRIPTION.replace('start="0"', 'start="zero"')), "cannot be used"),
     ],
 )
-def test_malformed_fmus(tmp_path: Path, make: Callable[[Path], Path], message: str) -> None:
+def test_malformed_fmus(tmp_path, make, message):
     path = make(tmp_path / "model.fmu")
     with pytest.raises(InputFault, match=message) as refused:
         describe(path)
@@ -72,13 +71,13 @@ def test_malformed_fmus(tmp_path: Path, make: Callable[[Path], Path], message: s
     assert {p.name for p in tmp_path.iterdir()} <= {"model.fmu"}
 
 
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+def test_a_pipe_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "model.fmu")
     with pytest.raises(InputFault, match="it is no file"):
         describe(tmp_path / "model.fmu")
 
 
-def test_arrays_have_a_bound(tmp_path: Path) -> None:
+def test_arrays_have_a_bound(tmp_path):
     """A kilobyte of XML can declare more entries than memory holds."""
     variable = '<Float64 name="x" valueReference="1" causality="output"><Dimension start="{}"/>'
     text = f"""<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="m">
@@ -88,7 +87,7 @@ def test_arrays_have_a_bound(tmp_path: Path) -> None:
         describe(fmu(tmp_path / "model.fmu", text.format(10**11)))
 
 
-def test_a_damaged_entry_is_found(tmp_path: Path) -> None:
+def test_a_damaged_entry_is_found(tmp_path):
     path = fmu(tmp_path / "model.fmu")
     content = bytearray(path.read_bytes())
     content[content.index(b"<CoSimulation")] ^= 1
@@ -97,7 +96,7 @@ def test_a_damaged_entry_is_found(tmp_path: Path) -> None:
         describe(path)
 
 
-def test_xml_of_any_size_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_xml_of_any_size_is_not_read(tmp_path, monkeypatch):
     monkeypatch.setattr("hapticlink.orchestrator.fmi.archive.MAX_XML_BYTES", 100)
     path = fmu(tmp_path / "model.fmu")
     with (
@@ -107,7 +106,7 @@ def test_xml_of_any_size_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
         read_xml(found, "modelDescription.xml")
 
 
-def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path):
     """A gigabyte of zeros in a megabyte."""
     path = fmu(tmp_path / "model.fmu")
     with (
@@ -120,7 +119,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
         describe(path)
 
 
-def test_an_archive_of_very_many_files_is_refused(tmp_path: Path) -> None:
+def test_an_archive_of_very_many_files_is_refused(tmp_path):
     path = fmu(tmp_path / "model.fmu", **{f"resources/{i}": "" for i in range(10_000)})
     with pytest.raises(InputFault, match="10001 entries; at most 10000 are unpacked; take out"):
         describe(path)
@@ -156,7 +155,7 @@ SSD = """<?xml version="1.0" encoding="UTF-8"?>
         ),
     ],
 )
-def test_malformed_ssps(tmp_path: Path, make: Callable[[Path], Path], message: str) -> None:
+def test_malformed_ssps(tmp_path, make, message):
     path = make(tmp_path / "system.ssp")
     with pytest.raises(InputFault, match=message):
         read.tables(path)
@@ -164,7 +163,7 @@ def test_malformed_ssps(tmp_path: Path, make: Callable[[Path], Path], message: s
 
 
 @pytest.mark.parametrize("outside", ["/tmp/x", "../x", "a/b", "a\\b", ""])
-def test_a_library_outside_of_the_archive_is_not_looked_for(tmp_path: Path, outside: str) -> None:
+def test_a_library_outside_of_the_archive_is_not_looked_for(tmp_path, outside):
     identifier = re.search(r'modelIdentifier="[^"]*"', DESCRIPTION)
     assert identifier
     text = DESCRIPTION.replace(identifier[0], f'modelIdentifier="{outside}"')

@@ -1,7 +1,5 @@
 """Directional derivatives of compiled FMUs in Newton's method: correct, wrong and missing ones."""
 
-from __future__ import annotations
-
 import ctypes
 from dataclasses import replace
 from fractions import Fraction
@@ -47,7 +45,7 @@ def solved(made: System, folder: Path) -> tuple[Outcome, Table]:
 
 
 @pytest.mark.parametrize("between", ["zoh", "foh"])
-def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path: Path, between: str) -> None:
+def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path, between):
     """Linear plants: the Jacobian told is exact, so Newton needs no differences."""
     outcome, table = solved(iterated(tmp_path, STEP, between), tmp_path)
     without, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]), tmp_path)
@@ -64,9 +62,7 @@ def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path: Path, between: str) -
 
 
 @pytest.mark.parametrize("offered", [WRONG, FAILING])
-def test_derivatives_that_do_not_help_give_way_to_differences(
-    tmp_path: Path, offered: float
-) -> None:
+def test_derivatives_that_do_not_help_give_way_to_differences(tmp_path, offered):
     outcome, table = solved(iterated(tmp_path, offered, "foh"), tmp_path)
     _, same = solved(iterated(tmp_path, STEP, "foh"), tmp_path)
     assert outcome.details.iterations is not None
@@ -75,7 +71,7 @@ def test_derivatives_that_do_not_help_give_way_to_differences(
     np.testing.assert_allclose(table["one.x"], same["one.x"], rtol=0, atol=1e-8)
 
 
-def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path: Path) -> None:
+def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path):
     """Substeps, and feed-through read after the step with other inputs."""
     made = iterated(tmp_path, STEP, "foh")
     for other in (
@@ -109,9 +105,7 @@ def looped(folder: Path, offered: float, flags: tuple[str, ...] = FLAGS, **own: 
     ("offered", "flags", "used"),
     [(STEP, FLAGS, True), (WRONG, FLAGS, True), (FAILING, FLAGS, False), (STEP, FLAGS[:-1], False)],
 )
-def test_start_values_by_directional_derivatives(
-    tmp_path: Path, offered: float, flags: tuple[str, ...], used: bool, isolate: bool
-) -> None:
+def test_start_values_by_directional_derivatives(tmp_path, offered, flags, used, isolate):
     made = looped(tmp_path, offered, flags)
     made = replace(made, fmus=tuple(replace(u, isolate=isolate) for u in made.fmus))
     _, table = solved(made, tmp_path)
@@ -143,7 +137,7 @@ int fmi3GetDirectionalDerivative(void *c, const unsigned *unknown, size_t nu, co
 """
 
 
-def test_fmi3_arrays_are_derived_whole(tmp_path: Path) -> None:
+def test_fmi3_arrays_are_derived_whole(tmp_path):
     """Of single entries of arrays, in any order; the arrays' sizes are what the standard asks."""
     (tmp_path / "linear.c").write_text(LINEAR)
     library = compiled(tmp_path / "linear.c", tmp_path, "linear")

@@ -1,7 +1,5 @@
 """FMI 3.0 from a compiled FMU: every number type, and what is called after a fault."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -27,9 +25,7 @@ EXTREMES = {
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_start_values_of_every_type(
-    tmp_path: Path, isolate: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_start_values_of_every_type(tmp_path, isolate, monkeypatch):
     c_fmu3(tmp_path)
     log = tmp_path / "log"
     monkeypatch.setenv("FAULT_FMU_LOG", str(log))
@@ -44,10 +40,10 @@ def test_start_values_of_every_type(
     assert log.read_text(encoding="utf-8").splitlines() == ["Grüße", "terminate", "free"]
 
 
-def test_which_output_is_the_derivative_of_which(tmp_path: Path) -> None:
+def test_which_output_is_the_derivative_of_which(tmp_path):
     """By value reference (FMI 3.0 section 2.4.7.4), entry by entry of an array."""
 
-    def change(text: str) -> str:
+    def change(text):
         size = '<Dimension start="2"/>'
         text = text.replace('"out_Float32" valueReference="3" ', '"slope" valueReference="3" ')
         for name, more in (("out_Float64", ""), ("slope", 'derivative="1" ')):
@@ -55,14 +51,14 @@ def test_which_output_is_the_derivative_of_which(tmp_path: Path) -> None:
             text = f'{head}{more}name="{name}" ' + tail.replace("/>", f">{size}</{kind(name)}>", 1)
         return text
 
-    def kind(name: str) -> str:
+    def kind(name):
         return "Float32" if name == "slope" else "Float64"
 
     found = describe(edited(c_fmu3(tmp_path), change))
     assert found.derivatives == {"out_Float64[1]": "slope[1]", "out_Float64[2]": "slope[2]"}
 
 
-def test_connections_to_every_type_round_to_whole_numbers(tmp_path: Path) -> None:
+def test_connections_to_every_type_round_to_whole_numbers(tmp_path):
     c_fmu3(tmp_path)
     python_fmu(tmp_path, "Gives", "self.y = 2.6 - self.steps * 0.25")
     wires = "".join(wire_table("gives.y", f"one.in_{k}") for k in NUMBERS)
@@ -85,9 +81,7 @@ def test_connections_to_every_type_round_to_whole_numbers(tmp_path: Path) -> Non
         ("Int32", -(2.0**31) - 1, "-2147483648 to 2147483647", ""),
     ],
 )
-def test_a_number_that_its_type_cannot_hold_is_a_fault(
-    tmp_path: Path, kind: str, value: float, limits: str, isolate: str
-) -> None:
+def test_a_number_that_its_type_cannot_hold_is_a_fault(tmp_path, kind, value, limits, isolate):
     c_fmu3(tmp_path)
     python_fmu(tmp_path, "Gives", f"self.y = {value!r} if self.steps == 3 else 1.0")
     wire = wire_table("gives.y", f"one.in_{kind}")
@@ -108,14 +102,7 @@ def test_a_number_that_its_type_cannot_hold_is_a_fault(
         (7, ISOLATED, None, ["terminate", "free"]),
     ],
 )
-def test_what_is_called_after_a_fault(
-    tmp_path: Path,
-    mode: int,
-    named: str | None,
-    calls: list[str],
-    isolate: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_called_after_a_fault(tmp_path, mode, named, calls, isolate, monkeypatch):
     """FMI 3.0 section 2.3.1: after an error only fmi3FreeInstance and fmi3Reset, after a fatal
     error nothing; a discarded step leaves the FMU as it was."""
     c_fmu3(tmp_path)
@@ -132,7 +119,7 @@ def test_what_is_called_after_a_fault(
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_whole_numbers_beyond_2_53_start_exactly(tmp_path: Path, isolate: str) -> None:
+def test_whole_numbers_beyond_2_53_start_exactly(tmp_path, isolate):
     """The largest whole numbers of both wide types come out as they went in where a double holds
     them; one that none holds is a fault, not another number."""
     c_fmu3(tmp_path)
@@ -148,7 +135,7 @@ def test_whole_numbers_beyond_2_53_start_exactly(tmp_path: Path, isolate: str) -
         assert str(experiment.outcome.fault).startswith(said)
 
 
-def test_a_whole_number_beyond_its_type_is_refused(tmp_path: Path) -> None:
+def test_a_whole_number_beyond_its_type_is_refused(tmp_path):
     c_fmu3(tmp_path)
     experiment, _ = run(tmp_path, ONE + f"start.in_Int64 = {2**63}\n")
     said = f"one: in_Int64 cannot be {2**63}: Int64 holds {-(2**63)} to {2**63 - 1}"
@@ -156,7 +143,7 @@ def test_a_whole_number_beyond_its_type_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_a_structural_parameter_sizes_a_matrix_given_by_rows(tmp_path: Path, isolate: str) -> None:
+def test_a_structural_parameter_sizes_a_matrix_given_by_rows(tmp_path, isolate):
     """Set in configuration mode (the FMU refuses it elsewhere); sum of i times entry i."""
     c_fmu3(tmp_path)
     starts = "start.size = 3\nstart.array = [[1, 2, 3], [4, 5, 6], [7, 8, 10]]\n"
@@ -180,13 +167,13 @@ def test_a_structural_parameter_sizes_a_matrix_given_by_rows(tmp_path: Path, iso
         ("start.size = true\n", "size takes a whole number"),
     ],
 )
-def test_what_fits_no_array_or_binary_is_refused(tmp_path: Path, starts: str, message: str) -> None:
+def test_what_fits_no_array_or_binary_is_refused(tmp_path, starts, message):
     c_fmu3(tmp_path)
     with pytest.raises(SceneFault, match=message):
         run(tmp_path, ONE + starts)
 
 
-def test_an_entry_alone_of_a_resized_array_is_refused(tmp_path: Path) -> None:
+def test_an_entry_alone_of_a_resized_array_is_refused(tmp_path):
     """The start values in modelDescription.xml are those of another size."""
     c_fmu3(tmp_path)
     experiment, _ = run(tmp_path, ONE + 'start.size = 3\nstart."array[1,1]" = 1.0\n')
@@ -194,9 +181,7 @@ def test_an_entry_alone_of_a_resized_array_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_a_binary_input_starts_with_bytes(
-    tmp_path: Path, isolate: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_binary_input_starts_with_bytes(tmp_path, isolate, monkeypatch):
     c_fmu3(tmp_path)
     monkeypatch.setenv("FAULT_FMU_LOG", str(tmp_path / "log"))
     experiment, _ = run(tmp_path, ONE + isolate + 'start.blob = "00ff10"\n')

@@ -45,7 +45,7 @@ def shipped(folder: Path, name: str, *files: str) -> Path:
 STARTED = 'start = { intParam = 7, booleanParameter = true, stringParameter = "cat", realIn = 2 }\n'
 
 
-def test_pythonfmus_examples_run_and_connect(tmp_path: Path) -> None:
+def test_pythonfmus_examples_run_and_connect(tmp_path):
     shipped(tmp_path, "pythonslave.py")
     shipped(tmp_path, "slavewithdep.py", "localmodule.py")
     experiment, found = run(
@@ -92,7 +92,7 @@ class Starts(Fmi2Slave):
 
 
 @pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
-def test_start_values_that_are_no_reals(tmp_path: Path, isolate: str) -> None:
+def test_start_values_that_are_no_reals(tmp_path, isolate):
     python_fmu_of(tmp_path, STARTS, "starts")
     one = '[[fmu]]\nname = "one"\npath = "Starts.fmu"\n' + isolate
     starts = 'start = { n = -2147483648, on = true, text = "Maß = 3" }\n'
@@ -139,7 +139,7 @@ def three(folder: Path) -> Path:
     return Path(Builder3.build_FMU(script, dest=folder))
 
 
-def test_fmi3_arrays_and_types_beside_fmi2(tmp_path: Path) -> None:
+def test_fmi3_arrays_and_types_beside_fmi2(tmp_path):
     pytest.importorskip("pythonfmu3")
     three(tmp_path)
     python_fmu(tmp_path, "Takes", "self.y = self.u + 10 * self.on")
@@ -177,10 +177,10 @@ to = "three.u[2]"
     np.testing.assert_array_equal(h["takes.y"][1:], k[:-1] + 10.0 * (k[:-1] % 2))
 
 
-def test_dependencies_on_an_array_are_those_on_its_entries(tmp_path: Path) -> None:
+def test_dependencies_on_an_array_are_those_on_its_entries(tmp_path):
     pytest.importorskip("pythonfmu3")
 
-    def declared(text: str) -> str:
+    def declared(text):
         for reference, inputs in ((2, "1"), (3, "")):
             text = text.replace(
                 f'<Output valueReference="{reference}"/>',
@@ -202,7 +202,7 @@ MANY = """self.value = {"u[1]": 0.0, "u[10]": 0.0, "u[2]": 0.0}
                                         setter=lambda v, n=n: self.value.__setitem__(n, v)))"""
 
 
-def test_a_vector_goes_by_its_indices_not_by_the_order_of_the_file(tmp_path: Path) -> None:
+def test_a_vector_goes_by_its_indices_not_by_the_order_of_the_file(tmp_path):
     text = SLAVE.format(name="Listed", body="self.y = self.value['u[2]'] - self.value['u[10]']")
     text = text.replace('self.register_variable(Real("u", causality=Fmi2Causality.input))', MANY)
     python_fmu_of(tmp_path, text, "listed")
@@ -248,7 +248,7 @@ def decay(folder: Path) -> None:
     edited(python_fmu_of(folder, DECAY, uuid.uuid4().hex), enumerated)
 
 
-def test_states_take_their_start_and_enumerations_the_names_of_their_items(tmp_path: Path) -> None:
+def test_states_take_their_start_and_enumerations_the_names_of_their_items(tmp_path):
     decay(tmp_path)
     for start, first, share in (('mode = "fast", x = 4', 4.0, 0.125), ("mode = 1", 1.0, 0.5)):
         x = run(tmp_path, f"{DECAY_FMU}start = {{ {start} }}\n")[1].haptics["decay.x"]
@@ -259,13 +259,13 @@ def test_states_take_their_start_and_enumerations_the_names_of_their_items(tmp_p
     ("start", "message"),
     [('mode = "fats"', "mode is one of slow, fast"), ("mode = 1.5", "mode takes a whole number")],
 )
-def test_items_that_an_enumeration_does_not_have(tmp_path: Path, start: str, message: str) -> None:
+def test_items_that_an_enumeration_does_not_have(tmp_path, start, message):
     decay(tmp_path)
     found = findings(tmp_path, f"{DECAY_FMU}start = {{ {start} }}\n")
     assert message in found["fmu[0] (decay).start.mode"][1]
 
 
-def test_a_filter_between_our_blocks_takes_the_place_of_a_connection(tmp_path: Path) -> None:
+def test_a_filter_between_our_blocks_takes_the_place_of_a_connection(tmp_path):
     python_fmu(tmp_path, "Push", "self.y = 3.0")
     bar = """
 [[fmu]]
@@ -300,16 +300,14 @@ child = "bar"
     [("mm", "m", 1500.0, 1.5), ("degC", "K", 20.0, 293.15), ("K", "degC", 273.15, 0.0),
      ("deg", "rad", 180.0, math.pi), ("m", "m", 2.0, 2.0)],
 )  # fmt: skip
-def test_units_convert(
-    tmp_path: Path, source: str, target: str, value: float, expected: float
-) -> None:
+def test_units_convert(tmp_path, source, target, value, expected):
     with_units(python_fmu(tmp_path, "Gives", f"self.y = {value}"), y=source)
     with_units(python_fmu(tmp_path, "Takes", "self.y = self.u"), u=target)
     _, found = run(tmp_path, PAIR)
     np.testing.assert_allclose(found.haptics["takes.y"][-1], expected, rtol=1e-15, atol=1e-12)
 
 
-def test_a_difference_of_temperatures_has_no_offset() -> None:
+def test_a_difference_of_temperatures_has_no_offset():
     base = (0, 0, 0, 0, 1, 0, 0, 0)
     degree, kelvin = Unit("degC", base, 1.0, 273.15), Unit("K", base)
     assert conversion(degree, kelvin) == Linear(1.0, 273.15)
@@ -317,7 +315,7 @@ def test_a_difference_of_temperatures_has_no_offset() -> None:
     assert Linear(2.0, 1.0).after(Linear(3.0, 5.0)) == Linear(6.0, 11.0)
 
 
-def test_factor_and_offset_come_after_the_units(tmp_path: Path) -> None:
+def test_factor_and_offset_come_after_the_units(tmp_path):
     with_units(python_fmu(tmp_path, "Gives", "self.y = 1500.0"), y="mm")
     with_units(python_fmu(tmp_path, "Takes", "self.y = self.u"), u="m")
     _, found = run(tmp_path, PAIR + "factor = -2.0\noffset = 10.0\n")
@@ -354,9 +352,7 @@ def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
         ("[[conn", "[[connection]]\nhold = 'zog'\n#", "connection[0].hold", 12, "did you mean"),
     ],
 )  # fmt: skip
-def test_faults_of_tables_have_their_place(
-    tmp_path: Path, old: str, new: str, key: str, line: int, message: str
-) -> None:
+def test_faults_of_tables_have_their_place(tmp_path, old, new, key, line, message):
     python_fmu(tmp_path, "Gives")
     python_fmu(tmp_path, "Takes")
     found = findings(tmp_path, PAIR.replace(old, new, 1))
@@ -365,7 +361,7 @@ def test_faults_of_tables_have_their_place(
     assert message in found[key][1]
 
 
-def test_units_that_do_not_convert_are_refused_with_both(tmp_path: Path) -> None:
+def test_units_that_do_not_convert_are_refused_with_both(tmp_path):
     with_units(python_fmu(tmp_path, "Gives"), y="mm")
     with_units(python_fmu(tmp_path, "Takes"), u="rad")
     line, message = findings(tmp_path, PAIR)["connection[0]"]
@@ -375,7 +371,7 @@ def test_units_that_do_not_convert_are_refused_with_both(tmp_path: Path) -> None
     assert "furlong has no BaseUnit" in findings(tmp_path, PAIR)["connection[0]"][1]
 
 
-def test_an_input_has_one_source(tmp_path: Path) -> None:
+def test_an_input_has_one_source(tmp_path):
     python_fmu(tmp_path, "Gives")
     python_fmu(tmp_path, "Takes")
     again = '[[connection]]\nfrom = "takes.y"\nto = "takes.u"\n'
@@ -384,7 +380,7 @@ def test_an_input_has_one_source(tmp_path: Path) -> None:
     assert "takes.u is fed by gives.y already" in message
 
 
-def test_paths_are_relative_to_the_scene_file_and_options_reach_in(tmp_path: Path) -> None:
+def test_paths_are_relative_to_the_scene_file_and_options_reach_in(tmp_path):
     (tmp_path / "below").mkdir()
     python_fmu(tmp_path, "Gives")
     text = PAIR.split("[[connection]]")[0].replace("Gives.fmu", "../Gives.fmu")
@@ -413,7 +409,7 @@ to = "fast.u"
 """
 
 
-def test_an_angle_in_degrees_is_continued_over_its_seam(tmp_path: Path) -> None:
+def test_an_angle_in_degrees_is_continued_over_its_seam(tmp_path):
     """A turn of 400 degrees a second, wrapped: first order gives the line back."""
     body = "self.y = (400 * (time + size) + 180) % 360 - 180"
     with_units(python_fmu(tmp_path, "Slow", body), y="deg")
@@ -424,7 +420,7 @@ def test_an_angle_in_degrees_is_continued_over_its_seam(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen, 400 * (time - 0.5 / 64), rtol=0, atol=1e-8)
 
 
-def test_what_is_no_angle_is_not_unwrapped(tmp_path: Path) -> None:
+def test_what_is_no_angle_is_not_unwrapped(tmp_path):
     with_units(python_fmu(tmp_path, "Slow"), y="m")
     python_fmu(tmp_path, "Fast")
     with pytest.raises(SceneFault, match="in m, which is no angle"):

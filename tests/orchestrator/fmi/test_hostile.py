@@ -1,7 +1,5 @@
 """FMUs that behave badly: what they return is not believed, and what they change is restored."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -30,16 +28,14 @@ ACTS = [
 
 @pytest.mark.parametrize("fmi", ["2", "3"])
 @pytest.mark.parametrize(("place", "act"), ACTS)
-def test_only_ok_and_warning_are_success(
-    tmp_path: Path, loop: str, fmi: str, place: str, act: str
-) -> None:
+def test_only_ok_and_warning_are_success(tmp_path, loop, fmi, place, act):
     is_a_fault(tmp_path, fmi, place, act)
 
 
 @pytest.mark.parametrize(
     ("fmi", "place", "act"), [("23"[k % 2], *row) for k, row in enumerate(ACTS)]
 )
-def test_so_it_is_in_a_process_of_its_own(tmp_path: Path, fmi: str, place: str, act: str) -> None:
+def test_so_it_is_in_a_process_of_its_own(tmp_path, fmi, place, act):
     """Python steps it in either loop, and its worker is the same for every version of FMI."""
     is_a_fault(tmp_path, fmi, place, act, ISOLATED)
 
@@ -56,9 +52,7 @@ def is_a_fault(folder: Path, fmi: str, place: str, act: str, isolate: str = "") 
 
 
 @pytest.mark.parametrize("place", ["save", "restore"])
-def test_a_state_that_is_saved_or_restored_in_part_is_none(
-    tmp_path: Path, loop: str, place: str
-) -> None:
+def test_a_state_that_is_saved_or_restored_in_part_is_none(tmp_path, loop, place):
     hostile_fmu(tmp_path)
     scene = hostile_scene(tmp_path, f"{place}_minus_5")
     options = ["faults.discard=retry"]
@@ -71,13 +65,8 @@ def test_a_state_that_is_saved_or_restored_in_part_is_none(
     ("place", "where"), [("step", "root"), ("step", "gone"), ("enter", "root"), ("make", "gone")]
 )
 def test_a_change_of_the_current_directory_is_undone_and_told(
-    tmp_path: Path,
-    fmi: str,
-    place: str,
-    where: str,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+    tmp_path, fmi, place, where, monkeypatch, caplog
+):
     hostile_fmu(tmp_path, fmi)
     hostile_scene(tmp_path, name := f"{place}_{where}_7")
     monkeypatch.chdir(tmp_path)
@@ -91,13 +80,11 @@ def test_a_change_of_the_current_directory_is_undone_and_told(
     assert len(tables.load(tmp_path / "out").haptics["time"]) == 33
 
 
-def test_runs_in_threads_leave_the_current_directory_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_runs_in_threads_leave_the_current_directory_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ends: list[object] = []
 
-    def runs() -> None:
+    def runs():
         for _ in range(6):
             ends.append(hl.run("pendulum", {"duration": 0.02}).run["end"]["reason"])
 
@@ -115,14 +102,7 @@ def test_runs_in_threads_leave_the_current_directory_alone(
     [("step", "upward"), ("step", "zero"), ("step", "flush"), ("get", "upward"), ("set", "zero"),
      ("enter", "upward"), ("make", "upward")],
 )  # fmt: skip
-def test_another_rounding_mode_is_restored_and_told(
-    tmp_path: Path,
-    loop: str,
-    fmi: str,
-    place: str,
-    act: str,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_another_rounding_mode_is_restored_and_told(tmp_path, loop, fmi, place, act, caplog):
     """The numbers of the other FMU are the same to the bit."""
     hostile_fmu(tmp_path, fmi)
     good = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").results.haptics
@@ -135,7 +115,7 @@ def test_another_rounding_mode_is_restored_and_told(
     assert 2.0**-1074 > 0.0
 
 
-def test_a_step_that_is_cut_short_unasked_is_no_whole_one(tmp_path: Path, loop: str) -> None:
+def test_a_step_that_is_cut_short_unasked_is_no_whole_one(tmp_path, loop):
     """Early return is not allowed to it (FMI 3.0, section 4.2.1)."""
     hostile_fmu(tmp_path, "3")
     outcome = simulate(hostile_scene(tmp_path, "step_early_20"), tmp_path / "out").outcome
@@ -148,16 +128,14 @@ def test_a_step_that_is_cut_short_unasked_is_no_whole_one(tmp_path: Path, loop: 
     ("act", "end"),
     [("finish", 20 / 64), ("beyond", 20 / 64), ("middle", 19 / 64), ("never", 19 / 64)],
 )
-def test_a_request_to_end_ends_the_run_at_the_last_whole_step(
-    tmp_path: Path, loop: str, fmi: str, act: str, end: float
-) -> None:
+def test_a_request_to_end_ends_the_run_at_the_last_whole_step(tmp_path, loop, fmi, act, end):
     """`never` asks for an end at NaN."""
     hostile_fmu(tmp_path, fmi)
     outcome = simulate(hostile_scene(tmp_path, f"step_{act}_20"), tmp_path / "out").outcome
     assert (outcome.reason, outcome.end_time) == ("terminated", end)
 
 
-def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path: Path) -> None:
+def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path):
     streams, limit, errors = (sys.stdout, sys.stderr), sys.getrecursionlimit(), np.geterr()
     hostile_fmu(tmp_path)
     file = hostile_slave(tmp_path, "2").name
@@ -170,7 +148,7 @@ def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path: Path
 
 @pytest.mark.parametrize("loop", ["compiled", "python"])
 @pytest.mark.parametrize("fmi", ["2", "3"])
-def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
+def test_exit_of_c_is_no_success(tmp_path, fmi, loop):
     hostile_fmu(tmp_path, fmi)
     scene, out = hostile_scene(tmp_path, "step_exit_20"), tmp_path / "out"
     command = [*RUN, str(scene), "--out", str(out)]
@@ -183,7 +161,7 @@ def test_exit_of_c_is_no_success(tmp_path: Path, fmi: str, loop: str) -> None:
     assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
 
 
-def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path: Path) -> None:
+def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path):
     """The tables are whole by then, and nothing is recovered."""
     hostile_fmu(tmp_path)
     scene, out = hostile_scene(tmp_path, "end_null_9"), tmp_path / "out"
@@ -195,7 +173,7 @@ def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path: Path) 
     assert tables.load(out).haptics["time"][-1] == 0.5
 
 
-def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> None:
+def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path):
     """A tool that never answers would hang the run; one signal ends it while it loads."""
     hostile_fmu(tmp_path, "2", needsExecutionTool="true")
     run = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").run
@@ -211,9 +189,7 @@ def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path: Path) -> No
     assert "interrupted" in said
 
 
-def test_what_a_run_does_not_use_of_fmi_3_is_told(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_a_run_does_not_use_of_fmi_3_is_told(tmp_path, caplog):
     scene = hostile_scene(tmp_path, "good_none_0")
     hostile_fmu(tmp_path, "3")
     simulate(scene, tmp_path / "out")

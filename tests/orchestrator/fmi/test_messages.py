@@ -3,7 +3,7 @@
 from hapticlink.orchestrator.fmi import messages
 
 
-def test_the_newest_messages_are_kept_and_no_novel() -> None:
+def test_the_newest_messages_are_kept_and_no_novel():
     key = messages.opened()
     for i in range(20_000):
         messages.keep(key, 2, b"%d " % i + b"x" * 10_000)

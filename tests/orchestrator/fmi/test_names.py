@@ -1,7 +1,5 @@
 """Names and value references of foreign FMUs: none shifts a column, none is another variable's."""
 
-from pathlib import Path
-
 import pytest
 
 from hapticlink.orchestrator.base.faults import InputFault
@@ -11,7 +9,7 @@ from tests.orchestrator.foreign_fmus import DESCRIPTION, edited, fmu_table, pyth
 
 
 @pytest.mark.parametrize("name", ["a,b", '"a", b', '"', '""', "'", ',",', "a b", "λ[1,2]"])
-def test_any_name_comes_back_from_the_csv(tmp_path: Path, name: str) -> None:
+def test_any_name_comes_back_from_the_csv(tmp_path, name):
     xml = name.replace('"', "&quot;")
     path = python_fmu(tmp_path, "Gives", "self.y = 7.0")
     edited(path, lambda text: text.replace('name="y"', f'name="{xml}"'))
@@ -22,20 +20,20 @@ def test_any_name_comes_back_from_the_csv(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["a&#10;b", "a&#13;", "a&#9;b", "a&#x202e;b"])
-def test_names_that_are_no_line(tmp_path: Path, name: str) -> None:
+def test_names_that_are_no_line(tmp_path, name):
     text = DESCRIPTION.replace('name="y"', f'name="{name}"')
     with pytest.raises(InputFault, match="printable characters"):
         describe(fmu(tmp_path / "model.fmu", text))
 
 
 @pytest.mark.parametrize("reference", [2**32, 2**32 + 1, -1, 2**64])
-def test_value_references_are_of_32_bits(tmp_path: Path, reference: int) -> None:
+def test_value_references_are_of_32_bits(tmp_path, reference):
     text = DESCRIPTION.replace('valueReference="1"', f'valueReference="{reference}"')
     with pytest.raises(InputFault, match=f"'y': value reference {reference} is not from 0 to"):
         describe(fmu(tmp_path / "model.fmu", text))
 
 
-def test_two_variables_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_two_variables_of_one_name_are_refused(tmp_path):
     """They would be one column, and all columns after it those of their neighbours."""
     text = DESCRIPTION.replace('name="mode"', 'name="y"')
     with pytest.raises(InputFault, match="'y': 2 variables have this name"):

@@ -1,11 +1,7 @@
 """Instances of one file of this project have one library in a run, and are independent; FMUs of
 others have one each."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from contextlib import ExitStack
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,14 +15,14 @@ from tests.orchestrator.foreign_fmus import c_fmu
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _fmus_stay_unpacked() -> None:
+def _fmus_stay_unpacked():
     """Here they do not: folders are counted."""
 
 
 @pytest.mark.parametrize("make", [build, build_native])
 def test_instances_of_our_file_share_a_folder_until_the_last_is_closed(
-    tmp_path: Path, own_temporary_folder: Path, make: Callable[..., Path]
-) -> None:
+    tmp_path, own_temporary_folder, make
+):
     """y = 2 u, and z the w of the step before."""
     description = described(make(coupled.gain("gain", 2.0, 0.0), tmp_path))
     instances = [InProcess(f"f{i}", description, np.zeros(2)) for i in range(8)]
@@ -49,9 +45,7 @@ def test_instances_of_our_file_share_a_folder_until_the_last_is_closed(
     assert not [*own_temporary_folder.iterdir()]
 
 
-def test_instances_of_a_file_of_others_have_a_library_each(
-    tmp_path: Path, own_temporary_folder: Path
-) -> None:
+def test_instances_of_a_file_of_others_have_a_library_each(tmp_path, own_temporary_folder):
     description = describe(c_fmu(tmp_path))
     with ExitStack() as stack:
         for i in range(2):

@@ -1,7 +1,5 @@
 """An FMU that requests the end of the simulation: a regular end with the last row."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ STAIR = fmu_table("stair", "stair", "rate = {}\n")
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 @pytest.mark.parametrize("coupling", ["gauss-seidel", "jacobi"])
-def test_the_stair_ends_at_its_top(tmp_path: Path, coupling: str, isolate: str) -> None:
+def test_the_stair_ends_at_its_top(tmp_path, coupling, isolate):
     """As Reference-FMUs' Stair at 5 Hz: its last row is (9.0, 10); the others' is of that time."""
     stair_fmu(tmp_path)
     python_fmu(tmp_path, "Beside")
@@ -33,7 +31,7 @@ def test_the_stair_ends_at_its_top(tmp_path: Path, coupling: str, isolate: str) 
     }  # fmt: skip
 
 
-def test_the_end_within_a_step_leaves_the_row_before_it(tmp_path: Path) -> None:
+def test_the_end_within_a_step_leaves_the_row_before_it(tmp_path):
     stair_fmu(tmp_path)
     experiment, found = run(tmp_path, STAIR.format(0.4), "duration=20", "haptics.rate=10")
     outcome = experiment.outcome
@@ -42,7 +40,7 @@ def test_the_end_within_a_step_leaves_the_row_before_it(tmp_path: Path) -> None:
     assert outcome.asked == "stair asks to end the simulation at 9 s, within its step"
 
 
-def test_a_retried_step_that_ends_is_no_discard(tmp_path: Path) -> None:
+def test_a_retried_step_that_ends_is_no_discard(tmp_path):
     stair_fmu(tmp_path, canGetAndSetFMUstate="true", canHandleVariableCommunicationStepSize="true")
     options = ("duration=20", "haptics.rate=10", "faults.discard=retry")
     experiment, found = run(tmp_path, STAIR.format(5), *options)
@@ -50,7 +48,7 @@ def test_a_retried_step_that_ends_is_no_discard(tmp_path: Path) -> None:
     assert found.tables["5hz"]["stair.counter"][-1] == 10
 
 
-def test_the_command_says_who_asked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_says_who_asked(tmp_path, capsys):
     stair_fmu(tmp_path)
     path = scene(tmp_path, STAIR.format(5), rate=10, duration=20)
     assert status("run", path, "--no-figures", "--out", tmp_path / "out") == 0

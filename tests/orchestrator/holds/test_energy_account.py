@@ -1,8 +1,6 @@
 """What a hold knows of the energy that it makes where samples are late, and what `passive` makes of
 it: against the meter, which knows all, on forces and motions without FMUs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -100,9 +98,7 @@ class Line:
     st.floats(0, 40),
     st.floats(0, 0.5),
 )
-def test_its_account_is_the_meters(
-    name: str, seed: int, every: int, step: int, least: float, spread: float, loss: float
-) -> None:
+def test_its_account_is_the_meters(name, seed, every, step, least, spread, loss):
     """Any latencies and losses, random forces and motions, then a rest until all has arrived: the
     hold has booked what a meter of the samples that it got does; and where none is lost and none
     overtaken, that is all."""
@@ -110,7 +106,7 @@ def test_its_account_is_the_meters(
     latency = Latency(min=least, max=least + spread, loss=loss, seed=seed % 1000)
     line = Line(name, latency, every, step)
 
-    def go(tick: int) -> float:
+    def go(tick):
         moves = tick < 200
         line.v[:] = generator.normal() * moves
         line.held[:] = line.late.value(tick, step / 2)
@@ -136,9 +132,7 @@ rates = st.sampled_from([(1, 1), (5, 1), (1, 5), (3, 2), (2, 7)])
 
 @settings(max_examples=120)
 @given(st.integers(0, 2**32 - 1), rates, st.none() | st.integers(0, 30), st.booleans())
-def test_passive_makes_nothing_where_the_way_is_foreseen(
-    seed: int, rates: tuple[int, int], least: int | None, known: bool
-) -> None:
+def test_passive_makes_nothing_where_the_way_is_foreseen(seed, rates, least, known):
     """The theorem, its premise reaching over the latency: random forces and speeds, no latency, for
     which half the swing suffices, or ones that vary without overtaking. Where no swing as large was
     seen before, what is made stays below the swing's on the way from a stamp to the step in which
@@ -156,7 +150,7 @@ def test_passive_makes_nothing_where_the_way_is_foreseen(
         line.hold.value(begin // 2)
     xs = []
 
-    def go(tick: int) -> float:
+    def go(tick):
         xs.append(float(line.x[0]))
         before = float(line.v[0])
         line.v[:] = generator.normal()
@@ -165,7 +159,7 @@ def test_passive_makes_nothing_where_the_way_is_foreseen(
         share = generator.choice([1.0, generator.uniform(0.0, 1.0)])
         return float(share * (line.v[0] + gained / 2) * step)
 
-    def force() -> float:
+    def force():
         return float(generator.choice([-LARGEST, LARGEST, generator.uniform(-LARGEST, LARGEST)]))
 
     line.run(250, force, go, begin)
@@ -176,9 +170,7 @@ def test_passive_makes_nothing_where_the_way_is_foreseen(
 
 @settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), rates, st.integers(0, 30), st.booleans())
-def test_what_passive_makes_of_white_noise_is_bounded(
-    seed: int, rates: tuple[int, int], least: int, known: bool
-) -> None:
+def test_what_passive_makes_of_white_noise_is_bounded(seed, rates, least, known):
     """White forces on white motions, foreseen or not: beside the swing's first time, only steps
     that go against what was foreseen, or further, make anything, each at most (R + C) |dx|, and
     those while it is not trusted again (1 - beta) C |dx|: R the largest swing, C the friction."""
@@ -188,7 +180,7 @@ def test_what_passive_makes_of_white_noise_is_bounded(
     hold, xs, allowed = line.hold, [], 0.0
     assert isinstance(hold, Passive)
 
-    def go(tick: int) -> float:
+    def go(tick):
         nonlocal allowed
         xs.append(float(line.x[0]))
         line.v[:] = generator.normal()

@@ -1,7 +1,5 @@
 """Laws of the holds on samples, without FMUs: polynomials that each reproduces, and invariants."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable
@@ -30,15 +28,13 @@ def fed(hold: Hold, times: Vector, signal: Callable[[float], Vector]) -> Hold:
 
 
 @given(stamps, st.integers(0, 40), st.floats(0, 20), st.integers(0, 2))
-def test_a_polynomial_of_the_holds_degree_is_continued_exactly(
-    times: Vector, later: int, ahead: float, degree: int
-) -> None:
+def test_a_polynomial_of_the_holds_degree_is_continued_exactly(times, later, ahead, degree):
     coefficients = np.array([0.5, -0.3, 0.01][: degree + 1])
 
-    def signal(t: float) -> Vector:
+    def signal(t):
         return np.array([np.polynomial.polynomial.polyval(t, coefficients)])
 
-    def slope(t: float) -> Vector:
+    def slope(t):
         derivative = np.polynomial.polynomial.polyder(coefficients)
         return np.array([np.polynomial.polynomial.polyval(t, derivative) if degree else 0.0])
 
@@ -58,9 +54,7 @@ def test_a_polynomial_of_the_holds_degree_is_continued_exactly(
 
 
 @given(stamps, st.integers(0, 40), st.floats(0, 20), st.floats(1, 20))
-def test_a_slope_is_the_rate_of_what_foh_makes_of_the_pose(
-    times: Vector, later: int, ahead: float, apart: float
-) -> None:
+def test_a_slope_is_the_rate_of_what_foh_makes_of_the_pose(times, later, ahead, apart):
     pose = lambda t: np.array([np.sin(0.3 * t), t * t])  # noqa: E731
     held = fed(HOLDS["foh"](HoldContext(2)), times, pose)
     slope = fed(
@@ -73,14 +67,14 @@ def test_a_slope_is_the_rate_of_what_foh_makes_of_the_pose(
     np.testing.assert_allclose(slope.value(tick, ahead), moved * 512 / apart, rtol=1e-6, atol=1e-6)
 
 
-def test_until_the_second_sample_a_slope_is_zero_as_the_pose_is_constant() -> None:
+def test_until_the_second_sample_a_slope_is_zero_as_the_pose_is_constant():
     slope = HOLDS["slope"](HoldContext(2))
     slope.push(0, np.array([3.0, 4.0, 1.0, 2.0]), 0)
     np.testing.assert_array_equal(slope.value(5, 2.5), [0.0, 0.0])
 
 
 @given(stamps)
-def test_delayed_and_smooth_reach_each_sample_a_period_later(times: Vector) -> None:
+def test_delayed_and_smooth_reach_each_sample_a_period_later(times):
     signal = lambda t: np.array([np.sin(0.3 * t), t * t])  # noqa: E731
     arrival = int(times[-1])
     period = arrival - int(times[-2])
@@ -90,9 +84,7 @@ def test_delayed_and_smooth_reach_each_sample_a_period_later(times: Vector) -> N
 
 
 @given(st.integers(1, 40), st.floats(0, 1), st.integers(0, 2**32 - 1))
-def test_delayed_goes_from_sample_to_sample_at_a_fixed_period(
-    period: int, share: float, seed: int
-) -> None:
+def test_delayed_goes_from_sample_to_sample_at_a_fixed_period(period, share, seed):
     samples = np.random.default_rng(seed).normal(size=(6, 2))
     hold = HOLDS["delayed"](HoldContext(2))
     for n, sample in enumerate(samples):
@@ -106,9 +98,7 @@ def test_delayed_goes_from_sample_to_sample_at_a_fixed_period(
     st.lists(st.tuples(st.integers(1, 40), st.integers(0, 60)), min_size=3, max_size=12),
     st.integers(0, 2**32 - 1),
 )
-def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(
-    name: str, rows: list[tuple[int, int]], seed: int
-) -> None:
+def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(name, rows, seed):
     """Nor has `smooth` a kink. The arrivals are as irregular as the stamps, and never fall."""
     samples = iter(np.random.default_rng(seed).normal(size=(len(rows) + 1, 1)))
     hold, eps = HOLDS[name](HoldContext(1)), 1e-6
@@ -127,7 +117,7 @@ def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(
             assert np.abs(slopes[1] - slopes[0]) < 1e-3 * size
 
 
-def test_delayed_where_periods_vary() -> None:
+def test_delayed_where_periods_vary():
     """Samples at 0, 20, 40, 50: at 50 it stands halfway between the two before."""
     hold = HOLDS["delayed"](HoldContext(1))
     for stamp, sample in ((0, 0.0), (20, 1.0), (40, 2.0), (50, 3.0)):
@@ -136,7 +126,7 @@ def test_delayed_where_periods_vary() -> None:
 
 
 @given(stamps)
-def test_mean_over_a_slow_step_is_the_integral_of_the_samples(times: Vector) -> None:
+def test_mean_over_a_slow_step_is_the_integral_of_the_samples(times):
     hold = HOLDS["mean"](HoldContext(1))
     hold.push(0, np.array([0.0]), 0)
     assert hold.value(0) == 0.0
@@ -151,9 +141,7 @@ UNAIDED = [name for name, hold in HOLDS.items() if hold.needs is None]
 
 @pytest.mark.parametrize("name", UNAIDED)
 @given(times=stamps, asked=st.booleans())
-def test_a_second_sample_of_a_stamp_replaces_the_first(
-    name: str, times: Vector, asked: bool
-) -> None:
+def test_a_second_sample_of_a_stamp_replaces_the_first(name, times, asked):
     """Before the hold is asked for a value at its tick."""
     once, twice = (HOLDS[name](HoldContext(1)) for _ in range(2))
     for stamp in (0, *times.tolist()):
@@ -167,7 +155,7 @@ def test_a_second_sample_of_a_stamp_replaces_the_first(
     np.testing.assert_allclose(twice.value(later), once.value(later), rtol=1e-12, atol=1e-12)
 
 
-def test_a_mean_that_has_been_read_stays() -> None:
+def test_a_mean_that_has_been_read_stays():
     hold = HOLDS["mean"](HoldContext(1))
     for stamp in (0, 10, 20):
         hold.push(stamp, np.array([float(stamp)]), stamp)
@@ -183,9 +171,7 @@ def projector(generator: np.random.Generator, rank: int) -> Vector:
 
 @pytest.mark.parametrize("name", EXTRAPOLATING)
 @given(seed=st.integers(0, 2**32 - 1), ahead=st.floats(0, 30))
-def test_a_projector_stays_a_projector_of_the_newest_rank(
-    name: str, seed: int, ahead: float
-) -> None:
+def test_a_projector_stays_a_projector_of_the_newest_rank(name, seed, ahead):
     generator = np.random.default_rng(seed)
     hold = Projector(lambda: HOLDS[name](HoldContext(9)), 9)
     rank = int(generator.integers(0, 4))
@@ -202,7 +188,7 @@ def test_a_projector_stays_a_projector_of_the_newest_rank(
         assert round(np.trace(p)) == rank
 
 
-def test_a_turning_direction_is_continued_not_frozen() -> None:
+def test_a_turning_direction_is_continued_not_frozen():
     """A first-order hold between lines at 0 and 10 degrees points near 15 half a period later."""
     hold = Projector(lambda: HOLDS["foh"](HoldContext(4)), 4)
     for stamp, angle in ((0, 0.0), (10, np.radians(10))):
@@ -214,9 +200,7 @@ def test_a_turning_direction_is_continued_not_frozen() -> None:
 
 @pytest.mark.parametrize("name", EXTRAPOLATING)
 @given(seed=st.integers(0, 2**32 - 1), ahead=st.floats(0, 30), scale=st.floats(-3, 3))
-def test_a_mobility_stays_semidefinite_in_any_units(
-    name: str, seed: int, ahead: float, scale: float
-) -> None:
+def test_a_mobility_stays_semidefinite_in_any_units(name, seed, ahead, scale):
     generator = np.random.default_rng(seed)
     units = np.outer(u := np.array([1.0, 1.0, 10**scale]), u).ravel()
     plain, scaled = (Semidefinite(lambda: HOLDS[name](HoldContext(9)), 9) for _ in range(2))
@@ -232,7 +216,7 @@ def test_a_mobility_stays_semidefinite_in_any_units(
     np.testing.assert_allclose(other, m.ravel(), rtol=0, atol=1e-9 * max(np.abs(m).max(), 1.0))
 
 
-def test_a_wrapped_angle_is_continued_over_the_seam() -> None:
+def test_a_wrapped_angle_is_continued_over_the_seam():
     hold = Unwrapped(lambda: HOLDS["foh"](HoldContext(2)), [1], [2 * np.pi])
     for k, angle in enumerate((3.0, 3.1, 3.2, 3.3)):
         wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
@@ -242,7 +226,7 @@ def test_a_wrapped_angle_is_continued_over_the_seam() -> None:
 
 @pytest.mark.parametrize("turn", [2 * np.pi, 360.0, 400.0])
 @given(st.integers(0, 2**32 - 1))
-def test_a_turn_is_one_in_the_unit_of_each_angle(turn: float, seed: int) -> None:
+def test_a_turn_is_one_in_the_unit_of_each_angle(turn, seed):
     """A walk in steps below half a turn, wrapped, is the walk again."""
     walk = np.cumsum(np.random.default_rng(seed).uniform(-0.49, 0.49, size=30)) * turn
     walk -= walk[0]
@@ -258,14 +242,14 @@ def test_a_turn_is_one_in_the_unit_of_each_angle(turn: float, seed: int) -> None
     ("rates", "order"),
     [((100, 100), 2), ((25, 100), 2), ((37, 100), 1), ((100, 37), 1), ((30, 512), 1)],
 )
-def test_lead_has_order_two_where_rates_divide(rates: tuple[int, int], order: int) -> None:
+def test_lead_has_order_two_where_rates_divide(rates, order):
     """The integral of a sine over 1 s, from samples of the first rate held over steps of the
     second; both rates are multiplied by 4 to 32. `foh` has order 2 at any."""
     errors: dict[str, list[float]] = {"lead": [], "foh": []}
     for name, finer in itertools.product(errors, (4, 8, 16, 32)):
         ticks = math.lcm(*rates) * finer
         source, target = (ticks // (rate * finer) for rate in rates)
-        hold, total, worst = HOLDS[name](HoldContext(1, lambda t, of=ticks: t / of)), 0.0, 0.0  # type: ignore[misc]
+        hold, total, worst = HOLDS[name](HoldContext(1, lambda t, of=ticks: t / of)), 0.0, 0.0
         for tick in sorted({*range(0, ticks, source), *range(0, ticks, target)}):
             if tick % source == 0:
                 hold.push(tick, np.array([np.sin(3 * tick / ticks)]), tick)

@@ -4,8 +4,6 @@ The two-mass oscillator with exact subsystems (computed independently, two ways)
 must take inputs that vary within a step it takes substeps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -23,7 +21,7 @@ Hold = str | Mapping[str, str]
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+def fmus(tmp_path_factory):
     return held(tmp_path_factory.mktemp("oscillator"))
 
 
@@ -34,7 +32,7 @@ OWN = {"two.F": "lead", "one.x": "foh-derivative", "one.v": "foh-derivative"}
 def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how: object) -> float:
     """The largest error of a position within 1 s after the start."""
     steps = round((1 + WARM) * rate)
-    made = coupled.masses(fmus, Fraction(1, rate), steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
+    made = coupled.masses(fmus, Fraction(1, rate), steps, hold, substeps=substeps, **how)
     outcome, table = coupled.simulate(made, folder)
     assert outcome.fault is None
     return coupled.error(table)
@@ -57,9 +55,7 @@ def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how:
         ("mean", 1, 1, "jacobi"),
     ],
 )
-def test_order_of_a_hold(
-    fmus: Fmus, tmp_path: Path, hold: Hold, substeps: int, order: int, coupling: str
-) -> None:
+def test_order_of_a_hold(fmus, tmp_path, hold, substeps, order, coupling):
     rates = [200, 400, 800]
     errors = [error(fmus, tmp_path, rate, hold, substeps, coupling=coupling) for rate in rates]
     assert coupled.order(rates, errors) == pytest.approx(order, abs=0.1)
@@ -70,15 +66,13 @@ def test_order_of_a_hold(
     [{"two.F": "passive"}, {"two.F": "nepce"}, {"one.x": "foh", "one.v": "slope"}],
     ids=["passive", "nepce", "slope"],
 )
-def test_holds_that_reach_order_one_at_higher_rates(
-    fmus: Fmus, tmp_path: Path, further: Mapping[str, str]
-) -> None:
+def test_holds_that_reach_order_one_at_higher_rates(fmus, tmp_path, further):
     rates = [400, 800, 1600]
     errors = [error(fmus, tmp_path, rate, {**OWN, **further}, 1) for rate in rates]
     assert coupled.order(rates, errors) == pytest.approx(1, abs=0.15)
 
 
-def test_a_set_position_that_is_not_paid_for_has_no_order(fmus: Fmus, tmp_path: Path) -> None:
+def test_a_set_position_that_is_not_paid_for_has_no_order(fmus, tmp_path):
     """The motion that the other mass sends is refused in part, at any rate."""
     hold = {"two.F": "lead", "one.x": "pspm", "one.v": "pspm"}
     coarse, fine = (error(fmus, tmp_path, rate, hold, 1) for rate in (800, 1600))
@@ -94,9 +88,7 @@ def test_a_set_position_that_is_not_paid_for_has_no_order(fmus: Fmus, tmp_path: 
         ("lead", 1, 7.08e-3),
     ],
 )
-def test_largest_error_at_a_hundredth(
-    fmus: Fmus, tmp_path: Path, hold: str, substeps: int, published: float
-) -> None:
+def test_largest_error_at_a_hundredth(fmus, tmp_path, hold, substeps, published):
     assert error(fmus, tmp_path, 100, hold, substeps) == pytest.approx(published, rel=0.02)
 
 
@@ -104,7 +96,7 @@ def growth(
     fmus: Fmus, folder: Path, step: Fraction, hold: str, substeps: int, steps: int, **how: object
 ) -> float:
     """Of the envelope between the last quarters of a run; 1 is the limit of stability."""
-    made = coupled.masses(fmus, step, steps, hold, substeps=substeps, **how)  # type: ignore[arg-type]
+    made = coupled.masses(fmus, step, steps, hold, substeps=substeps, **how)
     outcome, table = coupled.simulate(made, folder)
     assert outcome.fault is None
     size = np.abs(coupled.motion(table) / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
@@ -127,14 +119,8 @@ LIMITS += [(*row, True, "gauss-seidel-plants") for row in SEIDEL]
 
 @pytest.mark.parametrize(("hold", "substeps", "limit", "get_after_set", "coupling"), LIMITS)
 def test_limit_of_stability_to_one_percent(
-    fmus: Fmus,
-    tmp_path: Path,
-    hold: str,
-    substeps: int,
-    limit: str,
-    get_after_set: bool,
-    coupling: str,
-) -> None:
+    fmus, tmp_path, hold, substeps, limit, get_after_set, coupling
+):
     how = {"get_after_set": ("two",) * get_after_set, "coupling": coupling}
     steps = 500 if substeps > 1 else 2000
     below, above = (
@@ -144,7 +130,7 @@ def test_limit_of_stability_to_one_percent(
     assert below < 1 < above
 
 
-def test_an_output_that_nobody_reads_makes_no_order(fmus: Fmus, tmp_path: Path) -> None:
+def test_an_output_that_nobody_reads_makes_no_order(fmus, tmp_path):
     """`one.a` follows the force and is not connected: whatever the order of the file, `one` steps
     first, with the limit of that order (.0569 the other way round)."""
     turned = dict(reversed(fmus.items()))

@@ -1,8 +1,6 @@
 """Holds that keep account of the energy that they make: what they prove, on forces and motions
 without FMUs, and what no hold can."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -36,9 +34,7 @@ forces = st.lists(st.floats(-10, 10), min_size=4, max_size=40).map(np.array)
 
 
 @given(forces, st.integers(1, 8), st.floats(1e-4, 1.0), st.booleans())
-def test_passive_holds_leave_nothing_made_but_the_last_period(
-    forces: Vector, every: int, speed: float, back: bool
-) -> None:
+def test_passive_holds_leave_nothing_made_but_the_last_period(forces, every, speed, back):
     """Any force on a steady motion: what a period made is gone when the next has passed."""
     motion = np.full(every * len(forces), -speed if back else speed)
     first = np.concatenate([[0.0], -np.diff(forces) / 2 * motion[0] * every])  # zoh, a period
@@ -52,7 +48,7 @@ def test_passive_holds_leave_nothing_made_but_the_last_period(
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_passive_holds_make_next_to_nothing_of_random_smooth_signals(seed: int) -> None:
+def test_passive_holds_make_next_to_nothing_of_random_smooth_signals(seed):
     """A spring on random motion, renewed every fifth tick: a tenth of what zero order makes."""
     generator = np.random.default_rng(seed)
     t = np.arange(4001)
@@ -66,7 +62,7 @@ def test_passive_holds_make_next_to_nothing_of_random_smooth_signals(seed: int) 
 
 
 @pytest.mark.parametrize(("reversals", "apart"), [(0, 1), (1, 1), (8, 1), (60, 3)])
-def test_a_step_back_by_a_nanometre_costs_next_to_nothing(reversals: int, apart: int) -> None:
+def test_a_step_back_by_a_nanometre_costs_next_to_nothing(reversals, apart):
     """A spring of 1000 N/m on a steady motion, renewed every fifth tick; some steps go back by 1
     nm. What these make is theirs, (R + C) |dx|, and not that of the steps after them."""
     steps = np.full(400, 1e-4)
@@ -74,7 +70,7 @@ def test_a_step_back_by_a_nanometre_costs_next_to_nothing(reversals: int, apart:
     made, swing = {}, 0.0
     for name in ("zoh", "passive"):
         now = np.zeros(1)
-        context = HoldContext(1, displacement=lambda at=now: at, velocity=lambda: np.full(1, 1e-4))  # type: ignore[misc]
+        context = HoldContext(1, displacement=lambda at=now: at, velocity=lambda: np.full(1, 1e-4))
         hold = HOLDS[name](context)
         work = ideal = peak = force = at_sample = 0.0
         for tick, step in enumerate(steps):
@@ -95,7 +91,7 @@ def test_a_step_back_by_a_nanometre_costs_next_to_nothing(reversals: int, apart:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8))
-def test_what_passive_makes_is_at_stake_or_the_first_of_a_swing(seed: int, every: int) -> None:
+def test_what_passive_makes_is_at_stake_or_the_first_of_a_swing(seed, every):
     """Forces of any size on a motion of any steps, half of them not as predicted: the energy made
     at any renewal is at most what the hold says is at stake and, where a force differs more from
     the one before than any did, that difference times the distance until it is known."""
@@ -114,7 +110,7 @@ def test_what_passive_makes_is_at_stake_or_the_first_of_a_swing(seed: int, every
             hold.push(tick, np.array([fresh]), tick)
             force, begun, way = fresh, float(now[0]), 0.0
             _ = hold.value(tick, 0.5)
-            stake = hold.premises[2]  # type: ignore[attr-defined]
+            stake = hold.premises[2]
             assert work - ideal <= allowed + stake + 1e-9 * (1.0 + abs(work) + abs(ideal))
         held = float(hold.value(tick, 0.5)[0])
         step = float(v[0])

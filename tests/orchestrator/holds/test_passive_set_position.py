@@ -1,11 +1,7 @@
 """Passive set-position modulation: a spring whose far end is held gives no more than it got."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -44,8 +40,8 @@ def held(
 @settings(max_examples=150)
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.booleans(), st.integers(1, 4))
 def test_nothing_is_created_at_any_instant_on_any_motion_from_any_samples(
-    seed: int, damped: bool, moving: bool, longest: int
-) -> None:
+    seed, damped, moving, longest
+):
     """Random springs, samples at random ticks, steps of random length, motion straight or not
     within them: the work of F = K (y - x) + B (w - v), in closed form on each straight piece, never
     exceeds what the spring held at the start less what it holds now."""
@@ -56,7 +52,7 @@ def test_nothing_is_created_at_any_instant_on_any_motion_from_any_samples(
     x = generator.normal(size=n)
     holds = held(stiffness, damping, longest, lambda: x)
 
-    def stored(at: Vector) -> float:
+    def stored(at):
         return float(stiffness @ (y - at) ** 2) / 2
 
     work, scale = 0.0, 0.0
@@ -88,7 +84,7 @@ def test_nothing_is_created_at_any_instant_on_any_motion_from_any_samples(
         tick += step
 
 
-def test_a_sample_that_costs_no_more_than_there_is_passes_unchanged() -> None:
+def test_a_sample_that_costs_no_more_than_there_is_passes_unchanged():
     x = np.array([0.0])
     position, velocity = held(np.array([100.0]), np.array([20.0]), 1, lambda: x)
     position.push(0, np.array([0.1]), 0)  # 0.5 J to begin with
@@ -103,11 +99,11 @@ def test_a_sample_that_costs_no_more_than_there_is_passes_unchanged() -> None:
     assert position.value(2) == pytest.approx(0.02 + np.sqrt(8.32 / 50.0), rel=1e-12)
 
 
-def test_a_set_position_that_pumps_a_mass_pumps_nothing() -> None:
+def test_a_set_position_that_pumps_a_mass_pumps_nothing():
     """y steps with the sign of the mass's velocity: at resonance, without damping, each swing adds
     to the last. 1 kg on 100 N/m, solved exactly in each step."""
 
-    def swing(name: str) -> float:
+    def swing(name):
         x, v, y = np.array([0.05]), 0.0, np.zeros(1)
         near = NearEnd(lambda: x, np.zeros(1), TICK, lambda t: t * TICK)
         shared = EnergyTank(np.array([100.0]), np.zeros(1), near)
@@ -133,9 +129,7 @@ K, B = np.array([100.0, 100.0, 0.1]), np.array([20.0, 20.0, 0.02])
 
 
 @pytest.mark.parametrize(("rate", "sensing"), [(10, "ideal"), (30, "ideal"), (30, "encoders")])
-def test_the_controllers_spring_creates_one_steps_surplus_at_most(
-    tmp_path: Path, rate: int, sensing: str
-) -> None:
+def test_the_controllers_spring_creates_one_steps_surplus_at_most(tmp_path, rate, sensing):
     """F_drift on the handle, from the run's own signals. Sampling F makes 1/2 K dx^2 + B (dx/T - v)
     dx a step: the sum of these is large, and the hold lets through one of them. The work on the
     true handle differs by the force's changes times the encoders' error."""
@@ -168,7 +162,7 @@ def test_the_controllers_spring_creates_one_steps_surplus_at_most(
 
 
 @pytest.mark.parametrize("rate", [30, 60])
-def test_both_sides_share_what_either_puts_in(tmp_path: Path, rate: int) -> None:
+def test_both_sides_share_what_either_puts_in(tmp_path, rate):
     """A mechanism that starts at speed pulls the handle along: the coupling gives both together no
     more than it got, at every sample, and the handle follows. The work on the mechanism is the
     energy that it gained, which no meter of the run tells."""
@@ -194,19 +188,17 @@ def test_both_sides_share_what_either_puts_in(tmp_path: Path, rate: int) -> None
         ("closed-loop-direct", "holds.controller.v_S=pspm", "controller.x_S sets the same spring"),
     ],
 )
-def test_where_no_spring_is_set_or_half_of_one_it_is_refused(
-    tmp_path: Path, scene: str, option: str, why: str
-) -> None:
+def test_where_no_spring_is_set_or_half_of_one_it_is_refused(tmp_path, scene, option, why):
     with pytest.raises(SceneFault, match=why):
         simulate(scene, tmp_path, [option])
 
 
-def test_a_near_end_that_is_late_is_refused(tmp_path: Path) -> None:
+def test_a_near_end_that_is_late_is_refused(tmp_path):
     with pytest.raises(SceneFault, match="near end of its spring must be read unheld"):
         simulate("closed-loop-direct", tmp_path, ["hold=pspm", "delays.controller.x_D=0.004"])
 
 
-def test_a_near_end_that_is_an_angle_is_known_as_one() -> None:
+def test_a_near_end_that_is_an_angle_is_known_as_one():
     """Its tank unwraps what it reads (tests of the tank have what becomes of it)."""
     options = ["hold=pspm", "kinds.haptic_device.x=angle"]
     with built(open_scene.load("closed-loop-direct", options)) as system:
@@ -230,9 +222,7 @@ ALONE = "pspm of controller does not count controller.F_drift -> virtual_mechani
         ({"delays.controller.F_drift": 0.004}, ALONE),
     ],
 )
-def test_a_run_tells_where_a_force_of_the_coupling_is_late(
-    link: dict[str, Any], told: str | None
-) -> None:
+def test_a_run_tells_where_a_force_of_the_coupling_is_late(link, told):
     """Its energy is counted over the motion since its sample, or not at all."""
     run = hl.run("closed-loop-direct", SHARED | {"graphics.rate": 32} | link, figures=False)
     found = [line for line in run.run["warnings"] if line.startswith((MOTORS, ALONE))]
@@ -240,7 +230,7 @@ def test_a_run_tells_where_a_force_of_the_coupling_is_late(
     assert not told or found[0].startswith(told)
 
 
-def test_a_latency_of_nothing_changes_nothing() -> None:
+def test_a_latency_of_nothing_changes_nothing():
     """The energy tank keeps both sides of the coupling."""
     moving = {"hand.wrench": [0.0, 0.0, 0.0], "linkage.start_velocity.shoulder1": 4.0}
     x, none = (
@@ -288,7 +278,7 @@ stiffness = [{stiffness}]
 """
 
 
-def test_a_spring_of_another_fmu_is_kept_in_check(tmp_path: Path) -> None:
+def test_a_spring_of_another_fmu_is_kept_in_check(tmp_path):
     """Its near end goes its own way, as an output of the FMU that holds the spring."""
     for name, rate in (("Far", 9.0), ("Near", 5.0)):
         python_fmu_of(tmp_path, MOVES.format(name=name, rate=rate), f"{name}{uuid.uuid4().hex}")
@@ -311,9 +301,7 @@ def test_a_spring_of_another_fmu_is_kept_in_check(tmp_path: Path) -> None:
         ("y", "-1.0", "out of range: give a number >= 0"),
     ],
 )
-def test_a_spring_that_is_not_there_is_told(
-    tmp_path: Path, position: str, stiffness: str, why: str
-) -> None:
+def test_a_spring_that_is_not_there_is_told(tmp_path, position, stiffness, why):
     for name in ("Far", "Near"):
         python_fmu_of(tmp_path, MOVES.format(name=name, rate=1.0), f"{name}{uuid.uuid4().hex}")
     with pytest.raises(SceneFault, match=why):

@@ -2,8 +2,6 @@
 that are late and lost, wrapped angles. What the coupling gives to both sides is counted from the
 forces and motions alone."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -57,7 +55,7 @@ class Coupling:
         late = Late(held, Link(latency, Fraction(1, 1000)))
         if row:
             return late
-        return WithFurther(late, lambda: self.credit.copy(), (self.back, self.credit))  # type: ignore[arg-type]
+        return WithFurther(late, lambda: self.credit.copy(), (self.back, self.credit))
 
     def read(self, pose: Vector) -> Vector:
         wrapped = pose.copy()
@@ -133,9 +131,7 @@ class Coupling:
     st.sampled_from([0.0, 0.0, 0.2]),
     st.sampled_from([(0.0, 0.0, 0.0), (0.004, 0.004, 0.0), (0.0, 0.02, 0.3)]),
 )
-def test_the_coupling_gives_both_sides_no_more_than_it_got(
-    seed: int, every: int, wrapped: bool, against: float, link: tuple[float, float, float]
-) -> None:
+def test_the_coupling_gives_both_sides_no_more_than_it_got(seed, every, wrapped, against, link):
     """At every tick, beyond one step's sampling surplus and the unforeseen steps themselves; each
     of these is counted here, none is bounded by what the hold says."""
     generator = np.random.default_rng(seed)

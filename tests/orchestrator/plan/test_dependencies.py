@@ -1,7 +1,5 @@
 """The order of plants: that of their connections, whatever the order of the file; loops named."""
 
-from __future__ import annotations
-
 from itertools import permutations
 from pathlib import Path
 
@@ -25,13 +23,13 @@ def wired(folder: Path, names: tuple[str, ...], *wires: tuple[str, str]) -> Path
 
 
 @pytest.fixture
-def fmus(tmp_path: Path) -> Path:
+def fmus(tmp_path):
     for name in CHAIN:
         python_fmu(tmp_path, name, "self.y = self.u + size")
     return tmp_path
 
 
-def test_the_order_of_the_file_changes_nothing_in_a_chain(fmus: Path) -> None:
+def test_the_order_of_the_file_changes_nothing_in_a_chain(fmus):
     for k, names in enumerate(permutations(CHAIN)):
         path = wired(fmus, names, ("a", "b"), ("b", "c"))
         experiment = simulate(str(path), fmus / f"{k}", [COUPLING])
@@ -49,7 +47,7 @@ def test_the_order_of_the_file_changes_nothing_in_a_chain(fmus: Path) -> None:
         ("jacobi", []),
     ],
 )
-def test_a_loop_is_named(fmus: Path, coupling: str, found: list[dict[str, object]]) -> None:
+def test_a_loop_is_named(fmus, coupling, found):
     path = wired(fmus, ("b", "c", "a"), ("b", "c"), ("c", "b"), ("c", "a"))
     experiment = simulate(str(path), fmus / "out", [f"coupling={coupling}"])
     assert experiment.results.run["loops"] == found
@@ -57,10 +55,10 @@ def test_a_loop_is_named(fmus: Path, coupling: str, found: list[dict[str, object
     assert ("loop b -> c -> b: b, c in this order" in told) == bool(found)
 
 
-def test_direct_dependencies_order_a_loop(fmus: Path) -> None:
+def test_direct_dependencies_order_a_loop(fmus):
     """b's outputs follow its input of the instant, c's do not: c goes first."""
 
-    def without(text: str) -> str:
+    def without(text):
         outputs = text[text.index("<Outputs>") : text.index("</Outputs>")]
         return text.replace(outputs, outputs.replace("<Unknown ", '<Unknown dependencies="" '))
 

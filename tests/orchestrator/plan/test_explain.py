@@ -1,9 +1,6 @@
 """`--explain`, phases and recorded traces: the printed plan is the plan that is executed."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +11,7 @@ from hapticlink.orchestrator.results import tables
 from tests.shared_fixtures import status
 
 
-def test_explain_tells_blocks_and_the_samples_behind_inputs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_explain_tells_blocks_and_the_samples_behind_inputs(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     arguments = ["run", "closed-loop", "--explain", "--set", "graphics.rate=128"]
     assert status(*arguments, "--set", "hold=foh") == 0
@@ -33,9 +28,7 @@ def test_explain_tells_blocks_and_the_samples_behind_inputs(
     assert rows == [(t, t, "4" if t == "4" else "0") for t in "01234"]
 
 
-def test_a_run_keeps_what_explain_prints(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_keeps_what_explain_prints(tmp_path, capsys):
     options = ["--set", "duration=0.2", "--set", "graphics.rate={min=20, max=60, seed=2}"]
     told = []
     for how in (["--explain"], ["--no-figures", "--out", str(tmp_path)]):
@@ -48,9 +41,7 @@ def test_a_run_keeps_what_explain_prints(
 @pytest.mark.parametrize(
     "option", ["graphics.rate={min=20, max=60, seed=2}", "delays.hand.F={min=0.001, max=0.02}"]
 )
-def test_what_does_not_come_round_is_told_to_its_end(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
-) -> None:
+def test_what_does_not_come_round_is_told_to_its_end(tmp_path, capsys, option):
     options = ["--set", "duration=1.5", "--set", "haptics.rate=500", "--set", option]
     scene = "closed-loop-direct" if option.startswith("delays") else "closed-loop"
     assert status("run", scene, "--explain", *options) == 0
@@ -67,7 +58,7 @@ def test_what_does_not_come_round_is_told_to_its_end(
 
 
 @pytest.mark.parametrize("align", ["exact", "tick"])
-def test_a_phase_moves_the_frames(tmp_path: Path, align: str) -> None:
+def test_a_phase_moves_the_frames(tmp_path, align):
     options = ["duration=0.2", "graphics.phase=0.01", f"graphics.align={align}"]
     experiment = simulate("closed-loop", tmp_path, options)
     assert experiment.outcome.fault is None
@@ -92,12 +83,12 @@ def test_a_phase_moves_the_frames(tmp_path: Path, align: str) -> None:
         (["downsampling=zoh"], "there are latest, mean"),
     ],
 )
-def test_bad_rates_and_delays_are_told(tmp_path: Path, options: list[str], why: str) -> None:
+def test_bad_rates_and_delays_are_told(tmp_path, options, why):
     with pytest.raises(Fault, match=why):
         simulate("closed-loop", tmp_path, options)
 
 
-def test_a_recorded_trace_is_a_list_of_frames_beside_its_scene(tmp_path: Path) -> None:
+def test_a_recorded_trace_is_a_list_of_frames_beside_its_scene(tmp_path):
     stamps = ["1.600", "1.617", "1.634", "1.700  # a hitch", "1.716", "1.8"]
     (tmp_path / "frames.csv").write_text("time,fps\n" + "\n".join(stamps))
     scene = tmp_path / "traced.toml"
@@ -118,7 +109,7 @@ def test_a_recorded_trace_is_a_list_of_frames_beside_its_scene(tmp_path: Path) -
         ("0.1", "1 time stamps"),
     ],
 )
-def test_what_is_no_trace_is_told_by_its_line(tmp_path: Path, text: str, why: str) -> None:
+def test_what_is_no_trace_is_told_by_its_line(tmp_path, text, why):
     (tmp_path / "frames.csv").write_text(text)
     with pytest.raises(Fault, match=re.escape(why)):
         simulate("closed-loop", tmp_path, [f"graphics.rate={{trace='{tmp_path}/frames.csv'}}"])

@@ -1,10 +1,7 @@
 """Phases of blocks: clocks of their own, holds, --explain, run.json, SSP, sweeps, faults."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +17,7 @@ from tests.shared_fixtures import sets, status
 
 
 @given(st.sampled_from([(1, 4), (1, 2), (3, 4), (1, 1)]), st.sampled_from(["haptics", "graphics"]))
-def test_a_phase_of_our_block_moves_it_alone(share: tuple[int, int], rate: str) -> None:
+def test_a_phase_of_our_block_moves_it_alone(share, rate):
     part = Fraction(*share)
     phase = part / (512 if rate == "haptics" else 30)
     options = [f'phases.virtual_mechanism="{phase}"', f"mechanism_at={rate}"]
@@ -34,9 +31,7 @@ def test_a_phase_of_our_block_moves_it_alone(share: tuple[int, int], rate: str) 
     assert starts[2] * time.base == phase * (1 + 1 / part)
 
 
-def test_explain_and_run_json_tell_phases(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_explain_and_run_json_tell_phases(tmp_path, capsys):
     options = ["phases.virtual_mechanism=0.0005", "duration=0.1"]
     assert status("run", "closed-loop", "--explain", *sets(options)) == 0
     told = capsys.readouterr().out
@@ -59,9 +54,7 @@ def test_explain_and_run_json_tell_phases(
     assert age["min"] == age["max"] == pytest.approx(1 / 512 - 0.0005, rel=1e-15)
 
 
-def test_explain_goes_on_until_all_phases_have_begun_and_come_again(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_explain_goes_on_until_all_phases_have_begun_and_come_again(tmp_path, capsys):
     options = ["graphics.rate=128", "phases.virtual_mechanism='1/1024'"]
     assert status("run", "closed-loop", "--explain", *sets(options)) == 0
     told = capsys.readouterr().out
@@ -70,7 +63,7 @@ def test_explain_goes_on_until_all_phases_have_begun_and_come_again(
     assert rows == [("0", "0"), ("1", "0"), ("3", "2"), ("5", "4"), ("7", "6"), ("9", "8")]
 
 
-def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path: Path) -> None:
+def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path):
     options = ["duration=0.02", "hold=foh", "downsampling=mean"]
     options += ["phases.virtual_mechanism='1/1024'", "holds.controller.F_drift=lead"]
     run = simulate("closed-loop", tmp_path, options).results.run
@@ -87,7 +80,7 @@ def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path:
     assert "controller.F_drift -> virtual_mechanism.F_drift" in run["energies"]
 
 
-def test_rates_and_phases_survive_an_ssp(tmp_path: Path) -> None:
+def test_rates_and_phases_survive_an_ssp(tmp_path):
     options = ["duration=0.2", "graphics.phase=0.01", "phases.virtual_mechanism='1/1024'"]
     options += ["phases.controller=0.0005"]
     assert status("export", "closed-loop", "--out", str(tmp_path), *sets(options)) == 0
@@ -101,7 +94,7 @@ def test_rates_and_phases_survive_an_ssp(tmp_path: Path) -> None:
         assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
 
 
-def test_a_sweep_varies_phases() -> None:
+def test_a_sweep_varies_phases():
     points = [{"phases.virtual_mechanism": text} for text in ("0.0005", "1/1024", "0.002")]
     made = jobs("closed-loop", [], points)
     assert [j.scene and j.scene.phases["virtual_mechanism"] for j in made] == [
@@ -128,7 +121,7 @@ def test_a_sweep_varies_phases() -> None:
         (["graphics.phase='now'"], "graphics.phase", "'now' should be a number (s)"),
     ],
 )
-def test_phases_that_make_no_sense_are_told(options: list[str], key: str, why: str) -> None:
+def test_phases_that_make_no_sense_are_told(options, key, why):
     with pytest.raises(SceneFault) as refused:
         open_scene.load("closed-loop", options)
     (finding,) = refused.value.findings

@@ -43,9 +43,7 @@ couplings = st.sampled_from(sorted(SCHEMES))
 
 @shared
 @given(timelines, couplings)
-def test_no_get_after_set_without_a_step_between(
-    stamped: Make, timeline: Timeline, coupling: str
-) -> None:
+def test_no_get_after_set_without_a_step_between(stamped, timeline, coupling):
     plan = Plan(stamped(timeline, coupling))
     dirty: set[str] = set()
     for _, event in plan:
@@ -59,7 +57,7 @@ def test_no_get_after_set_without_a_step_between(
                     assert fmu not in dirty
 
 
-def test_get_after_set_reads_and_pushes_what_the_new_inputs_give(stamped: Make) -> None:
+def test_get_after_set_reads_and_pushes_what_the_new_inputs_give(stamped):
     """Once the step has ended, its feed-through outputs are those of the inputs of that instant."""
     plan = Plan(stamped(fixed(Fraction(100), Fraction(50), 10, "tick"), "jacobi"))
     plant = next(u.name for u in plan.system.fmus if not u.sampled and plan.system.into(u.name))
@@ -74,9 +72,7 @@ def test_get_after_set_reads_and_pushes_what_the_new_inputs_give(stamped: Make) 
 
 @shared
 @given(timelines, couplings)
-def test_every_fmu_is_stepped_without_gap_or_overlap(
-    stamped: Make, timeline: Timeline, coupling: str
-) -> None:
+def test_every_fmu_is_stepped_without_gap_or_overlap(stamped, timeline, coupling):
     plan = Plan(stamped(timeline, coupling))
     reached = dict.fromkeys(plan.system.fmu, 0)
     rows = {c.name: 0 for c in timeline.clocks}
@@ -96,9 +92,7 @@ def test_every_fmu_is_stepped_without_gap_or_overlap(
 
 @shared
 @given(timelines, st.sampled_from(CAUSAL), st.sampled_from([{}, {"mechanism": 3}]))
-def test_nothing_reads_the_future_and_holds_give_the_newest(
-    stamped: Make, timeline: Timeline, coupling: str, substeps: dict[str, int]
-) -> None:
+def test_nothing_reads_the_future_and_holds_give_the_newest(stamped, timeline, coupling, substeps):
     """Of every clock: what it puts out is used at the first tick at or after its stamp, by plants,
     in all their substeps, and by sampled blocks. Jacobi's sampled outputs come an event later."""
     system = with_coupling(stamped(timeline, coupling), substeps=substeps)
@@ -113,9 +107,7 @@ def test_nothing_reads_the_future_and_holds_give_the_newest(
 
 @shared
 @given(timelines, couplings)
-def test_ages_are_those_of_every_use_until_the_pattern_repeats(
-    stamped: Make, timeline: Timeline, coupling: str
-) -> None:
+def test_ages_are_those_of_every_use_until_the_pattern_repeats(stamped, timeline, coupling):
     plan = Plan(stamped(timeline, coupling))
     ages: dict[str, list[int]] = {}
     for tick, connection, stamp in uses(plan, pattern_end(plan.system)):
@@ -130,9 +122,7 @@ def test_ages_are_those_of_every_use_until_the_pattern_repeats(
 
 @shared
 @given(timelines, st.sampled_from(CAUSAL))
-def test_ages_do_not_grow_after_the_first_repetition(
-    stamped: Make, timeline: Timeline, coupling: str
-) -> None:
+def test_ages_do_not_grow_after_the_first_repetition(stamped, timeline, coupling):
     plan = Plan(stamped(timeline, coupling))
     found, seconds = delays(plan), timeline.seconds
     for tick, connection, stamp in uses(plan):
@@ -141,7 +131,7 @@ def test_ages_do_not_grow_after_the_first_repetition(
             assert age.min <= seconds(tick - stamp) <= age.max
 
 
-def test_gauss_seidel_delays_nothing_and_jacobi_the_sampled_by_one_period(stamped: Make) -> None:
+def test_gauss_seidel_delays_nothing_and_jacobi_the_sampled_by_one_period(stamped):
     timeline = fixed(Fraction(512), Fraction(30), 512)
     period = 1 / 512
     for coupling, late in (("gauss-seidel", 0.0), ("jacobi", period)):

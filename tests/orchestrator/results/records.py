@@ -1,7 +1,5 @@
 """A run.json for results that no run has made."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

@@ -1,12 +1,9 @@
 """Two runs into one folder: the second gets an error at once, and nothing of the first is lost."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import pytest
 
@@ -20,10 +17,10 @@ from tests.shared_fixtures import status
 RUN = "import hapticlink as hl; print(hl.run('pendulum', out={!r}, figures=False).folder)"
 
 
-def test_a_second_run_is_refused_at_once(tmp_path: Path) -> None:
+def test_a_second_run_is_refused_at_once(tmp_path):
     refusals: list[str] = []
 
-    def second(time: float) -> None:
+    def second(time):
         if refusals:
             return
         command = [sys.executable, "-c", RUN.format(str(tmp_path / "out"))]
@@ -39,10 +36,10 @@ def test_a_second_run_is_refused_at_once(tmp_path: Path) -> None:
     assert status("run", "pendulum", "--out", tmp_path / "out", "--no-figures") == 0  # afterwards
 
 
-def test_a_thread_of_this_process_is_refused_too(tmp_path: Path) -> None:
+def test_a_thread_of_this_process_is_refused_too(tmp_path):
     outcomes: list[object] = []
 
-    def run() -> None:
+    def run():
         try:
             outcomes.append(simulate("pendulum", tmp_path / "out").outcome.reason)
         except InputFault as fault:
@@ -57,13 +54,13 @@ def test_a_thread_of_this_process_is_refused_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"duration": -1}, {"stop_when": "no.such > 1"}])
-def test_a_refused_run_leaves_no_folder(tmp_path: Path, wrong: dict[str, object]) -> None:
+def test_a_refused_run_leaves_no_folder(tmp_path, wrong):
     with pytest.raises(InputFault):
         hl.run("pendulum", wrong, out=tmp_path / "runs" / "out")
     assert not [*tmp_path.iterdir()]
 
 
-def test_a_killed_run_leaves_no_lock(tmp_path: Path) -> None:
+def test_a_killed_run_leaves_no_lock(tmp_path):
     lines = (
         "from pathlib import Path; import os",
         "from hapticlink.orchestrator.results.folder_lock import held",
@@ -75,7 +72,7 @@ def test_a_killed_run_leaves_no_lock(tmp_path: Path) -> None:
         assert not [*tmp_path.iterdir()]
 
 
-def test_many_at_once_leave_one_whole_run(tmp_path: Path) -> None:
+def test_many_at_once_leave_one_whole_run(tmp_path):
     command = [*COMMAND, "pendulum", "--out", str(tmp_path / "o")]
     started = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(3)]
     ends = [(process.communicate()[1], process.returncode) for process in started]

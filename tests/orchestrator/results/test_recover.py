@@ -1,12 +1,9 @@
 """A run that is killed loses no row, and long runs keep nothing in memory."""
 
-from __future__ import annotations
-
 import json
 import resource
 import signal
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,7 +21,7 @@ KILLS = f"if time >= {LAST}: __import__('os').kill(__import__('os').getpid(), 9)
 
 
 @pytest.mark.parametrize("extra", ["", "isolate = true\n"])
-def test_a_run_that_is_killed_keeps_every_row(tmp_path: Path, extra: str) -> None:
+def test_a_run_that_is_killed_keeps_every_row(tmp_path, extra):
     """By an FMU, before the first block of rows was full; or with all FMUs of others in processes
     of their own, from outside, where no watchdog is."""
     body = KILLS if not extra else f"if time >= {LAST}: __import__('time').sleep(1000)"
@@ -52,7 +49,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path: Path, extra: str) -> Non
     np.testing.assert_array_equal(table["time"], np.arange(LAST * 64 + 1) / 64)
 
 
-def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path: Path) -> None:
+def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
     """The process is killed while it writes a block: rows that the table has already are left out,
     one that it has in part is whole in the block, or is counted as lost."""
     values = np.zeros(2)
@@ -74,7 +71,7 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path: Path) -> None:
     assert recover(tmp_path) == {}
 
 
-def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
+def test_memory_does_not_grow_with_the_run(tmp_path):
     """Two more minutes at 4096 Hz are 12 MB of rows; the largest memory of the process grows by a
     fraction of that."""
     c_fmu(tmp_path)

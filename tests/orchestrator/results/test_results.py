@@ -21,9 +21,7 @@ def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
 
 
 @given(st.lists(st.floats(allow_nan=False), min_size=3, max_size=3))
-def test_every_float_reads_back_to_the_bit(
-    tmp_path_factory: pytest.TempPathFactory, values: list[float]
-) -> None:
+def test_every_float_reads_back_to_the_bit(tmp_path_factory, values):
     path = tmp_path_factory.getbasetemp() / "floats.csv"
     with recorder_of(path, ["a.x", "a.P[1,1]", "a.P[1,2]"], np.array(values)) as recorder:
         recorder.row(1 / 3)
@@ -34,10 +32,10 @@ def test_every_float_reads_back_to_the_bit(
     ]
 
 
-def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path: Path) -> None:
+def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path):
     path, view = tmp_path / "rows.csv", np.zeros(1)
 
-    def record_and_break() -> None:
+    def record_and_break():
         with recorder_of(path, ["y"], view) as recorder:
             for k in range(5):
                 view[0] = k
@@ -50,7 +48,7 @@ def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path: Path) 
     assert read_table(path)["y"].tolist() == list(range(5))
 
 
-def test_vectors_and_matrices_stack(tmp_path: Path) -> None:
+def test_vectors_and_matrices_stack(tmp_path):
     path = tmp_path / "m.csv"
     columns = [f"e.L[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)]
     with recorder_of(path, columns, np.arange(6.0)) as recorder:
@@ -71,7 +69,7 @@ def test_vectors_and_matrices_stack(tmp_path: Path) -> None:
         (["a.x", "a.x[1]"], 0),
     ],
 )
-def test_entries_stack_by_their_indices(tmp_path: Path, columns: list[str], value: Any) -> None:
+def test_entries_stack_by_their_indices(tmp_path, columns, value):
     path = tmp_path / "x.csv"
     with recorder_of(path, columns, np.arange(float(len(columns)))) as recorder:
         recorder.row(0.0)
@@ -81,7 +79,7 @@ def test_entries_stack_by_their_indices(tmp_path: Path, columns: list[str], valu
     assert found[1].tolist() == value
 
 
-def test_arrays_of_records_have_their_own_names(tmp_path: Path) -> None:
+def test_arrays_of_records_have_their_own_names(tmp_path):
     path = tmp_path / "x.csv"
     with recorder_of(path, ["a.leg[1].x[1]", "a.leg[1].x[2]", "a.leg[2].y"], np.arange(3.0)) as r:
         r.row(0.0)
@@ -91,13 +89,13 @@ def test_arrays_of_records_have_their_own_names(tmp_path: Path) -> None:
     assert "a.leg" not in table
 
 
-def test_nan_is_written_as_such(tmp_path: Path) -> None:
+def test_nan_is_written_as_such(tmp_path):
     with recorder_of(tmp_path / "n.csv", ["y"], np.array([math.nan])) as recorder:
         recorder.row(0.0)
     assert math.isnan(read_table(tmp_path / "n.csv")["y"][0])
 
 
-def test_the_end_of_a_run_is_written_over_what_is_there(tmp_path: Path) -> None:
+def test_the_end_of_a_run_is_written_over_what_is_there(tmp_path):
     """The first that fits, on no more bytes than there were; where none fits, all stays."""
     path = tmp_path / "run.json"
     write(path, text({"end": "running"}) + b" " * 100)

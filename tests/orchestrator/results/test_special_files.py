@@ -1,11 +1,8 @@
 """Results of an earlier run that are no files, or have no end: a run replaces them, and what reads
 them refuses them at once."""
 
-from __future__ import annotations
-
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -61,21 +58,19 @@ def endless_story(out: Path) -> None:
 
 
 @pytest.fixture
-def out(tmp_path: Path) -> Path:
+def out(tmp_path):
     hl.run("pendulum", {"duration": 0.05}, out=tmp_path / "out", figures=False)
     return tmp_path / "out"
 
 
 @pytest.mark.parametrize("spoil", [fifo, endless, brackets, folder_in_the_list, endless_story])
-def test_a_run_replaces_them(out: Path, spoil: Callable[[Path], None]) -> None:
+def test_a_run_replaces_them(out, spoil):
     spoil(out)
     assert status("run", "pendulum", "--set", "duration=0.1", "--out", out, "--no-figures") == 0
     assert tables.load(out).haptics["time"][-1] == pytest.approx(0.1, abs=2e-3)
 
 
-def test_a_folder_in_the_place_of_run_json_is_told(
-    out: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_in_the_place_of_run_json_is_told(out, capsys):
     folder_as_story(out)
     assert status("run", "pendulum", "--out", out, "--no-figures") != 0
     assert "it is no file" in capsys.readouterr().err
@@ -84,7 +79,7 @@ def test_a_folder_in_the_place_of_run_json_is_told(
 @pytest.mark.parametrize(
     "spoil", [fifo, endless, endless_rows, one_line, brackets, folder_as_story, endless_story]
 )
-def test_what_reads_them_refuses_them(out: Path, spoil: Callable[[Path], None]) -> None:
+def test_what_reads_them_refuses_them(out, spoil):
     spoil(out)
     for read in (tables.load, hl.load):
         with pytest.raises(InputFault, match=str(out)):
@@ -97,7 +92,7 @@ def test_what_reads_them_refuses_them(out: Path, spoil: Callable[[Path], None]) 
             recover(out)
 
 
-def test_rows_that_are_a_pipe_beside_a_table_hang_nothing(out: Path) -> None:
+def test_rows_that_are_a_pipe_beside_a_table_hang_nothing(out):
     os.mkfifo(out / "haptics.rows")
     assert recover(out) == {}
     assert status("recover", out) == 0

@@ -1,8 +1,6 @@
 """Energy of connections whose numbers are converted on the way, or stand apart on the board: the
 sampled spring in closed form, whatever its units, factors and the order of its outputs."""
 
-from __future__ import annotations
-
 import uuid
 from pathlib import Path
 
@@ -47,7 +45,7 @@ def path(t: NDArray[np.float64]) -> NDArray[np.float64]:
 def made(folder: Path, name: str, units: tuple[str, str], *parts: object) -> None:
     keys = ("input", "outputs", "motion")
     text = SLAVE.format(name=name, **dict(zip(keys, parts, strict=True)))
-    entry, output = str(parts[0]), parts[1][0][0][0]  # type: ignore[index]
+    entry, output = str(parts[0]), parts[1][0][0][0]
     said = {f"{n}[{i}]": u for n, u in zip((entry, output), units, strict=True) for i in (1, 2)}
     with_units(python_fmu_of(folder, text, uuid.uuid4().hex), **said)
 
@@ -102,9 +100,7 @@ def energies(experiment: Experiment) -> dict[str, NDArray[np.float64]]:
 @pytest.mark.parametrize("length", ["m", "mm"])
 @pytest.mark.parametrize("force", ["N", "kN"])
 @pytest.mark.parametrize(("factor", "offset"), [(1.0, 0.0), (-2.5, 0.0), (0.5, 0.004)])
-def test_a_sampled_spring_through_conversions(
-    tmp_path: Path, length: str, force: str, factor: float, offset: float
-) -> None:
+def test_a_sampled_spring_through_conversions(tmp_path, length, force, factor, offset):
     fmus(tmp_path, length, force)
     found = energies(run(tmp_path, f"factor = {factor}\noffset = {offset}\n"))
     stiffness, push = factor * STIFFNESS, offset * {"N": 1.0, "kN": 1e3}[force]
@@ -118,9 +114,7 @@ def test_a_sampled_spring_through_conversions(
 
 
 @pytest.mark.parametrize("hold", ["passive", "nepce"])
-def test_holds_that_keep_account_do_so_in_the_units_of_the_target(
-    tmp_path: Path, hold: str
-) -> None:
+def test_holds_that_keep_account_do_so_in_the_units_of_the_target(tmp_path, hold):
     head = f'holds."spring.F[1]" = "{hold}"\nholds."spring.F[2]" = "{hold}"\n'
     fmus(tmp_path)
     plain = energies(run(tmp_path, head=head))
@@ -132,7 +126,7 @@ def test_holds_that_keep_account_do_so_in_the_units_of_the_target(
     assert (plain["generated"] < 0.2 * energies(run(tmp_path))["generated"]).all()
 
 
-def test_a_vector_whose_entries_stand_apart_is_booked_as_one(tmp_path: Path) -> None:
+def test_a_vector_whose_entries_stand_apart_is_booked_as_one(tmp_path):
     fmus(tmp_path, "mm", "kN")
     one_by_one = energies(run(tmp_path))
     text = FMUS + (BACK + PULL).replace("[{0}]", "")

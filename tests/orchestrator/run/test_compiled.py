@@ -1,9 +1,6 @@
 """The compiled loop writes the bytes of the one in Python: every scene, hold, scheme and fault."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -55,14 +52,14 @@ def both(
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_every_shipped_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_every_shipped_scene(tmp_path, monkeypatch, name):
     run, left = both(name, tmp_path, monkeypatch, "duration=0.1")
     assert run["fault"] is None
     assert not left
 
 
 @pytest.mark.parametrize("hold", [*HOLDS.names()])
-def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) -> None:
+def test_every_hold(tmp_path, monkeypatch, hold):
     kind = "downsampling" if HOLDS[hold].downsamples else "hold"
     options = [f"{kind}={hold}", *NO_MATRICES, "graphics.rate=60", "duration=0.3"]
     run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options)
@@ -72,7 +69,7 @@ def test_every_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str) 
     assert sum(link["lost"] for link in run["links"].values())
 
 
-def test_matrices_that_are_extrapolated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_matrices_that_are_extrapolated(tmp_path, monkeypatch):
     tables = []
     for choice in ("python", "compiled"):
         monkeypatch.setenv(CHOICE, choice)
@@ -84,9 +81,7 @@ def test_matrices_that_are_extrapolated(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("hold", ["passive", "nepce"])
-def test_a_tank_that_both_sides_share(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hold: str
-) -> None:
+def test_a_tank_that_both_sides_share(tmp_path, monkeypatch, hold):
     options = [f"hold={hold}", "graphics.rate=30", "duration=0.5"]
     options += [f"holds.controller.{end}=pspm" for end in ("x_S", "v_S")]
     for late in ([], ["delays.controller.x_S={ min = 0.001, max = 0.05, loss = 0.2, seed = 3 }"]):
@@ -107,9 +102,7 @@ def test_a_tank_that_both_sides_share(
     ],
     ids=lambda options: options[0],
 )
-def test_every_scheme_and_rate(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str]
-) -> None:
+def test_every_scheme_and_rate(tmp_path, monkeypatch, options):
     both("closed-loop", tmp_path, monkeypatch, "duration=0.2", *options)
 
 
@@ -140,9 +133,7 @@ hold = "smooth"
     ("coupling", "isolate"),
     [("gauss-seidel", ""), ("jacobi", ""), ("jacobi", "isolate = true")],
 )
-def test_substeps_and_isolated_fmus(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coupling: str, isolate: str
-) -> None:
+def test_substeps_and_isolated_fmus(tmp_path, monkeypatch, coupling, isolate):
     python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
     text = STEPS.format(coupling=coupling).replace("rate = 24", f"rate = 24\n{isolate}")
     _, left = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
@@ -159,9 +150,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("policy", ["", "faults.nan=hold", "faults.discard=retry"])
 @pytest.mark.parametrize("body", FAULTS.values(), ids=FAULTS)
-def test_faults_of_python_fmus(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, policy: str
-) -> None:
+def test_faults_of_python_fmus(tmp_path, monkeypatch, body, policy):
     python_fmu(tmp_path, "Fails", body, canGetAndSetFMUstate=True)
     options = [policy] if policy else []
     both(str(scene(tmp_path, fmu_table("one", "Fails"))), tmp_path, monkeypatch, *options)
@@ -174,9 +163,7 @@ LEFT = {
 
 
 @pytest.mark.parametrize("error", LEFT)
-def test_exceptions_that_a_python_fmu_leaves_behind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: str
-) -> None:
+def test_exceptions_that_a_python_fmu_leaves_behind(tmp_path, monkeypatch, error):
     """The library of pythonfmu checks neither an integer's size nor a status that has no truth
     value: it goes on with -1, or with a step that is taken."""
     python_fmu(tmp_path, "Leaves", LEFT[error])
@@ -185,7 +172,7 @@ def test_exceptions_that_a_python_fmu_leaves_behind(
 
 
 @pytest.mark.parametrize("mode", range(1, 5))
-def test_every_status_of_a_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int) -> None:
+def test_every_status_of_a_step(tmp_path, monkeypatch, mode):
     c_fmu(tmp_path)
     text = fmu_table("one", "faults", f"start.mode = {mode}\n")
     run, _ = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
@@ -200,9 +187,7 @@ REPEATED: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize("how", REPEATED)
-def test_steps_that_are_taken_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
-) -> None:
+def test_steps_that_are_taken_back(tmp_path, monkeypatch, how):
     """The two-mass oscillator, iterated."""
     coupling, settings = REPEATED[how]
     fmus = held(tmp_path)
@@ -237,20 +222,18 @@ def test_steps_that_are_taken_back(
         ["duration=20"],
     ],
 )
-def test_kinds_of_events_are_bound_before_the_loop(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str]
-) -> None:
+def test_kinds_of_events_are_bound_before_the_loop(tmp_path, monkeypatch, options):
     """Those that the plan gives, in their order; within the time of the loop only those beyond the
     communication points that it knows from the start."""
     bound: list[list[Event]] = []
     late: list[Event] = []
     original, new = Events.prepare, Events._new_kind
 
-    def prepare(events: Events, kinds: Iterable[Event]) -> None:
+    def prepare(events, kinds):
         bound.append([*kinds])
         original(events, bound[-1])
 
-    def new_kind(events: Events) -> None:
+    def new_kind(events):
         late.append(events._event(events._key.tolist()))
         new(events)
 

@@ -1,8 +1,6 @@
 """Each hold in C returns the bits of its Python class, whatever it is given; those of matrices
 agree to rounding, since Python takes the eigenvectors of LAPACK."""
 
-from __future__ import annotations
-
 import ctypes
 import subprocess
 import sys
@@ -69,13 +67,13 @@ class Pair:
         self.compiled = CompiledHold(load(), loop, own, places, held, shared)
 
     def _made(self, name: str, wrapped: str, moves: bool) -> Hold:
-        reader = Reader(self.signals, self.position, np.ones(SIZE))  # type: ignore[arg-type]
+        reader = Reader(self.signals, self.position, np.ones(SIZE))
         turns, sampled = np.array([0.0, 0.0, 2 * np.pi * (wrapped == "angle")]), wrapped == "late"
         near = NearEnd(reader, turns, 0.02, seconds, reader if moves else None, sampled)
         tank = EnergyTank(np.array([40.0, 3.0, 7.0]), np.full(SIZE, 0.5), near)
         needed = (tank, 0) if HOLDS[name].needs == "spring" else None
         scale = np.array([2.0, -1.0, 0.5])
-        x, v = (Reader(self.signals, at, scale) for at in (self.position, self.velocity))  # type: ignore[arg-type]
+        x, v = (Reader(self.signals, at, scale) for at in (self.position, self.velocity))
         context = HoldContext(SIZE, seconds, x, v if moves else None, needed)
         if wrapped == "angle":
             return Unwrapped(lambda: HOLDS[name](context), [0, 2], [2 * np.pi, 360.0])
@@ -96,7 +94,7 @@ def _counted(hold: Hold) -> list[float]:
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=6, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_holds_in_c_are_those_in_python(name: str, wrapped: str, seed: int) -> None:
+def test_holds_in_c_are_those_in_python(name, wrapped, seed):
     generator = np.random.default_rng(seed)
     pair = Pair(name, wrapped, generator)
     holds = (pair.python, pair.compiled)
@@ -114,24 +112,21 @@ def test_holds_in_c_are_those_in_python(name: str, wrapped: str, seed: int) -> N
         stamp = int(generator.integers(stamp, tick + 1)) if generator.random() < 0.8 else stamp
     assert _counted(pair.compiled) == _counted(pair.python)
     if wrapped == "late":
-        ways = [hold.link for hold in (pair.python, pair.compiled)]  # type: ignore[union-attr]
+        ways = [hold.link for hold in (pair.python, pair.compiled)]
         counts = [(way.sent, way.lost, way.overtaken) for way in ways]
         assert counts[0] == counts[1]
 
 
 @pytest.mark.parametrize("size", [1, 2])
 @pytest.mark.parametrize("name", [name for name in NAMES if HOLDS[name].needs == "power"])
-def test_a_long_path_is_added_up_in_the_same_order(name: str, size: int) -> None:
+def test_a_long_path_is_added_up_in_the_same_order(name, size):
     """Of one entry NumPy adds eight numbers or more in an order of its own. 20 steps of the target
     for each sample, which comes 13 of them late; the force works against a motion at about 1 m/s,
     so that the friction is within its limits."""
     generator, signals = np.random.default_rng(1), Signals()
 
-    def made() -> Hold:
-        x, v = (
-            Reader(signals, [*range(i, i + size)], np.ones(size))  # type: ignore[arg-type]
-            for i in (SIZE, 2 * SIZE)
-        )
+    def made():
+        x, v = (Reader(signals, [*range(i, i + size)], np.ones(size)) for i in (SIZE, 2 * SIZE))
         return HOLDS[name](HoldContext(size, seconds, x, v))
 
     loop = loop_over(signals.values)
@@ -174,9 +169,7 @@ def both(
 @pytest.mark.parametrize("name", MATRICES)
 @settings(max_examples=5, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 10))
-def test_holds_of_matrices_in_c_are_those_in_python(
-    name: str, wrap: type[Projector | Semidefinite], late: bool, seed: int, rows: int
-) -> None:
+def test_holds_of_matrices_in_c_are_those_in_python(name, wrap, late, seed, rows):
     """To the rounding errors of the matrix whose eigenvalues are taken. A projector has more of
     them the closer the smallest eigenvalue that it keeps is to the largest that it drops."""
     generator = np.random.default_rng(seed)
@@ -185,7 +178,7 @@ def test_holds_of_matrices_in_c_are_those_in_python(
     assert python
     tick, rank = 0, rows
 
-    def compare(tick: int, ahead: float) -> None:
+    def compare(tick, ahead):
         expected, found = (np.array(hold.value(tick, ahead)) for hold in holds)
         atol = 1e-8
         if isinstance(python, Semidefinite):
@@ -210,9 +203,7 @@ def test_holds_of_matrices_in_c_are_those_in_python(
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 10), st.integers(-12, 12))
-def test_a_matrix_without_negative_eigenvalues_stays_as_it_is(
-    seed: int, n: int, power: int
-) -> None:
+def test_a_matrix_without_negative_eigenvalues_stays_as_it_is(seed, n, power):
     """Jacobi's method finds eigenvectors that are orthonormal and belong to their eigenvalues: of
     multiple ones and zeros, too."""
     generator = np.random.default_rng(seed)
@@ -225,7 +216,7 @@ def test_a_matrix_without_negative_eigenvalues_stays_as_it_is(
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 6])
-def test_diagonal_projectors_stay_as_they_are(n: int) -> None:
+def test_diagonal_projectors_stay_as_they_are(n):
     _, compiled, _living = both(Projector, "lead", n)
     diagonal = np.diag(np.arange(n) % 2 == 0).astype(float).ravel()
     compiled.push(0, diagonal, 0)
@@ -234,7 +225,7 @@ def test_diagonal_projectors_stay_as_they_are(n: int) -> None:
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("name", MATRICES)
-def test_what_is_no_projector_has_a_rank_within_its_rows(name: str) -> None:
+def test_what_is_no_projector_has_a_rank_within_its_rows(name):
     """Of traces that are negative, or beyond the largest integer of C, or overflow."""
     generator, rows = np.random.default_rng(4), 3
     *holds, _living = both(Projector, name, rows)
@@ -277,6 +268,6 @@ assert np.array_equal(held, values)
 """
 
 
-def test_a_large_array_takes_no_place_on_the_stack() -> None:
+def test_a_large_array_takes_no_place_on_the_stack():
     """Of 256 KB: that of a thread is 512 KB on macOS, and an FMU may have a million numbers."""
     subprocess.run([sys.executable, "-c", LARGE], check=True)

@@ -1,7 +1,5 @@
 """Scenes with contacts, further hands or a local model: what is refused, and that they run."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import Table
 
 TOUCHED = "duration=0.6"
 """By then the hand has moved a link to the wall."""
@@ -70,18 +67,18 @@ TOUCHED = "duration=0.6"
         ("local-model", "mechanism_at=graphics", "runs at the graphics rate itself"),
     ],
 )
-def test_what_is_refused(scene: str, option: str, message: str) -> None:
+def test_what_is_refused(scene, option, message):
     with pytest.raises(SceneFault, match=message):
         open_scene.load(scene, option.split(";"))
 
 
 @pytest.fixture(scope="module")
-def walls(tmp_path_factory: pytest.TempPathFactory) -> Table:
+def walls(tmp_path_factory):
     """The haptic rows of `enclosure`, whose contacts are detected at the graphics rate."""
     return simulate("enclosure", tmp_path_factory.mktemp("walls"), [TOUCHED]).results.haptics
 
 
-def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path: Path, walls: Table) -> None:
+def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path, walls):
     """Against a run without walls: the force of the walls turns the motion around."""
     alone = ["controller.contact=false", "contacts.enclosure=[[-1,-1],[1,-1],[1,1],[-1,1]]"]
     free = simulate("enclosure", tmp_path, [TOUCHED, *alone]).results.haptics
@@ -93,9 +90,7 @@ def test_the_hand_feels_the_wall_and_the_link_stays_out_of_it(tmp_path: Path, wa
     assert free["virtual_mechanism.x[1]"].max() > walls["virtual_mechanism.x[1]"].max() + 2e-3
 
 
-def test_detection_at_the_graphics_rate_is_near_that_at_the_haptic_rate(
-    tmp_path: Path, walls: Table
-) -> None:
+def test_detection_at_the_graphics_rate_is_near_that_at_the_haptic_rate(tmp_path, walls):
     assert open_scene.load("enclosure").contacts.detection == "graphics"
     options = [TOUCHED, "contacts.detection=haptics"]
     near = simulate("enclosure", tmp_path, options).results.haptics
@@ -103,7 +98,7 @@ def test_detection_at_the_graphics_rate_is_near_that_at_the_haptic_rate(
     assert np.abs(x - there).max() < 1e-4
 
 
-def test_a_pendulum_keeps_e_squared_of_its_energy_at_each_limit(tmp_path: Path) -> None:
+def test_a_pendulum_keeps_e_squared_of_its_energy_at_each_limit(tmp_path):
     """Released at 1 rad from the vertical, at which it is stopped: V = m g l (1 - cos 1)."""
     limits = "{upper=-1.5707963267948966, stiffness=2000.0, restitution=0.7}"
     options = ["duration=2.0", "linkage.start={pivot=-2.5707963267948966}"]
@@ -116,7 +111,7 @@ def test_a_pendulum_keeps_e_squared_of_its_energy_at_each_limit(tmp_path: Path) 
     assert rows["virtual_mechanism.F_env"][:, 0].min() < -10  # the hand is pushed back
 
 
-def test_a_second_hand_holds_its_point(tmp_path: Path) -> None:
+def test_a_second_hand_holds_its_point(tmp_path):
     two = simulate("two-hands", tmp_path, ["duration=0.5"]).results.haptics
     for i in (1, 2, 3):
         grip = two[f"hand_left.F[{i}]"]
@@ -127,7 +122,7 @@ def test_a_second_hand_holds_its_point(tmp_path: Path) -> None:
     np.testing.assert_allclose(step, (speed[1:] + speed[:-1]) / 2, atol=1e-4)
 
 
-def test_the_first_hand_feels_the_second(tmp_path: Path) -> None:
+def test_the_first_hand_feels_the_second(tmp_path):
     """The handle accelerates as the operational point does under the other hand's force alone, from
     the first tick on."""
     point = "linkage.point=[{name='left', body='link4', at=[0.02, 0.0]}]"
@@ -149,7 +144,7 @@ def test_contact_rows_are_never_mixed(tmp_path):
     assert "foh" in str(holds.values())
 
 
-def test_the_copy_follows_free_objects(tmp_path: Path) -> None:
+def test_the_copy_follows_free_objects(tmp_path):
     """push-disc until the disc has been hit: geometry that the graphics block finds gives nearly
     the motion of geometry that the mechanism finds."""
     q = []
@@ -163,7 +158,7 @@ def test_the_copy_follows_free_objects(tmp_path: Path) -> None:
     assert np.abs(q[0] - q[1]).max() < 0.2 * moved
 
 
-def test_contacts_that_are_too_deep_or_too_stiff_are_warned_of(tmp_path: Path) -> None:
+def test_contacts_that_are_too_deep_or_too_stiff_are_warned_of(tmp_path):
     """The disc starts on the axis of link 2, whose radius is 3 mm; b/m of the discs is 1/0.2 ms."""
     options = ["duration=0.02", "mechanism.events=0", "contacts.damping=300"]
     options.append("linkage.start.disc=[0.0445, 0.0148, 0.0]")
@@ -181,9 +176,7 @@ def test_contacts_that_are_too_deep_or_too_stiff_are_warned_of(tmp_path: Path) -
         ("graphics", "rk4", False),
     ],
 )
-def test_that_a_frame_of_contacts_changes_the_energy_is_told(
-    tmp_path: Path, detection: str, integrator: str, told: bool
-) -> None:
+def test_that_a_frame_of_contacts_changes_the_energy_is_told(tmp_path, detection, integrator, told):
     """Of the method that makes none, which only holds between two frames: the energy rises there by
     more than the wrenches on the arm do in work."""
     options = ["duration=1.0", "graphics.rate=10", f"contacts.detection={detection}"]

@@ -3,8 +3,6 @@
 On real FMUs, against closed forms and the two-mass oscillator's numbers, computed independently.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -46,7 +44,7 @@ UNTIL = Fraction("1.06")
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+def fmus(tmp_path_factory):
     return held(tmp_path_factory.mktemp("oscillator"))
 
 
@@ -61,9 +59,7 @@ def largest(fmus: Fmus, folder: Path, rate: int, between: str, substeps: int) ->
 @pytest.mark.parametrize(
     ("between", "substeps", "published"), [("foh", 2, 1.73e-3), ("hermite", 8, 7.8e-7)]
 )
-def test_error_of_the_two_mass_oscillator(
-    fmus: Fmus, tmp_path: Path, between: str, substeps: int, published: float
-) -> None:
+def test_error_of_the_two_mass_oscillator(fmus, tmp_path, between, substeps, published):
     found = largest(fmus, tmp_path, 100, between, substeps)
     assert found == pytest.approx(published, rel=0.02)
 
@@ -72,18 +68,16 @@ def test_error_of_the_two_mass_oscillator(
     ("between", "substeps", "order"),
     [("zoh", 1, 1), ("foh", 1, 2), ("second-order", 4, 3), ("hermite", 4, 4)],
 )
-def test_order_is_that_of_the_interpolation(
-    fmus: Fmus, tmp_path: Path, between: str, substeps: int, order: int
-) -> None:
+def test_order_is_that_of_the_interpolation(fmus, tmp_path, between, substeps, order):
     rates = [50, 100, 200]
     errors = [largest(fmus, tmp_path, rate, between, substeps) for rate in rates]
     assert observed_order(rates, errors) == pytest.approx(order, abs=0.1)
 
 
-def test_both_methods_find_the_same(fmus: Fmus, tmp_path: Path) -> None:
+def test_both_methods_find_the_same(fmus, tmp_path):
     tables = []
     for method in ("aitken", "newton"):
-        how = Iteration(method=method, tolerance=1e-11)  # type: ignore[arg-type]
+        how = Iteration(method=method, tolerance=1e-11)
         made = iterated(fmus, Fraction(1, 2), "foh", iteration=how)
         outcome, table = simulate(made, tmp_path)
         assert outcome.fault is None
@@ -91,7 +85,7 @@ def test_both_methods_find_the_same(fmus: Fmus, tmp_path: Path) -> None:
     np.testing.assert_allclose(tables[0], tables[1], atol=1e-7)
 
 
-def test_what_was_iterated_is_counted(fmus: Fmus, tmp_path: Path) -> None:
+def test_what_was_iterated_is_counted(fmus, tmp_path):
     made = system(
         fmus, ROWS, "iterated", Fraction(1, 100), Fraction(1, 2), between="foh", substeps=3
     )
@@ -104,12 +98,12 @@ def test_what_was_iterated_is_counted(fmus: Fmus, tmp_path: Path) -> None:
     assert (calls["save"], calls["rollback"]) == (50, found.rollbacks)
 
 
-def test_it_reads_the_future_and_says_so(fmus: Fmus) -> None:
+def test_it_reads_the_future_and_says_so(fmus):
     plan = Plan(system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh"))
     assert all(use.stamp == use.tick + 1 for use in uses(plan))
 
 
-def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus: Fmus, tmp_path: Path) -> None:
+def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus, tmp_path):
     """Linear interpolation holds the mean of the source's samples, so it generates no energy: the
     work of both books is the same."""
     outcome, _ = simulate(iterated(fmus, UNTIL, "foh", power=POWER), tmp_path)
@@ -121,17 +115,17 @@ def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus: Fmus, tmp_path:
 STIFF = (100.0, 300.0, 2e4, 200.0)
 
 
-def test_newton_converges_where_the_fixed_point_does_not(tmp_path: Path) -> None:
+def test_newton_converges_where_the_fixed_point_does_not(tmp_path):
     made = stiff(tmp_path, *STIFF)
 
-    def coupled(coupling: str, rate: int, method: str = "newton") -> tuple[object, float]:
+    def coupled(coupling, rate, method="newton"):
         outcome, table = simulate(
             system(
                 made, ROWS, coupling, Fraction(1, rate), Fraction(1),
                 between="foh" if coupling == "iterated" else None,
                 substeps=2,
                 get_after_set=("two",),
-                iteration=Iteration(method=method),  # type: ignore[arg-type]
+                iteration=Iteration(method=method),
             ),
             tmp_path,
         )  # fmt: skip
@@ -149,14 +143,14 @@ def test_newton_converges_where_the_fixed_point_does_not(tmp_path: Path) -> None
     assert fine < coarse / 12  # order 2
 
 
-def test_an_fmu_that_cannot_roll_back_is_named(fmus: Fmus) -> None:
+def test_an_fmu_that_cannot_roll_back_is_named(fmus):
     rigid = {"one": fmus["one"], "two": replace(fmus["two"], flags=frozenset())}
     made = system(rigid, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh")
     with pytest.raises(InputFault, match=r"two cannot save .*canGetAndSetFMUstate"):
         list(delays(Plan(made)))
 
 
-def test_fmus_in_processes_of_their_own_roll_back_too(fmus: Fmus, tmp_path: Path) -> None:
+def test_fmus_in_processes_of_their_own_roll_back_too(fmus, tmp_path):
     made = iterated(fmus, Fraction(1, 10), "foh", substeps=2)
     _, here = simulate(made, tmp_path)
     units = tuple(replace(u, isolate=True) for u in made.fmus)
@@ -165,7 +159,7 @@ def test_fmus_in_processes_of_their_own_roll_back_too(fmus: Fmus, tmp_path: Path
     np.testing.assert_array_equal(apart.rows, here.rows)
 
 
-def test_a_hold_that_does_not_interpolate_is_refused(fmus: Fmus) -> None:
+def test_a_hold_that_does_not_interpolate_is_refused(fmus):
     made = system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh", hold="delayed")
     assert {c.hold for c in made.connections} == {"foh"}
 
@@ -174,9 +168,7 @@ def test_a_hold_that_does_not_interpolate_is_refused(fmus: Fmus) -> None:
 
 
 @pytest.mark.parametrize(("a", "b"), [(2.0, 0.25), (2.0, 3.0), (-5.0, 4.0), (-1.0, 1.0)])
-def test_start_values_go_through_a_feed_through_loop_of_any_gain(
-    tmp_path: Path, a: float, b: float
-) -> None:
+def test_start_values_go_through_a_feed_through_loop_of_any_gain(tmp_path, a, b):
     """y_a = a y_b + 1, y_b = b y_a - 3."""
     parts = described([gain("a", a, 1.0), gain("b", b, -3.0)], tmp_path)
     rows = [("a.y", "b.u"), ("b.y", "a.u")]
@@ -185,7 +177,7 @@ def test_start_values_go_through_a_feed_through_loop_of_any_gain(
     assert table["a.y"][0] == pytest.approx((1 - 3 * a) / (1 - a * b), rel=1e-12)
 
 
-def test_a_loop_without_start_values_is_an_error_that_names_it(tmp_path: Path) -> None:
+def test_a_loop_without_start_values_is_an_error_that_names_it(tmp_path):
     parts = described([gain("a", 2.0, 1.0), gain("b", 0.5, -3.0)], tmp_path)
     rows = [("a.y", "b.u"), ("b.y", "a.u")]
     made = system(parts, rows, "jacobi", Fraction(1), Fraction(1))
@@ -197,7 +189,7 @@ def test_a_loop_without_start_values_is_an_error_that_names_it(tmp_path: Path) -
 # --- order from dependencies --------------------------------------------------------------
 
 
-def test_an_input_that_no_output_follows_makes_no_order(tmp_path: Path) -> None:
+def test_an_input_that_no_output_follows_makes_no_order(tmp_path):
     """b takes a's y directly, a takes b's into its state only: a goes first."""
     parts = described([gain("a", 2.0, 1.0, "sampled"), gain("b", 3.0, 0.0, "sampled")], tmp_path)
     rows = [("a.y", "b.u"), ("b.y", "a.w")]
@@ -210,7 +202,7 @@ def test_an_input_that_no_output_follows_makes_no_order(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table["b.y"], 3.0)
 
 
-def test_a_ring_of_direct_dependencies_is_named(tmp_path: Path) -> None:
+def test_a_ring_of_direct_dependencies_is_named(tmp_path):
     parts = described([gain("a", 2.0, 1.0, "sampled"), gain("b", 3.0, 0.0, "sampled")], tmp_path)
     rows = [("a.y", "b.u"), ("b.y", "a.u")]
     made = system(parts, rows, "gauss-seidel", Fraction(1), Fraction(4))
@@ -218,7 +210,7 @@ def test_a_ring_of_direct_dependencies_is_named(tmp_path: Path) -> None:
         list(delays(Plan(made)))
 
 
-def test_a_ring_opens_where_only_unread_outputs_are_direct(tmp_path: Path) -> None:
+def test_a_ring_opens_where_only_unread_outputs_are_direct(tmp_path):
     """b.y follows b.u at once, but only b.z is read: z_{k+1} = y_{k-1}, y_k = 2 z_k + 1."""
     parts = described([gain("a", 2.0, 1.0, "sampled"), gain("b", 3.0, 0.0, "sampled")], tmp_path)
     rows = [("a.y", "b.u"), ("a.y", "b.w"), ("b.z", "a.u")]
@@ -257,7 +249,7 @@ def scene(fmus: Fmus, coupling: str, settings: str) -> Scene:
     return read(SCENE.format(coupling=coupling, settings=settings, folder=folder))
 
 
-def test_a_scene_is_iterated_as_it_says(fmus: Fmus, tmp_path: Path) -> None:
+def test_a_scene_is_iterated_as_it_says(fmus, tmp_path):
     settings = 'iteration = { method = "newton", interpolation = "hermite" }\nsubsteps.one = 2'
     found = experiment.simulate(scene(fmus, "iterated", settings), tmp_path).results.run
     assert found["fault"] is None
@@ -268,7 +260,7 @@ def test_a_scene_is_iterated_as_it_says(fmus: Fmus, tmp_path: Path) -> None:
     assert found["iterations"]["jacobians"] >= 1
 
 
-def test_hermite_gives_way_where_a_source_has_no_derivative(tmp_path: Path) -> None:
+def test_hermite_gives_way_where_a_source_has_no_derivative(tmp_path):
     """No connection of this scene takes `hold`, so it is not `hold` that does not fit."""
     bare = held(tmp_path)
     edited(bare["two"].path, lambda text: text.replace('"der(F)"', '"F_rate"'))
@@ -294,6 +286,6 @@ def test_hermite_gives_way_where_a_source_has_no_derivative(tmp_path: Path) -> N
         ("step_control = { tolerance = 1.0 }", "with a higher rate or `substeps`"),
     ],
 )
-def test_settings_that_cannot_be_are_told(fmus: Fmus, settings: str, key: str) -> None:
+def test_settings_that_cannot_be_are_told(fmus, settings, key):
     with pytest.raises(SceneFault, match=key):
         scene(fmus, "iterated", settings)

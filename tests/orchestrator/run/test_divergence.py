@@ -1,7 +1,5 @@
 """A run that diverges with finite values is reported and does not end with status 0."""
 
-from pathlib import Path
-
 import pytest
 
 from hapticlink.orchestrator.base.faults import Diverged
@@ -19,9 +17,7 @@ from tests.shared_fixtures import status
 
 @pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
 @pytest.mark.parametrize(("start", "bound", "rows"), [(0.0, "1e+12", 3), (2e5, "2e+17", 5)])
-def test_an_output_beyond_1e12_of_its_start(
-    tmp_path: Path, start: float, bound: str, rows: int, isolate: str
-) -> None:
+def test_an_output_beyond_1e12_of_its_start(tmp_path, start, bound, rows, isolate):
     slave = SLAVE.format(name="Grows", body="self.y = self.y + 1e4 ** self.steps")
     text = slave.replace("0.0, 0.0, 1.0", f"0.0, {start}, 1.0")
     with_units(python_fmu_of(tmp_path, text, "grows"), y="m")
@@ -32,7 +28,7 @@ def test_an_output_beyond_1e12_of_its_start(
     assert len(found.haptics["time"]) == rows
 
 
-def test_a_held_output_is_bounded_too(tmp_path: Path) -> None:
+def test_a_held_output_is_bounded_too(tmp_path):
     body = "self.y = float('nan') if self.steps < 3 else 1e13"
     with_units(python_fmu(tmp_path, "Grows", body), y="m")
     experiment, found = run(tmp_path, fmu_table("one", "Grows"), "faults.nan=hold")
@@ -40,14 +36,14 @@ def test_a_held_output_is_bounded_too(tmp_path: Path) -> None:
     assert found.run["held_outputs"] == {"one": 2}
 
 
-def test_a_whole_number_is_bounded_by_its_type(tmp_path: Path) -> None:
+def test_a_whole_number_is_bounded_by_its_type(tmp_path):
     python_fmu(tmp_path, "Counts", "self.steps = 2_000_000_000")
     experiment, found = run(tmp_path, fmu_table("one", "Counts"))
     assert experiment.outcome.fault is None
     assert found.haptics["one.steps"][-1] == 2e9
 
 
-def test_closures_that_come_apart_by_a_link(tmp_path: Path) -> None:
+def test_closures_that_come_apart_by_a_link(tmp_path):
     """Its links are 40, 120 and 90 mm long, 83 mm in the mean."""
     options = ["haptics.rate=20", "mechanism.stabilization=none"]
     outcome = simulate("four-bar", tmp_path, options).outcome
@@ -56,7 +52,7 @@ def test_closures_that_come_apart_by_a_link(tmp_path: Path) -> None:
     assert "beyond 0.0833: the run has diverged" in str(outcome.fault)
 
 
-def test_energy_that_nobody_put_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_energy_that_nobody_put_in(tmp_path, capsys):
     """A pendulum of 2.5 kg and 0.2 m gains with every step that is too long for its method."""
     fine, coarse = "haptics.rate=100", "haptics.rate=3"
     heun = "mechanism.integrator=heun"
@@ -68,12 +64,12 @@ def test_energy_that_nobody_put_in(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "pendulum: diverged at 10 s" in told.out
 
 
-def test_what_wrenches_and_drives_put_in_is_no_divergence(tmp_path: Path) -> None:
+def test_what_wrenches_and_drives_put_in_is_no_divergence(tmp_path):
     for scene in ("single-body", "four-bar", "two-hands", "obstacles"):
         assert simulate(scene, tmp_path / scene, ["duration=0.3"]).outcome.fault is None
 
 
-def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path: Path) -> None:
+def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path):
     """The report's gains are those of a mechanism at 512 Hz, not at 10; a hand that pushes the
     handle out does so in good order."""
     options = [
@@ -92,9 +88,7 @@ def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path: Pa
     assert (pushed.reason, pushed.fault) == ("stop_when", None)
 
 
-def test_holds_that_make_more_than_was_put_in_are_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_holds_that_make_more_than_was_put_in_are_told(tmp_path, capsys):
     assert status("run", "sampled-spring", "--no-figures", "--out", tmp_path) == 0
     said = "neither hands nor mechanism put in any on the whole: the loop is not passive"
     assert said in capsys.readouterr().out

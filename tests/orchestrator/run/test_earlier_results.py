@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -53,13 +52,7 @@ def elsewhere(folder: Path) -> None:
     ],
     ids=["damaged entry", "other platform", "other guid", "fault before the first row"],
 )
-def test_what_fails_before_its_first_row_takes_nothing(
-    tmp_path: Path,
-    make: Callable[[Path], object],
-    exit_status: int,
-    said: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_fails_before_its_first_row_takes_nothing(tmp_path, make, exit_status, said, capsys):
     c_fmu(tmp_path)
     path, out = scene(tmp_path, ONE), tmp_path / "out"
     assert status("run", path, "--no-figures", "--out", out) == 0
@@ -70,7 +63,7 @@ def test_what_fails_before_its_first_row_takes_nothing(
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
 
 
-def test_without_an_earlier_row_the_fault_stands_in_run_json(tmp_path: Path) -> None:
+def test_without_an_earlier_row_the_fault_stands_in_run_json(tmp_path):
     nan_at_the_start(tmp_path)
     for _ in range(2):  # the second finds the first, which has no row
         experiment, _ = run(tmp_path, ONE)
@@ -80,7 +73,7 @@ def test_without_an_earlier_row_the_fault_stands_in_run_json(tmp_path: Path) -> 
         assert found.haptics["one.y"].tolist() == []
 
 
-def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path: Path) -> None:
+def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path):
     c_fmu(tmp_path)
     run(tmp_path, ONE)
     nan_at_the_start(tmp_path)
@@ -91,9 +84,7 @@ def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path: Path) 
     assert tables.load(tmp_path / "out").run["end"]["reason"] == "duration"
 
 
-def test_json_of_a_run_without_rows_tells_its_fault(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_of_a_run_without_rows_tells_its_fault(tmp_path, capsys):
     """Its folder keeps those of the earlier run, and with them an earlier run.json."""
     c_fmu(tmp_path)
     path, out = scene(tmp_path, ONE), tmp_path / "out"
@@ -105,7 +96,7 @@ def test_json_of_a_run_without_rows_tells_its_fault(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
-def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path: Path) -> None:
+def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path):
     """No file may grow beyond 16 kB: the FMU is unpacked, the first row is written, and run.json,
     which keeps room for its end, does not fit."""
     c_fmu(tmp_path)
@@ -123,7 +114,7 @@ def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path: Path) ->
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
 
 
-def test_links_are_replaced_not_followed(bar: Path, tmp_path: Path) -> None:
+def test_links_are_replaced_not_followed(bar, tmp_path):
     out, other = tmp_path / "out", tmp_path / "other"
     out.mkdir()
     other.write_text("mine")

@@ -1,9 +1,6 @@
 """The energy of a held force: closed forms of a sampled spring, and where holds are refused."""
 
-from __future__ import annotations
-
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +15,7 @@ FORCE = "hand.F -> virtual_mechanism.F_hand"
 
 
 @pytest.mark.parametrize("rate", [20, 64])
-def test_a_sampled_spring_makes_half_k_dx_squared(tmp_path: Path, rate: int) -> None:
+def test_a_sampled_spring_makes_half_k_dx_squared(tmp_path, rate):
     experiment = simulate("sampled-spring", tmp_path, [f"haptics.rate={rate}"])
     assert experiment.outcome.fault is None
     x = experiment.results.haptics["virtual_mechanism.x"][:, 0]
@@ -35,9 +32,7 @@ def test_a_sampled_spring_makes_half_k_dx_squared(tmp_path: Path, rate: int) -> 
 
 @settings(max_examples=25)
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1), st.sampled_from([1.0, -1.0]))
-def test_a_spring_renewed_more_rarely_than_the_target_steps(
-    every: int, seed: int, sign: float
-) -> None:
+def test_a_spring_renewed_more_rarely_than_the_target_steps(every, seed, sign):
     """1/2 K sum dx^2 over the renewals, on any path between them, and over folded rows."""
     path = np.cumsum(np.random.default_rng(seed).normal(size=(4 * ROWS + 1, 3)), axis=0)
     stiffness = np.array([100.0, 50.0, 2.0])
@@ -60,7 +55,7 @@ def test_a_spring_renewed_more_rarely_than_the_target_steps(
 
 @settings(max_examples=25)
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1))
-def test_a_fast_spring_held_by_a_slow_target(every: int, seed: int) -> None:
+def test_a_fast_spring_held_by_a_slow_target(every, seed):
     """The target moves in straight lines over `every` samples: it gets the newest only."""
     generator = np.random.default_rng(seed)
     frames = np.cumsum(generator.normal(size=2 * ROWS // every + 2))
@@ -83,7 +78,7 @@ def test_a_fast_spring_held_by_a_slow_target(every: int, seed: int) -> None:
 
 
 @pytest.mark.parametrize("between", [1, 2])
-def test_a_constant_force_generates_nothing(between: int) -> None:
+def test_a_constant_force_generates_nothing(between):
     """It does F dx, held or not, from the first sample to the last, between two of the target's
     steps, and over folded rows."""
     path = np.cumsum(np.random.default_rng(5).normal(size=3 * ROWS))
@@ -105,7 +100,7 @@ def test_a_constant_force_generates_nothing(between: int) -> None:
     assert abs(energy.generated) < 1e-9
 
 
-def test_a_passive_hold_takes_back_what_sampling_makes(tmp_path: Path) -> None:
+def test_a_passive_hold_takes_back_what_sampling_makes(tmp_path):
     made = {}
     for hold in ("zoh", "passive", "nepce"):
         experiment = simulate("sampled-spring", tmp_path, [f"holds.hand.F={hold}"])
@@ -115,7 +110,7 @@ def test_a_passive_hold_takes_back_what_sampling_makes(tmp_path: Path) -> None:
     assert abs(made["nepce"]) < 0.01 * made["zoh"]
 
 
-def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
+def test_power_across_rates_is_told_and_kept_in_check(tmp_path):
     forces = {
         "hand.F -> virtual_mechanism.F_hand",
         "controller.F_drift -> virtual_mechanism.F_drift",
@@ -143,8 +138,6 @@ def test_power_across_rates_is_told_and_kept_in_check(tmp_path: Path) -> None:
         ("holds.controller.nothing=foh", "is no connection of this scene"),
     ],
 )
-def test_a_hold_that_cannot_work_is_refused_with_a_reason(
-    tmp_path: Path, option: str, why: str
-) -> None:
+def test_a_hold_that_cannot_work_is_refused_with_a_reason(tmp_path, option, why):
     with pytest.raises(SceneFault, match=why):
         simulate("closed-loop", tmp_path, [option])

@@ -9,7 +9,6 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +39,7 @@ OTHER = fmu_table("other", "Other")
 
 
 @pytest.fixture(autouse=True)
-def crash_monitor_of_runs() -> None:
+def crash_monitor_of_runs():
     """Runs start their watchdog."""
 
 
@@ -55,7 +54,7 @@ def children() -> set[str]:
 
 
 @pytest.fixture(autouse=True)
-def _nothing_left_behind(own_temporary_folder: Path) -> Iterator[None]:
+def _nothing_left_behind(own_temporary_folder):
     server()  # stays for the next command
     before = folders(), children(), list(sys.path), os.getcwd()
     yield
@@ -70,9 +69,7 @@ def _nothing_left_behind(own_temporary_folder: Path) -> Iterator[None]:
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 @pytest.mark.parametrize("value", ["float('nan')", "float('inf')"])
-def test_a_value_that_is_not_finite_stops_or_is_held(
-    tmp_path: Path, value: str, isolate: str
-) -> None:
+def test_a_value_that_is_not_finite_stops_or_is_held(tmp_path, value, isolate):
     body = f"self.y = {value} if self.steps == 5 else float(self.steps)"
     python_fmu(tmp_path, "Lost", body)
     one = fmu_table("one", "Lost", isolate)
@@ -85,7 +82,7 @@ def test_a_value_that_is_not_finite_stops_or_is_held(
     assert found.run["held_outputs"] == {"one": 1}
 
 
-def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path: Path) -> None:
+def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path):
     never = SLAVE.format(name="Never", body="pass").replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1")
     python_fmu_of(tmp_path, never, "never")
     experiment, _ = run(tmp_path, fmu_table("one", "Never"), "faults.nan=hold")
@@ -98,7 +95,7 @@ HALF = "\n        ".join(
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path: Path, isolate: str) -> None:
+def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path, isolate):
     python_fmu(tmp_path, "Stiff", HALF, canGetAndSetFMUstate=True)
     one = fmu_table("one", "Stiff", isolate)
     experiment, found = run(tmp_path, one)
@@ -111,7 +108,7 @@ def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path: Path, isol
     assert found.run["smaller_steps"] == {"one": 32}
 
 
-def test_a_retry_that_cannot_be_says_why(tmp_path: Path) -> None:
+def test_a_retry_that_cannot_be_says_why(tmp_path):
     python_fmu(tmp_path, "Stiff", "return False")
     experiment, _ = run(tmp_path, fmu_table("one", "Stiff"), "faults.discard=retry")
     assert "not retried: the FMU lacks canGetAndSetFMUstate" in str(experiment.outcome.fault)
@@ -121,7 +118,7 @@ def test_a_retry_that_cannot_be_says_why(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_an_exception_in_a_python_fmu(tmp_path: Path, isolate: str) -> None:
+def test_an_exception_in_a_python_fmu(tmp_path, isolate):
     python_fmu(tmp_path, "Raises", "if time > 0.2: raise RuntimeError('broken gear')")
     python_fmu(tmp_path, "Other")
     experiment, found = run(tmp_path, fmu_table("one", "Raises", isolate) + OTHER)
@@ -141,14 +138,7 @@ def test_an_exception_in_a_python_fmu(tmp_path: Path, isolate: str) -> None:
         (4, "fatal", []),
     ],
 )
-def test_every_status(
-    tmp_path: Path,
-    mode: int,
-    named: str | None,
-    calls: list[str],
-    isolate: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_every_status(tmp_path, mode, named, calls, isolate, monkeypatch):
     """What is called after a fault: FMI 2.0.5 sections 2.1.3 and 4.2.4."""
     log = tmp_path / "log"
     monkeypatch.setenv("FAULT_FMU_LOG", str(log))
@@ -175,9 +165,7 @@ def test_every_status(
         ("if time > 0.2: __import__('time').sleep(60)", "did not answer within 2 s"),
     ],
 )
-def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(
-    tmp_path: Path, body: str, how: str
-) -> None:
+def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(tmp_path, body, how):
     python_fmu(tmp_path, "Dies", body)
     ended = tmp_path / "ended"
     said = f"\n    def terminate(self):\n        open({str(ended)!r}, 'w').close()\n"
@@ -193,7 +181,7 @@ def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(
     assert ended.exists()  # the other FMU was terminated
 
 
-def test_a_native_endless_loop_is_ended(tmp_path: Path) -> None:
+def test_a_native_endless_loop_is_ended(tmp_path):
     c_fmu(tmp_path)
     text = fmu_table("one", "faults", ISOLATED + "start.mode = 6\n")
     experiment, found = run(tmp_path, text, "faults.timeout=2")
@@ -201,7 +189,7 @@ def test_a_native_endless_loop_is_ended(tmp_path: Path) -> None:
     assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
 
 
-def test_isolated_runs_give_the_same_bytes(tmp_path: Path) -> None:
+def test_isolated_runs_give_the_same_bytes(tmp_path):
     python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
     text = fmu_table("one", "Gives") + fmu_table("two", "Gives", "rate = 24\n")
     text += wire_table("one.y", "two.u", "factor = 0.3\n") + wire_table("two.y", "one.u")
@@ -213,7 +201,7 @@ def test_isolated_runs_give_the_same_bytes(tmp_path: Path) -> None:
             assert (tmp_path / out / table).read_bytes() == (tmp_path / "a" / table).read_bytes()
 
 
-def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) -> None:
+def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path):
     for name, value in (("first", 1.0), ("second", 2.0)):
         (tmp_path / name).mkdir()
         slave = SLAVE.format(name="Same", body=f"self.y = {value}")
@@ -230,9 +218,7 @@ def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
-    tmp_path: Path, isolate: str
-) -> None:
+def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(tmp_path, isolate):
     c_fmu(tmp_path, python=True)
     path = scene(tmp_path, fmu_table("one", "faults", isolate))
     log = tmp_path / "log"
@@ -242,7 +228,7 @@ def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(
 
 
 @pytest.mark.parametrize("command", ["run", "run isolated", "sweep"])
-def test_threads_that_an_fmu_leaves_running_keep_no_process(tmp_path: Path, command: str) -> None:
+def test_threads_that_an_fmu_leaves_running_keep_no_process(tmp_path, command):
     """Python waits for them before it ends."""
     wait = "__import__('threading').Thread(target=__import__('time').sleep, args=[600]).start()"
     python_fmu(tmp_path, "Bad", f"self.steps > 1 or {wait}")
@@ -268,9 +254,7 @@ TERMINATE = """
     ("body", "isolate"),
     [("raise RuntimeError('stuck brake')", ISOLATED), ("raise SystemExit(3)", "")],
 )
-def test_an_exception_in_terminate_is_told_after_the_last_row(
-    tmp_path: Path, body: str, isolate: str
-) -> None:
+def test_an_exception_in_terminate_is_told_after_the_last_row(tmp_path, body, isolate):
     """Two of them: after a fatal error an FMU is not even freed, and the next is terminated. In a
     process of its own, as it once ended by SIGSEGV, with nothing on stderr."""
     slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format(body)
@@ -285,7 +269,7 @@ def test_an_exception_in_terminate_is_told_after_the_last_row(
     assert (found.run["end"]["reason"], found.haptics["time"][-1]) == ("fault", 0.5)
 
 
-def test_a_process_that_dies_in_terminate_is_told(tmp_path: Path) -> None:
+def test_a_process_that_dies_in_terminate_is_told(tmp_path):
     slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format("__import__('os')._exit(3)")
     python_fmu_of(tmp_path, slave, tmp_path.name)
     experiment, found = run(tmp_path, fmu_table("one", "Bad", ISOLATED))
@@ -302,9 +286,7 @@ def test_a_process_that_dies_in_terminate_is_told(tmp_path: Path) -> None:
         ("__import__('os').abort()", -signal.SIGABRT),
     ],
 )
-def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
-    tmp_path: Path, crash: str, status: int
-) -> None:
+def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, crash, status):
     python_fmu(tmp_path, "Dies", f"self.y = time + size\n        if time >= 2.0: {crash}")
     path, out = scene(tmp_path, fmu_table("one", "Dies"), duration=5), tmp_path / "out"
     command = [*RUN, str(path), "--out", str(out)]
@@ -320,7 +302,7 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(
     assert not folders()
 
 
-def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path: Path) -> None:
+def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path):
     name = "hapticlink.orchestrator.base.temporary_folders"
     made = f"import {name} as folders; print(folders.new()); {{}}"
     kill = "__import__('os').kill(__import__('os').getpid(), 9)"
@@ -339,9 +321,7 @@ def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path:
 
 
 @pytest.mark.parametrize(("number", "isolate"), [(signal.SIGINT, ""), (signal.SIGTERM, ISOLATED)])
-def test_a_signal_keeps_results_and_exits_with_1(
-    tmp_path: Path, number: signal.Signals, isolate: str
-) -> None:
+def test_a_signal_keeps_results_and_exits_with_1(tmp_path, number, isolate):
     started = tmp_path / "started"
     body = f"""__import__('time').sleep(0.01)
         if time > 0.3 and self.steps % 10 == 0:
@@ -366,7 +346,7 @@ def test_a_signal_keeps_results_and_exits_with_1(
     assert found.haptics["time"][-1] == found.run["end"]["time"] >= 0.3
 
 
-def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path: Path) -> None:
+def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path):
     most = 40_000
     limit = f"__import__('resource').setrlimit({resource.RLIMIT_FSIZE}, ({most}, {most}))"
     python_fmu(tmp_path, "Fine", f"self.y = 1 / 3 + time; self.steps == 1 and {limit}")
@@ -395,7 +375,7 @@ FILLS = """
 
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="no disk of one's own")
 @pytest.mark.parametrize("step", [50, 320])
-def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step: int) -> None:
+def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path, step):
     """A disk of 768 kB that fills up before any row is written, and with the last."""
     disk = tmp_path / "disk"
     disk.mkdir()
@@ -421,7 +401,7 @@ def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path: Path, step:
 
 
 @pytest.mark.parametrize("gone", [".py", "slavemodule.txt"])
-def test_a_python_fmu_without_its_module_is_told(tmp_path: Path, gone: str) -> None:
+def test_a_python_fmu_without_its_module_is_told(tmp_path, gone):
     """The libraries of pythonfmu crash the process."""
     path = python_fmu(tmp_path, "Bare")
     with zipfile.ZipFile(path) as archive:
@@ -435,7 +415,7 @@ def test_a_python_fmu_without_its_module_is_told(tmp_path: Path, gone: str) -> N
     assert said in str(experiment.outcome.fault)
 
 
-def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path: Path) -> None:
+def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path):
     python_fmu(tmp_path, "Gives")
     text = 'extends = "closed-loop"\n' + fmu_table("one", "Gives")
     (tmp_path / "scene.toml").write_text(text + wire_table("one.y", "controller.x_D[1]"))

@@ -1,11 +1,8 @@
 """A run fetches, sets and records no more than is used, with the same results."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -34,7 +31,7 @@ def columns(folder: Path) -> dict[str, list[list[str]]]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Experiment, dict[str, Any]]:
+def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     return ran(folder), columns(folder)
 
@@ -45,13 +42,7 @@ LIST = '["hand", "virtual_mechanism.x", "virtual_environment.P_c[1,2]"]'
 @pytest.mark.parametrize(
     ("signals", "every"), [("all", 7), ("connected", 1), ("none", 7), (LIST, 7)]
 )
-def test_recorded_columns_are_those_of_the_whole_table(
-    whole: tuple[Experiment, dict[str, Any]],
-    tmp_path: Path,
-    signals: str,
-    every: int,
-    loop: str,
-) -> None:
+def test_recorded_columns_are_those_of_the_whole_table(whole, tmp_path, signals, every, loop):
     """Each column in each row to the byte, and all else that a run tells."""
     found = ran(tmp_path, f"record.signals={signals}", f"record.every={every}")
     for rate, table in columns(tmp_path).items():
@@ -65,7 +56,7 @@ def test_recorded_columns_are_those_of_the_whole_table(
     assert ("one row in 7" in said) == (every > 1)
 
 
-def test_only_what_is_used_is_fetched(tmp_path: Path) -> None:
+def test_only_what_is_used_is_fetched(tmp_path):
     """What connections read; of the plants also what steps and faults are judged by."""
     found = ran(tmp_path, "record.signals=none").system
     kept = {u.name: {s.port for s in u.description.outputs} for u in found.fmus}
@@ -78,7 +69,7 @@ def test_only_what_is_used_is_fetched(tmp_path: Path) -> None:
     assert "iota" not in kept["virtual_environment"]
 
 
-def test_calls_of_an_event(tmp_path: Path, loop: str) -> None:
+def test_calls_of_an_event(tmp_path, loop):
     """One get, set and step of each FMU at each communication point; a checked step adds two half
     steps and two gets, with the state saved and restored."""
     outcome = ran(tmp_path).outcome
@@ -104,7 +95,7 @@ FOREIGN = (
 )
 
 
-def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(tmp_path: Path, loop: str) -> None:
+def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(tmp_path, loop):
     """FMI has inputs keep their values, but FMUs of others need not, so that these are set though
     they have not changed."""
     python_fmu(tmp_path, "Steady", "self.y = 1.0")
@@ -133,7 +124,7 @@ hold = "zoh"
 """
 
 
-def test_unchanged_inputs_are_not_set_again(tmp_path: Path, loop: str) -> None:
+def test_unchanged_inputs_are_not_set_again(tmp_path, loop):
     """A block of this project gets a held value once: at 0 s, and as each of 4 steps has ended."""
     python_fmu(tmp_path, "Source")
     found = simulate(str(scene(tmp_path, HELD)), tmp_path / "out")
@@ -141,14 +132,14 @@ def test_unchanged_inputs_are_not_set_again(tmp_path: Path, loop: str) -> None:
     assert found.outcome.details.calls["wall"] == {"get": 33, "set": 5, "step": 33}
 
 
-def test_a_name_that_is_none(tmp_path: Path) -> None:
+def test_a_name_that_is_none(tmp_path):
     with pytest.raises(SceneFault, match=r"did you mean 'virtual_mechanism\.x'\?"):
         simulate(SCENE, tmp_path, ['record.signals=["virtual_mechanism.xx"]'])
     with pytest.raises(SceneFault, match='"all", "connected" or "none" or a list'):
         simulate(SCENE, tmp_path, ["record.signals=some"])
 
 
-def test_rows_instead_of_csv(whole: tuple[Experiment, dict[str, Any]], tmp_path: Path) -> None:
+def test_rows_instead_of_csv(whole, tmp_path):
     found = ran(tmp_path, "record.format=rows")
     assert {p.name for p in tmp_path.iterdir()} == {"run.json", "haptics.rows", "graphics.rows"}
     for rate, table in whole[0].results.tables.items():
@@ -158,7 +149,7 @@ def test_rows_instead_of_csv(whole: tuple[Experiment, dict[str, Any]], tmp_path:
     assert {p.name for p in tmp_path.iterdir()} == {"run.json", "haptics.csv", "graphics.csv"}
 
 
-def test_results_of_a_run_that_records_nothing(tmp_path: Path) -> None:
+def test_results_of_a_run_that_records_nothing(tmp_path):
     found = ran(tmp_path, "record.signals=none")
     assert {p.name for p in tmp_path.iterdir()} == {"run.json"}
     assert found.outcome.end_time == 0.5

@@ -1,7 +1,5 @@
 """A bar on a rail that a hand moves, sampled and as a plant, against closed forms."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -54,10 +52,10 @@ def order(bar: Path, kind: str, rates: list[int], options: dict) -> float:
 
 
 @pytest.mark.parametrize("kind", ["spring", "arm"])
-def test_a_hand_as_a_plant_is_coupled_to_order_two(bar: Path, kind: str) -> None:
+def test_a_hand_as_a_plant_is_coupled_to_order_two(bar, kind):
     assert order(bar, kind, [200, 400, 800], PLANT) == pytest.approx(2, abs=0.03)
 
 
 @pytest.mark.parametrize("kind", ["spring", "arm"])
-def test_a_sampled_hand_is_coupled_to_order_one(bar: Path, kind: str) -> None:
+def test_a_sampled_hand_is_coupled_to_order_one(bar, kind):
     assert order(bar, kind, [800, 1600, 3200], {}) == pytest.approx(1, abs=0.05)

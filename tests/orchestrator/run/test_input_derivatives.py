@@ -4,8 +4,6 @@ Against the two-mass oscillator's published errors, orders and limits of stabili
 subsystems reach only where the hold acts within the step; without substeps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from fractions import Fraction
@@ -30,13 +28,13 @@ Fmus = Mapping[str, Description]
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("native")
     return {name: native(folder, name) for name in ("one", "two")}
 
 
 @given(st.lists(st.floats(-10, 10), min_size=2, max_size=4), st.floats(1e-4, 10))
-def test_derivatives_and_mean_of_a_polynomial(parts: list[float], width: float) -> None:
+def test_derivatives_and_mean_of_a_polynomial(parts, width):
     """Of p(t) = sum_j parts_j t^j / width^j, whose derivatives at 0 and mean are known."""
     order = len(parts) - 1
     values = np.polynomial.Polynomial(parts)(np.linspace(0, 1, order + 1))
@@ -50,7 +48,7 @@ def test_derivatives_and_mean_of_a_polynomial(parts: list[float], width: float) 
 
 @pytest.mark.parametrize("name", sorted(n for n, hold in HOLDS.items() if hold.degree))
 @given(data=st.data())
-def test_what_an_fmu_is_told_is_the_hold(name: str, data: st.DataObject) -> None:
+def test_what_an_fmu_is_told_is_the_hold(name, data):
     """Its Taylor polynomial is the hold everywhere within a step, any samples and step sizes."""
     hold, size = HOLDS[name], 2
     made = hold(HoldContext(size, seconds=lambda ticks: 0.01 * ticks))
@@ -83,14 +81,12 @@ def test_what_an_fmu_is_told_is_the_hold(name: str, data: st.DataObject) -> None
     ("hold", "published"),
     [("zoh", 8.75e-2), ("foh", 8.90e-3), ("second-order", 1.53e-3), ("lead", 7.08e-3)],
 )
-def test_largest_error_at_a_hundredth(
-    fmus: Fmus, tmp_path: Path, hold: str, published: float
-) -> None:
+def test_largest_error_at_a_hundredth(fmus, tmp_path, hold, published):
     assert error(fmus, tmp_path, 100, hold, 1) == pytest.approx(published, rel=0.02)
 
 
 @pytest.mark.parametrize(("hold", "order"), [("foh", 2), ("second-order", 3), ("delayed", 1)])
-def test_order_of_a_hold(fmus: Fmus, tmp_path: Path, hold: str, order: int) -> None:
+def test_order_of_a_hold(fmus, tmp_path, hold, order):
     rates = [200, 400, 800]
     errors = [error(fmus, tmp_path, rate, hold, 1) for rate in rates]
     assert coupled.order(rates, errors) == pytest.approx(order, abs=0.1)
@@ -106,9 +102,7 @@ def test_order_of_a_hold(fmus: Fmus, tmp_path: Path, hold: str, order: int) -> N
         ("second-order", ".0843", "gauss-seidel-plants"),
     ],
 )
-def test_limit_of_stability_to_one_percent(
-    fmus: Fmus, tmp_path: Path, hold: str, limit: str, coupling: str
-) -> None:
+def test_limit_of_stability_to_one_percent(fmus, tmp_path, hold, limit, coupling):
     below, above = (
         growth(fmus, tmp_path, Fraction(limit) * part, hold, 1, 500, coupling=coupling)
         for part in (Fraction(99, 100), Fraction(101, 100))
@@ -117,7 +111,7 @@ def test_limit_of_stability_to_one_percent(
 
 
 @pytest.mark.parametrize("hold", ["foh", "second-order", "delayed", "smooth"])
-def test_substeps_change_nothing(fmus: Fmus, tmp_path: Path, hold: str) -> None:
+def test_substeps_change_nothing(fmus, tmp_path, hold):
     """Each substep goes on along the same polynomial."""
     rows = []
     for substeps in (1, 3):
@@ -127,16 +121,14 @@ def test_substeps_change_nothing(fmus: Fmus, tmp_path: Path, hold: str) -> None:
 
 
 @pytest.mark.parametrize(("between", "published"), [("foh", 1.73e-3), ("hermite", 7.8e-7)])
-def test_iterated_coupling_needs_no_substeps(
-    fmus: Fmus, tmp_path: Path, between: str, published: float
-) -> None:
+def test_iterated_coupling_needs_no_substeps(fmus, tmp_path, between, published):
     made = coupled.iterated(fmus, Fraction("1.06"), between, rows=coupled.HERMITE)
     outcome, table = coupled.simulate(made, tmp_path)
     assert outcome.fault is None
     assert coupled.error(table) == pytest.approx(published, rel=0.02)
 
 
-def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus: Fmus, tmp_path: Path) -> None:
+def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, tmp_path):
     """`foh` on it is the lead; where only one of the two can, each gets what it can take."""
     constant = {n: native(tmp_path, n, FLAGS[1:]) for n in ("one", "two")}
     assert error(constant, tmp_path, 100, "foh", 1) == pytest.approx(7.08e-3, rel=0.02)
@@ -149,7 +141,7 @@ def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus: Fmus, tmp_path: P
     }
 
 
-def test_energy_is_booked_with_the_mean(fmus: Fmus, tmp_path: Path) -> None:
+def test_energy_is_booked_with_the_mean(fmus, tmp_path):
     """Iterated and linear, what is held has the mean of the source's two samples: none is made."""
     made = coupled.iterated(fmus, Fraction("1.06"), "foh", power=coupled.POWER)
     outcome, _ = coupled.simulate(made, tmp_path)
@@ -180,9 +172,7 @@ def scene(fmus: Fmus, isolate: bool = False, factor: float = 1.0) -> Path:
     return path
 
 
-def test_a_run_and_a_plan_say_who_takes_what(
-    fmus: Fmus, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_and_a_plan_say_who_takes_what(fmus, tmp_path, capsys):
     options = ["substeps.two=2"]
     found = simulate(str(scene(fmus)), tmp_path / "out", options).results.run
     assert found["within_a_step"] == {
@@ -196,7 +186,7 @@ def test_a_run_and_a_plan_say_who_takes_what(
     assert "  set one derivatives True\n" in told
 
 
-def test_a_run_says_where_an_fmu_cannot(tmp_path: Path) -> None:
+def test_a_run_says_where_an_fmu_cannot(tmp_path):
     constant = {n: native(tmp_path, n, FLAGS[1:]) for n in ("one", "two")}
     found = simulate(str(scene(constant)), tmp_path / "out", ["substeps.two=2"]).results.run
     assert found["within_a_step"] == {
@@ -205,7 +195,7 @@ def test_a_run_says_where_an_fmu_cannot(tmp_path: Path) -> None:
     }
 
 
-def test_in_a_process_of_its_own_it_is_the_same(fmus: Fmus, tmp_path: Path) -> None:
+def test_in_a_process_of_its_own_it_is_the_same(fmus, tmp_path):
     for isolate in (False, True):
         ended = simulate(str(scene(fmus, isolate)), tmp_path / str(isolate))
         assert ended.outcome.fault is None
@@ -213,7 +203,7 @@ def test_in_a_process_of_its_own_it_is_the_same(fmus: Fmus, tmp_path: Path) -> N
     assert same[0] == same[1]
 
 
-def test_derivatives_convert_like_values(fmus: Fmus, tmp_path: Path) -> None:
+def test_derivatives_convert_like_values(fmus, tmp_path):
     """A force of minus F through a factor of -1, from a spring that pushes the other way."""
     turned = {"one": native(tmp_path, "one"), "two": fmus["two"]}
     (tmp_path / "two.fmu").write_bytes(native(tmp_path, "two", sign=-1.0).path.read_bytes())
@@ -223,9 +213,7 @@ def test_derivatives_convert_like_values(fmus: Fmus, tmp_path: Path) -> None:
     np.testing.assert_allclose(found["two.F"], -plain["two.F"], rtol=0, atol=1e-9)
 
 
-def test_a_step_taken_again_in_halves_goes_on_along_the_polynomial(
-    fmus: Fmus, tmp_path: Path
-) -> None:
+def test_a_step_taken_again_in_halves_goes_on_along_the_polynomial(fmus, tmp_path):
     """`one` discards what is longer than an eighth of a step; exact as it is, nothing changes."""
     (tmp_path / "brittle").mkdir()
     brittle = native(tmp_path / "brittle", "one", brittle=1e-9, fine=0.01 / 8, failure=2)

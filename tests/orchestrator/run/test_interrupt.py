@@ -7,7 +7,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
 
 @pytest.fixture(autouse=True)
-def crash_monitor_of_runs() -> None:
+def crash_monitor_of_runs():
     """Runs start their watchdog."""
 
 
@@ -34,14 +34,14 @@ def waited_for(come: Callable[[], object]) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _nothing_left_behind(own_temporary_folder: Path) -> Iterator[None]:
+def _nothing_left_behind(own_temporary_folder):
     handlers = [signal.getsignal(s) for s in interrupt.SIGNALS]
     yield
     assert not [*Path(tempfile.gettempdir()).glob("hapticlink-*")]
     assert [signal.getsignal(s) for s in interrupt.SIGNALS] == handlers
 
 
-def test_a_signal_before_the_run_says_so(bar: Path, tmp_path: Path) -> None:
+def test_a_signal_before_the_run_says_so(bar, tmp_path):
     """While the scene is read; it is held, so that no import loses it."""
     code = (
         "import hapticlink.orchestrator.open_scene as s, os, signal\n"
@@ -71,7 +71,7 @@ def workers(pid: int) -> list[bytes]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="finds the processes of a process in /proc")
-def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path: Path) -> None:
+def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path):
     """As in a terminal, the signal goes to the whole group, and the worker is at its imports."""
     python_fmu(tmp_path, "Slow", "__import__('time').sleep(0.01)")
     path = scene(tmp_path, fmu_table("one", "Slow", ISOLATED), duration=100)
@@ -105,9 +105,7 @@ def rows_of(folder: Path) -> int:
     ("kind", "number"),
     [("isolated", signal.SIGTERM), ("Python", signal.SIGINT), ("native", signal.SIGTERM)],
 )
-def test_a_second_signal_ends_an_fmu_that_hangs(
-    tmp_path: Path, kind: str, number: signal.Signals
-) -> None:
+def test_a_second_signal_ends_an_fmu_that_hangs(tmp_path, kind, number):
     body, isolate = HANGS[kind]
     if kind == "native":
         c_fmu(tmp_path)
@@ -132,12 +130,12 @@ def test_a_second_signal_ends_an_fmu_that_hangs(
     assert {p.name for p in out.iterdir()} == {"run.json", "haptics.rows"}
 
 
-def test_python_gets_the_second_signal_when_processes_have_ended(tmp_path: Path) -> None:
+def test_python_gets_the_second_signal_when_processes_have_ended(tmp_path):
     """What a run in Python makes of Ctrl-C is its own; the FMU that hangs does not keep it."""
     python_fmu(tmp_path, "Hangs", "if self.steps == 4: __import__('time').sleep(1000)")
     path = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED) + "[faults]\ntimeout = 1000.0\n")
 
-    def signals() -> None:
+    def signals():
         waited_for(lambda: rows_of(tmp_path / "out") == 4)
         for _ in range(2):
             time.sleep(0.2)
@@ -151,7 +149,7 @@ def test_python_gets_the_second_signal_when_processes_have_ended(tmp_path: Path)
     assert (outcome.reason, outcome.end_time) == ("interrupted", 3 / 64)
 
 
-def test_signals_are_held_once_and_given_back(tmp_path: Path) -> None:
+def test_signals_are_held_once_and_given_back(tmp_path):
     done: list[str] = []
     interrupt.add(lambda: done.append("kept"))
     gone = lambda: done.append("removed")  # noqa: E731
@@ -180,7 +178,7 @@ CHILD = """
 @pytest.mark.parametrize(
     "then", ["pass", "__import__('os')._exit(3)", "__import__('time').sleep(1000)"]
 )
-def test_processes_that_an_isolated_fmu_has_started_end_with_it(tmp_path: Path, then: str) -> None:
+def test_processes_that_an_isolated_fmu_has_started_end_with_it(tmp_path, then):
     file = tmp_path / "pid"
     python_fmu(tmp_path, "Starts", CHILD.format(pid=str(file), then=then))
     path = scene(tmp_path, fmu_table("one", "Starts", ISOLATED) + "[faults]\ntimeout = 2.0\n")
@@ -198,7 +196,7 @@ def alive(pid: int) -> bool:
         return False
 
 
-def test_a_second_signal_leaves_no_unfinished_file(tmp_path: Path) -> None:
+def test_a_second_signal_leaves_no_unfinished_file(tmp_path):
     text = f"""
 import signal
 from pathlib import Path

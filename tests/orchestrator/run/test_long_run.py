@@ -1,7 +1,5 @@
 """A run of any length shows its first rows at once: nothing walks through it before."""
 
-from pathlib import Path
-
 import pytest
 
 from hapticlink.orchestrator.base.faults import SceneFault
@@ -23,7 +21,7 @@ SOON = "stop_when='virtual_mechanism.energy > 1e-5'"
     ],
     ids=["exact", "aligned", "phases", "drawn latencies"],
 )
-def test_a_run_of_1e5_s_has_rows(tmp_path: Path, options: list[str]) -> None:
+def test_a_run_of_1e5_s_has_rows(tmp_path, options):
     experiment = simulate("closed-loop", tmp_path, [LONG, SOON, *options])
     outcome = experiment.outcome
     assert (outcome.fault, outcome.reason) == (None, "stop_when")
@@ -31,12 +29,12 @@ def test_a_run_of_1e5_s_has_rows(tmp_path: Path, options: list[str]) -> None:
     assert experiment.results.run["delays"]["haptic_device.x -> controller.x_D"]["max"] == 0.0
 
 
-def test_ages_of_a_run_are_those_of_its_plan(tmp_path: Path) -> None:
+def test_ages_of_a_run_are_those_of_its_plan(tmp_path):
     experiment = simulate("closed-loop-direct", tmp_path, ["duration=0.6"])
     assert experiment.outcome.details.delays == delays(Plan(experiment.system))
 
 
-def test_rates_that_are_drawn_before_the_run_have_a_bound(tmp_path: Path) -> None:
+def test_rates_that_are_drawn_before_the_run_have_a_bound(tmp_path):
     rate = "graphics.rate={ min = 20, max = 60, seed = 2 }"
     with pytest.raises(SceneFault, match=r"graphics\.rate: up to .* would be drawn"):
         simulate("closed-loop", tmp_path, [LONG, rate])

@@ -7,8 +7,6 @@ inside, continuous, to the held pose and velocity of the device. First crossing 
 computed independently.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -124,7 +122,7 @@ def sprung() -> Component:
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Description]:
+def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("multirate")
     parts = (mass("device", 0.1, 2.0, 1.0), spring(), mass("linkage", 0.5, 1.0, 0.0), sprung())
     return {c.name: describe(build(c, folder)) for c in parts}
@@ -162,17 +160,10 @@ def system(
 
 
 @pytest.mark.parametrize(("linkage", "rate", "align", "limit"), LIMITS)
-def test_limit_of_the_coupling_to_one_percent(
-    fmus: dict[str, Description],
-    tmp_path: Path,
-    linkage: str,
-    rate: int,
-    align: str,
-    limit: float,
-) -> None:
+def test_limit_of_the_coupling_to_one_percent(fmus, tmp_path, linkage, rate, align, limit):
     timeline = fixed(Fraction(512), Fraction(rate), 512 * 16, align)
 
-    def growth(gain: float) -> float:
+    def growth(gain):
         """Between the last quarters of a run."""
         _, _, third, last = np.split(forces(fmus, tmp_path, linkage, timeline, gain)[1:], 4)
         return float(last.max() / third.max())
@@ -188,9 +179,7 @@ def radius(made: System) -> float:
 
 
 @pytest.mark.parametrize(("linkage", "rate", "align", "limit"), LIMITS)
-def test_the_lifted_map_has_the_same_limits(
-    fmus: dict[str, Description], linkage: str, rate: int, align: str, limit: float
-) -> None:
+def test_the_lifted_map_has_the_same_limits(fmus, linkage, rate, align, limit):
     timeline = fixed(Fraction(512), Fraction(rate), 512 * 16, align)
     below, above = (radius(system(fmus, linkage, timeline, k * limit)) for k in (0.995, 1.005))
     assert below < 1.0 < above
@@ -199,9 +188,7 @@ def test_the_lifted_map_has_the_same_limits(
 @pytest.mark.parametrize(
     ("frames", "growth"), [((17, 17), None), ((51, 51), None), ((17, 51), 1.86)], ids=str
 )
-def test_the_lifted_map_of_alternating_frames(
-    fmus: dict[str, Description], frames: tuple[int, int], growth: float | None
-) -> None:
+def test_the_lifted_map_of_alternating_frames(fmus, frames, growth):
     whole = sum(frames)
     starts = Frames(lambda i: i // 2 * whole + i % 2 * frames[0], 100, 2)
     clocks = (Clock("haptics", range(starts[98])), Clock("graphics", starts))
@@ -213,9 +200,7 @@ def test_the_lifted_map_of_alternating_frames(
         assert a_frame == pytest.approx(growth, rel=0.005)
 
 
-def test_matrices_of_frames_in_turn_grow_as_the_alternating_ones(
-    fmus: dict[str, Description],
-) -> None:
+def test_matrices_of_frames_in_turn_grow_as_the_alternating_ones(fmus):
     """Each length alone is stable; their product grows as the run does."""
     clocks = (Clock("haptics", range(1000)), Clock("graphics", [0, 17, 68, 85, 136]))
     made = system(fmus, "sprung", Timeline(Fraction(1, 512), 900, clocks), 1050.0, 20.0)
@@ -230,9 +215,7 @@ def test_matrices_of_frames_in_turn_grow_as_the_alternating_ones(
 @pytest.mark.parametrize(
     ("frames", "growth"), [((17, 17), None), ((51, 51), None), ((17, 51), 1.86)], ids=str
 )
-def test_alternating_frames_grow_where_each_alone_is_stable(
-    fmus: dict[str, Description], tmp_path: Path, frames: tuple[int, int], growth: float | None
-) -> None:
+def test_alternating_frames_grow_where_each_alone_is_stable(fmus, tmp_path, frames, growth):
     """K = 1050 and a spring of 20 to ground: spectral radii at most .986 alone."""
     starts = np.cumsum([0, *frames * 18]).tolist()  # short of what ends a run as diverged
     clocks = (Clock("haptics", range(starts[-1] + 2)), Clock("graphics", starts))

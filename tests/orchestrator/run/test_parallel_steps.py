@@ -1,7 +1,5 @@
 """Isolated FMUs step concurrently, with the same results and faults as one after the other."""
 
-from pathlib import Path
-
 import pytest
 
 from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, run
@@ -18,7 +16,7 @@ MEET = """import pathlib, time as clock
 
 
 @pytest.mark.parametrize("coupling", ["gauss-seidel", "jacobi"])
-def test_steps_of_an_instant_run_at_the_same_time(tmp_path: Path, coupling: str) -> None:
+def test_steps_of_an_instant_run_at_the_same_time(tmp_path, coupling):
     """Each waits in its step for the other to be in the same step."""
     for name, own, other in (("First", "a", "b"), ("Second", "b", "a")):
         python_fmu(tmp_path, name, MEET.format(folder=str(tmp_path), own=own, other=other))
@@ -30,7 +28,7 @@ def test_steps_of_an_instant_run_at_the_same_time(tmp_path: Path, coupling: str)
 
 
 @pytest.mark.parametrize("isolate", ["false", "true"])
-def test_of_two_that_fail_the_first_of_the_plan_is_told(tmp_path: Path, isolate: str) -> None:
+def test_of_two_that_fail_the_first_of_the_plan_is_told(tmp_path, isolate):
     python_fmu(tmp_path, "Late", "__import__('time').sleep(0.05 * (time > 0.1)); return time < 0.1")
     python_fmu(tmp_path, "Early", "return time < 0.1")
     for first, second in (("Late", "Early"), ("Early", "Late")):
@@ -42,9 +40,7 @@ def test_of_two_that_fail_the_first_of_the_plan_is_told(tmp_path: Path, isolate:
 
 
 @pytest.mark.parametrize("isolate", ["false", "true"])
-def test_outputs_that_cannot_be_read_are_a_fault_when_they_are_due(
-    tmp_path: Path, isolate: str
-) -> None:
+def test_outputs_that_cannot_be_read_are_a_fault_when_they_are_due(tmp_path, isolate):
     c_fmu(tmp_path)
     python_fmu(tmp_path, "Goes")
     slow = FMU.format("one", "faults", isolate) + "start.mode = 8\nrate = 8\n"
@@ -56,7 +52,7 @@ def test_outputs_that_cannot_be_read_are_a_fault_when_they_are_due(
     assert found.haptics["time"][-1] == 23 / 64  # those of 0.375 s come after the read
 
 
-def test_one_that_dies_leaves_the_others_a_clean_end(tmp_path: Path) -> None:
+def test_one_that_dies_leaves_the_others_a_clean_end(tmp_path):
     """They have been sent their steps when it dies."""
     c_fmu(tmp_path)
     ended = tmp_path / "ended"

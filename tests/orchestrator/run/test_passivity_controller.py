@@ -1,8 +1,6 @@
 """The passivity observer and controller: walls far beyond the closed form, and runs that need
 none."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca
@@ -47,9 +45,7 @@ def pressed(options: dict[str, Any], guard: float | None = MASS) -> tuple[hl.Res
     ("hand", "damping", "seed"),
     [("constant", 0.0, 0), ("constant", 5.0, 1), ("arm", 0.0, 2), ("arm", 5.0, 3)],
 )
-def test_a_wall_beyond_its_limit_generates_at_most_the_handles_kinetic_energy(
-    hand: str, damping: float, seed: int
-) -> None:
+def test_a_wall_beyond_its_limit_generates_at_most_the_handles_kinetic_energy(hand, damping, seed):
     draw = np.random.default_rng(seed)
     K = 5200.0 * 10 ** draw.uniform(0.05, 1.2)
     assert wall_limits.stable(MASS, 5.0, T) < K
@@ -70,7 +66,7 @@ def test_a_wall_beyond_its_limit_generates_at_most_the_handles_kinetic_energy(
     assert without.max() > 2 * work.max()
 
 
-def test_the_handle_comes_to_rest_at_ten_times_the_limit() -> None:
+def test_the_handle_comes_to_rest_at_ten_times_the_limit():
     options = {"fmu.wall.settings.stiffness": 50000.0, "duration": 6.0}
     for guard, apart in ((MASS, 1e-5), (None, 5e-3)):
         run, _ = pressed(options, guard)
@@ -78,7 +74,7 @@ def test_the_handle_comes_to_rest_at_ten_times_the_limit() -> None:
         assert late < apart if guard else late > apart
 
 
-def test_where_it_never_acts_the_bits_are_those_without() -> None:
+def test_where_it_never_acts_the_bits_are_those_without():
     short = {"duration": 1.0}
     plain = run_once("closed-loop", short)
     guarded = run_once("closed-loop", short | {"controller.passivity": True})
@@ -87,7 +83,7 @@ def test_where_it_never_acts_the_bits_are_those_without() -> None:
         assert np.array_equal(plain[signal], guarded[signal])
 
 
-def test_a_coupling_beyond_its_limit_gives_the_handle_little() -> None:
+def test_a_coupling_beyond_its_limit_gives_the_handle_little():
     """60,000 N/m between mechanism and handle chatter; the motors give 7.9 mJ without."""
     stiff = {
         "controller.teleoperation.stiffness": [2e4, 2e4, 100.0],
@@ -101,7 +97,7 @@ def test_a_coupling_beyond_its_limit_gives_the_handle_little() -> None:
     assert given[True] < 0.1 * given[False]
 
 
-def test_the_lifted_map_is_that_of_the_loop_without_it() -> None:
+def test_the_lifted_map_is_that_of_the_loop_without_it():
     given = {"fmu.wall.settings.passivity": MASS}
     without, with_it = (own_hand("virtual-wall", options) for options in ({}, given))
     assert with_it.growth == pytest.approx(without.growth, rel=1e-6)
@@ -123,7 +119,7 @@ def sampled(run: Running, x: list[float]) -> tuple[np.ndarray, float, float]:
     return y["F_motor"], y["passivity_energy_left"], y["passivity_damping"]
 
 
-def test_the_equations() -> None:
+def test_the_equations():
     run = block(energy=1e-4, limit=1.5, noise=1e-12)
     x = np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.01], [2e-4, 5e-4, 0.0], [1e-4, 4e-4, 0.0]])
     K, E, before, held = np.array([1000.0, 1000.0, 5.0]), 1e-4, x[0], np.zeros(3)
@@ -141,7 +137,7 @@ def test_the_equations() -> None:
     assert acted
 
 
-def test_a_free_handle_forgets_what_was_absorbed_and_keeps_a_deficit() -> None:
+def test_a_free_handle_forgets_what_was_absorbed_and_keeps_a_deficit():
     run = block(reset_after=2 * T)
     sampled(run, [1e-3, 0.0, 0.0])
     _, absorbed, _ = sampled(run, [2e-3, 0.0, 0.0])
@@ -156,7 +152,7 @@ def test_a_free_handle_forgets_what_was_absorbed_and_keeps_a_deficit() -> None:
 
 
 @pytest.mark.parametrize(("key", "value"), [("limit", 2.0), ("limit", 0.0), ("noise", 0.0)])
-def test_what_cannot_be_damped_is_refused(key: str, value: float) -> None:
+def test_what_cannot_be_damped_is_refused(key, value):
     with pytest.raises(hl.InputFault, match=f"passivity.*{key}"):
         hl.scene("closed-loop", {f"controller.passivity.{key}": value})
 
@@ -169,7 +165,7 @@ def warned(scene: str, options: dict[str, Any], why: str) -> list[str]:
 
 @pytest.mark.parametrize("end", ["wall.F", "wall.x"])
 @pytest.mark.parametrize("link", [T, {"loss": 0.2}])
-def test_a_run_warns_where_force_or_pose_of_a_guarded_wall_is_late(end: str, link: object) -> None:
+def test_a_run_warns_where_force_or_pose_of_a_guarded_wall_is_late(end, link):
     options = {"fmu.wall.settings.passivity": MASS}
     assert not warned("virtual-wall", options, "passivity controller")
     (line,) = warned("virtual-wall", options | {f"delays.'{end}'": link}, "passivity controller")
@@ -184,14 +180,14 @@ def test_a_run_warns_where_force_or_pose_of_a_guarded_wall_is_late(end: str, lin
         ({"delays.controller.x_D": 0.002}, "haptic_device.x -> controller.x_D"),
     ],
 )
-def test_so_it_does_of_a_guarded_controller(late: dict[str, Any], connection: str) -> None:
+def test_so_it_does_of_a_guarded_controller(late, connection):
     guarded = {"controller.passivity": True}
     assert not warned("closed-loop", guarded, "passivity controller")
     (line,) = warned("closed-loop", guarded | late, "passivity controller")
     assert connection in line
 
 
-def test_of_a_further_users_controller_it_warns_by_its_own_settings() -> None:
+def test_of_a_further_users_controller_it_warns_by_its_own_settings():
     late, why = {"coupling": "jacobi"}, "passivity controller"
     left = "warning: controller_left.F_motor -> haptic_device_left.F_motor"
     (line,) = warned("two-users", late | {"controllers.left.passivity": True}, why)
@@ -202,7 +198,7 @@ def test_of_a_further_users_controller_it_warns_by_its_own_settings() -> None:
     assert not line.startswith(left)
 
 
-def test_it_warns_of_motors_at_their_limit() -> None:
+def test_it_warns_of_motors_at_their_limit():
     """The controller counts what it asked for: 0 J here, where the motors gave more."""
     weak = {
         "controller.passivity": True,
@@ -217,7 +213,7 @@ def test_it_warns_of_motors_at_their_limit() -> None:
 
 
 @pytest.mark.parametrize("rate", [10, 30])
-def test_a_run_warns_where_steps_outside_the_premises_matter(rate: int) -> None:
+def test_a_run_warns_where_steps_outside_the_premises_matter(rate):
     """`passive` generates more than the hand puts in at 10 Hz, and next to nothing at 30."""
     options = {"hold": "passive", "graphics.rate": rate}
     run = hl.run("closed-loop-direct", options, figures=False).record
@@ -228,7 +224,7 @@ def test_a_run_warns_where_steps_outside_the_premises_matter(rate: int) -> None:
     assert (counted.outside > 0.2 * counted.steps) == (rate == 10)
 
 
-def test_it_warns_where_it_damps_counts_of_the_encoders() -> None:
+def test_it_warns_where_it_damps_counts_of_the_encoders():
     """The motors give the true handle nothing, and yet it acts, until `noise` is what the warning
     says: the energy of one count."""
     encoders = {"sensing": "encoders", "duration": 1.0, "controller.passivity": True}
@@ -241,7 +237,7 @@ def test_it_warns_where_it_damps_counts_of_the_encoders() -> None:
     assert not warned("closed-loop", enough, why)  # where it never acts
 
 
-def test_the_energy_of_a_count_is_that_of_the_pose_that_fits_it() -> None:
+def test_the_energy_of_a_count_is_that_of_the_pose_that_fits_it():
     device, pose = Device(), np.array([0.03, 0.02, 0.4])
     angles = ca.Function("q", [x := ca.SX.sym("x", 3)], [base_angles(x, numbers(device))])
     inertia = ca.Function("M", [x], [dynamics(x, ca.SX(3, 1), numbers(device))[0]])

@@ -1,10 +1,7 @@
 """The passivity controller of Hannaford and Ryu on a virtual wall, through FMUs: rows that were
 computed independently, by 40 semi-implicit steps in each period of 1 ms."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -118,13 +115,7 @@ def passivity_controller() -> Component:
         (400.0, 5, 0.8, (33.90, 0.001, -1.44)),
     ],
 )
-def test_peak_swing_and_energy(
-    tmp_path: Path,
-    stiffness: float,
-    every: int,
-    damping: float,
-    expected: tuple[float, float, float],
-) -> None:
+def test_peak_swing_and_energy(tmp_path, stiffness, every, damping, expected):
     """Peak and peak to peak of the last 0.5 s (mm), energy absorbed (mJ): negative where the wall
     generates it."""
     path = tmp_path / "pushed.toml"

@@ -1,8 +1,6 @@
 """Runs in real time, by a clock that goes on only while somebody waits for it, so that counters and
 stamps are exact; and threads that are real, of which no time is asserted."""
 
-from __future__ import annotations
-
 import math
 import signal
 import threading
@@ -49,9 +47,7 @@ def made(folder: Path, clock: WallClock | None, *options: str, scene: str = "clo
     ],
     ids=lambda options: options[0],
 )
-def test_a_run_whose_samples_are_in_time_writes_the_bytes_of_any_run(
-    tmp_path: Path, options: list[str]
-) -> None:
+def test_a_run_whose_samples_are_in_time_writes_the_bytes_of_any_run(tmp_path, options):
     _, plain = made(tmp_path / "plain", None, *FAST, *options)
     run, paced = made(tmp_path / "paced", WallClock(lambda k: 15 * MS), *FAST, *options)
     told = run["real_time"]
@@ -83,10 +79,10 @@ def late_samples(computing: Callable[[int], int], until: Fraction) -> list[tuple
 
 
 @pytest.mark.parametrize("hold", ["zoh", "smooth", "passive"])
-def test_late_samples_arrive_with_their_stamps(tmp_path: Path, hold: str) -> None:
+def test_late_samples_arrive_with_their_stamps(tmp_path, hold):
     """Steps of 3, 25, 50, 3, ... ms at 60 Hz."""
 
-    def computing(k: int) -> int:
+    def computing(k):
         return (3, 25, 50)[k % 3] * MS
 
     options = (*FAST, f"hold={hold}", "delays.virtual_mechanism.x=0.004")
@@ -102,16 +98,14 @@ def test_late_samples_arrive_with_their_stamps(tmp_path: Path, hold: str) -> Non
     assert told["largest_lateness"] == samples["lateness"].max() > 0.03
 
 
-def test_without_the_compiled_loop_there_is_no_real_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_compiled_loop_there_is_no_real_time(tmp_path, monkeypatch):
     monkeypatch.setenv(CHOICE, "python")
     ended = simulate("closed-loop", tmp_path, FAST, real_time=WallClock().run())
     assert ended.outcome.reason == "fault"
     assert "needs the compiled loop: HAPTICLINK_LOOP=python" in ended.run["fault"]["message"]
 
 
-def test_deadlines_that_are_missed_are_counted(tmp_path: Path) -> None:
+def test_deadlines_that_are_missed_are_counted(tmp_path):
     """A tick that begins 3 ms late is complete after the next is due; one that begins 0.25 s late
     moves the schedule."""
     clock = WallClock(late={101 * MS: 3 * MS, 205 * MS: 250 * MS})
@@ -125,7 +119,7 @@ def test_deadlines_that_are_missed_are_counted(tmp_path: Path) -> None:
     assert clock.time == 250 * MS + int(153e9 / 512)
 
 
-def test_quantiles_are_within_a_bin_of_those_of_the_numbers() -> None:
+def test_quantiles_are_within_a_bin_of_those_of_the_numbers():
     numbers = np.random.default_rng(1).lognormal(9.0, 2.0, 4000).astype(int)
     ends = [pace._upper(i) for i in range(pace.BINS)]
     bins = np.bincount(np.searchsorted(ends, numbers), minlength=pace.BINS)
@@ -136,7 +130,7 @@ def test_quantiles_are_within_a_bin_of_those_of_the_numbers() -> None:
     assert found["max"] == numbers.max() * 1e-9
 
 
-def test_a_schedule_waits_by_the_clock_of_the_machine(tmp_path: Path) -> None:
+def test_a_schedule_waits_by_the_clock_of_the_machine(tmp_path):
     """A run of 0.1 s does not end before that."""
     began = perf_counter_ns()
     run = simulate("closed-loop", tmp_path, ["duration=0.11"], real_time=RealTimeRun()).run
@@ -165,7 +159,7 @@ def threads() -> list[str]:
 
 
 @pytest.mark.parametrize("isolate", ["", "isolate = true"])
-def test_a_fault_beside_the_loop_ends_the_run_and_its_threads(tmp_path: Path, isolate: str) -> None:
+def test_a_fault_beside_the_loop_ends_the_run_and_its_threads(tmp_path, isolate):
     path = beside_the_loop(tmp_path, "raise ValueError('three')", isolate)
     run = simulate(path, tmp_path / "out", (), real_time=RealTimeRun()).run
     assert run["end"]["reason"] == "fault"
@@ -176,9 +170,7 @@ def test_a_fault_beside_the_loop_ends_the_run_and_its_threads(tmp_path: Path, is
     assert not threads()
 
 
-def test_an_fmu_that_hangs_beside_the_loop_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_fmu_that_hangs_beside_the_loop_is_named(tmp_path, monkeypatch):
     """It is in its step when the run ends, and is not called again; the loop went on meanwhile."""
     monkeypatch.setattr(concurrent_fmus, "GRACE", 0.01)
     go = tmp_path / "go"
@@ -198,7 +190,7 @@ def test_an_fmu_that_hangs_beside_the_loop_is_named(
     assert not threads()
 
 
-def test_a_step_that_is_not_done_at_the_end_is_waited_for(tmp_path: Path) -> None:
+def test_a_step_that_is_not_done_at_the_end_is_waited_for(tmp_path):
     clock = WallClock(lambda k: 100 * MS if k == 16 else 0)
     run, _ = made(tmp_path, clock, *FAST)
     samples = read_table(tmp_path / "graphics_samples.csv")
@@ -207,8 +199,8 @@ def test_a_step_that_is_not_done_at_the_end_is_waited_for(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("how", ["interrupted", "stop_when"])
-def test_a_run_that_ends_early_leaves_its_rows_and_no_thread(tmp_path: Path, how: str) -> None:
-    def turn(simulation: object, loop: object) -> None:
+def test_a_run_that_ends_early_leaves_its_rows_and_no_thread(tmp_path, how):
+    def turn(simulation, loop):
         if how == "interrupted" and not came:
             came.append(1)
             signal.raise_signal(signal.SIGINT)
@@ -223,13 +215,13 @@ def test_a_run_that_ends_early_leaves_its_rows_and_no_thread(tmp_path: Path, how
     assert not threads()
 
 
-def test_the_figure_shows_the_share_of_ticks_above_each_time() -> None:
+def test_the_figure_shows_the_share_of_ticks_above_each_time():
     times, shares = exceedance([(0.0, 1), (2e-3, 2), (5e-3, 1)])
     assert np.allclose(times, [1e-4, 1e-4, 2.0, 5.0])
     assert np.allclose(shares, [1.0, 0.75, 0.25, 0.0])
 
 
-def test_a_run_says_how_it_has_kept_its_schedule(tmp_path: Path) -> None:
+def test_a_run_says_how_it_has_kept_its_schedule(tmp_path):
     clock = WallClock(lambda k: 25 * MS, {205 * MS: 250 * MS})
     found = simulate("closed-loop", tmp_path, FAST, real_time=clock.run()).results
     said = [*summary.lines(found)]

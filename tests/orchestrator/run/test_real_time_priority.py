@@ -3,7 +3,6 @@
 import os
 import sys
 import threading
-from pathlib import Path
 
 import pytest
 
@@ -12,7 +11,7 @@ from hapticlink.orchestrator.run import real_time_priority
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="sched(7) is of Linux")
 
 
-def test_the_thread_has_the_priority_and_its_threads_do_not() -> None:
+def test_the_thread_has_the_priority_and_its_threads_do_not():
     before = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getaffinity(0)
     beside: list[int] = []
     with real_time_priority.raised() as got:
@@ -27,8 +26,8 @@ def test_the_thread_has_the_priority_and_its_threads_do_not() -> None:
     assert after == before
 
 
-def test_a_missing_right_is_a_reason_and_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object) -> None:
+def test_a_missing_right_is_a_reason_and_no_error(monkeypatch):
+    def refused(*_):
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refused)
@@ -37,7 +36,7 @@ def test_a_missing_right_is_a_reason_and_no_error(monkeypatch: pytest.MonkeyPatc
     assert got["scheduler"] == "normal: no right to SCHED_FIFO (ulimit -r 20)"
 
 
-def test_a_higher_priority_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_higher_priority_stays(monkeypatch):
     """As under `chrt -f 50`."""
     monkeypatch.setattr(os, "sched_getparam", lambda _: os.sched_param(50))
     set_to: list[object] = []
@@ -47,9 +46,7 @@ def test_a_higher_priority_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set_to == []
 
 
-def test_a_core_that_cannot_be_had_is_a_reason_and_no_error(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_core_that_cannot_be_had_is_a_reason_and_no_error(monkeypatch, tmp_path):
     (tmp_path / "isolated").write_text("1000\n")
     monkeypatch.setattr(real_time_priority, "_ISOLATED", tmp_path / "isolated")
     before = os.sched_getaffinity(0)
@@ -58,7 +55,7 @@ def test_a_core_that_cannot_be_had_is_a_reason_and_no_error(
     assert got["core"].startswith("shared: 1000 is isolated, and cannot be had")
 
 
-def test_the_first_isolated_core_is_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_first_isolated_core_is_taken(monkeypatch, tmp_path):
     before = os.sched_getaffinity(0)
     core = min(before)
     (tmp_path / "isolated").write_text(f"{core}-7\n")

@@ -1,20 +1,17 @@
 """Runs of real FMUs: causality on stamped signals, what FMUs say, and what counts as run time."""
 
 import time
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import Table, read_table
 from hapticlink.orchestrator.run.execute_plan import run
-from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_fmus import run as run_scene
 from tests.orchestrator.timelines import fixed, varying
@@ -35,13 +32,7 @@ def table(folder: Path, clock: str = "haptics") -> Table:
 
 @pytest.mark.parametrize("timeline", TIMELINES.values(), ids=TIMELINES.keys())
 @pytest.mark.parametrize(("coupling", "late"), [("gauss-seidel", 0), ("jacobi", 1)])
-def test_stamped_signals(
-    stamped: Callable[[Timeline, str], System],
-    tmp_path: Path,
-    timeline: Timeline,
-    coupling: str,
-    late: int,
-) -> None:
+def test_stamped_signals(stamped, tmp_path, timeline, coupling, late):
     outcome = run(Plan(stamped(timeline, coupling)), RunFolder(tmp_path))
     assert outcome.fault is None
     fast, slow = table(tmp_path), table(tmp_path, "graphics")
@@ -66,21 +57,19 @@ def test_stamped_signals(
 ONE = '[[fmu]]\nname = "one"\npath = "One.fmu"\n'
 
 
-def test_what_the_fmu_said_is_in_the_fault(tmp_path: Path) -> None:
+def test_what_the_fmu_said_is_in_the_fault(tmp_path):
     error = "__import__('pythonfmu').enums.Fmi2Status.error"
     python_fmu(tmp_path, "One", f"self.log('the belt slipped', {error}); return False")
     experiment, _ = run_scene(tmp_path, ONE)
     assert "the belt slipped" in str(experiment.outcome.fault)
 
 
-def test_loading_and_unloading_are_no_part_of_the_runs_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_loading_and_unloading_are_no_part_of_the_runs_time(tmp_path, monkeypatch):
     python_fmu(tmp_path, "One")
     pauses = []
 
-    def paused(method: Callable[[InProcess], object]) -> Callable[[InProcess], object]:
-        def call(instance: InProcess) -> object:
+    def paused(method):
+        def call(instance):
             time.sleep(0.3)
             pauses.append(method.__name__)
             return method(instance)

@@ -3,7 +3,6 @@
 import json
 import subprocess
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +15,7 @@ SHORT = ("--set", "duration=0.2")
 ROCKER = "linkage.start.rocker=2.9"
 
 
-def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path: Path) -> None:
+def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path):
     out = tmp_path / "out"
     assert status("run", "closed-loop", "--out", out, *SHORT) == 0
     first = {p.name for p in out.iterdir()}
@@ -36,9 +35,7 @@ def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path: Path
 
 
 @pytest.mark.parametrize("command", ["run", "build", "export"])
-def test_a_folder_that_cannot_be_is_bad_input(
-    bar: Path, tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_cannot_be_is_bad_input(bar, tmp_path, command, capsys):
     (tmp_path / "file").write_text("")
     assert status(command, bar, "--out", tmp_path / "file") == 2
     assert "is a file; name a folder" in capsys.readouterr().err
@@ -46,9 +43,7 @@ def test_a_folder_that_cannot_be_is_bad_input(
     assert "cannot be created" in capsys.readouterr().err
 
 
-def test_a_start_that_assembly_moves_far_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_start_that_assembly_moves_far_is_told(tmp_path, capsys):
     for options, count in (((), 0), (("--set", ROCKER), 1)):
         assert status("info", "four-bar", *options) == 0
         assert status("run", "four-bar", "--no-figures", "--out", tmp_path, *SHORT, *options) == 0
@@ -62,7 +57,7 @@ def test_a_start_that_assembly_moves_far_is_told(
     assert "warning" not in capsys.readouterr().out
 
 
-def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
+def test_held_outputs_and_retried_steps_are_told(tmp_path):
     python_fmu(tmp_path, "Lost", "self.y = float('nan') if self.steps > 3 else 1.0")
     _, found = run(tmp_path, 'faults.nan = "hold"\n' + fmu_table("one", "Lost"))
     held = found.run["held_outputs"]["one"]
@@ -86,9 +81,7 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path: Path) -> None:
     ]
 
 
-def test_a_scene_of_given_fmus_has_nothing_to_build(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scene_of_given_fmus_has_nothing_to_build(tmp_path, capsys):
     python_fmu(tmp_path, "Given")
     path = scene(tmp_path, fmu_table("one", "Given"), duration=1)
     assert status("build", path, "--out", tmp_path / "fmus") == 2
@@ -96,7 +89,7 @@ def test_a_scene_of_given_fmus_has_nothing_to_build(
     assert not (tmp_path / "fmus").exists()
 
 
-def test_a_signal_of_another_rate_is_told_where_it_is() -> None:
+def test_a_signal_of_another_rate_is_told_where_it_is():
     found = run_once("closed-loop", {"duration": 0.2, "phases.virtual_mechanism": 0.0005})
     (table,) = (n for n, t in found.tables.items() if "virtual_mechanism.x" in t)
     assert table != "haptics"
@@ -104,7 +97,7 @@ def test_a_signal_of_another_rate_is_told_where_it_is() -> None:
         found.haptics["virtual_mechanism.x"]
 
 
-def test_a_reader_that_has_enough_is_no_fault() -> None:
+def test_a_reader_that_has_enough_is_no_fault():
     with subprocess.Popen(
         [*COMMAND, "run", "closed-loop", "--explain"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,

@@ -1,7 +1,5 @@
 """What happens at given times: in both loops, against closed forms and the run's own signals."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

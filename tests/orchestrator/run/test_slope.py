@@ -1,7 +1,5 @@
 """The hold `slope` between two FMUs: the velocity that a target gets is the rate of its pose."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import casadi as ca
@@ -59,7 +57,7 @@ def fast() -> Component:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("slope")
     for component in (slow(), fast()):
         build(component, made)
@@ -74,7 +72,7 @@ def ran(folder: Path, text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return results.haptics["time"], results["fast.pose"], results["fast.rate"]
 
 
-def test_the_held_velocity_is_the_rate_of_the_held_pose_over_the_seam(folder: Path) -> None:
+def test_the_held_velocity_is_the_rate_of_the_held_pose_over_the_seam(folder):
     time, pose, rate = ran(folder, SCENE)
     frame = np.floor(time * 32 + 1e-9)  # the newest sample at each instant
     for n in range(2, 60):
@@ -86,7 +84,7 @@ def test_the_held_velocity_is_the_rate_of_the_held_pose_over_the_seam(folder: Pa
         np.testing.assert_allclose(rate[k], expected, rtol=1e-9, atol=1e-9)
 
 
-def test_a_late_pose_and_its_rate_agree_too(folder: Path) -> None:
+def test_a_late_pose_and_its_rate_agree_too(folder):
     """Both with the same latency and losses."""
     late = "{ min = 0.003, max = 0.05, loss = 0.2, seed = 4 }"
     _, pose, rate = ran(folder, f'delays = {{ "slow.x" = {late}, "slow.v" = {late} }}\n' + SCENE)
@@ -96,7 +94,7 @@ def test_a_late_pose_and_its_rate_agree_too(folder: Path) -> None:
     assert 800 < same.sum() < 1010
 
 
-def test_a_slope_needs_the_pose(folder: Path) -> None:
+def test_a_slope_needs_the_pose(folder):
     (folder / "scene.toml").write_text(SCENE.replace('"slow.x" = "foh"', '"slow.x" = "slope"'))
     with pytest.raises(SceneFault, match="anything of which x is the derivative"):
         hl.run(hl.scene(str(folder / "scene.toml")))

@@ -1,10 +1,5 @@
 """The estimate of the steps' error, against the stability function of the integrator."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -37,11 +32,11 @@ loop = [{ bodies = ["rod", "slider"], at = [[0.25, 0.0], [0.0, 0.0]] }]
 
 
 @pytest.fixture
-def slider(bar: Path) -> Callable[..., hl.Run]:
+def slider(bar):
     """v' = -(b/m) v - (k/m) x, with z = -b h/m and spring = h sqrt(k/m) at the communication step
     size."""
 
-    def run(z: float, substeps: int = 1, spring: float = 0.0) -> hl.Run:
+    def run(z, substeps=1, spring=0.0):
         options = {
             "duration": 2.0,
             "haptics.rate": 512,
@@ -60,9 +55,7 @@ def rk4(z: float) -> float:
 
 
 @pytest.mark.parametrize("z", [-0.5, -1.0, -2.0, -2.6])
-def test_errors_are_those_of_the_stability_function(
-    slider: Callable[..., hl.Run], z: float
-) -> None:
+def test_errors_are_those_of_the_stability_function(slider, z):
     """v decays from 1: the first step errs most, and changes v most, so that the second is checked,
     too."""
     found = slider(z).run["step_errors"]["virtual_mechanism"]
@@ -75,7 +68,7 @@ def test_errors_are_those_of_the_stability_function(
     assert found["sum"] == pytest.approx(total, rel=1e-9)
 
 
-def test_the_sum_is_what_errors_add_up_to(slider: Callable[..., hl.Run]) -> None:
+def test_the_sum_is_what_errors_add_up_to(slider):
     """A slider on a spring: v = cos(w t); e_k is 2/pi of its amplitude in the mean."""
     run = slider(0.0, spring=0.4)
     v, t = run["haptics"]["virtual_mechanism.v"][:, 0], run["haptics"]["time"]
@@ -85,7 +78,7 @@ def test_the_sum_is_what_errors_add_up_to(slider: Callable[..., hl.Run]) -> None
     )
 
 
-def test_a_short_episode_is_told(tmp_path: Path) -> None:
+def test_a_short_episode_is_told(tmp_path):
     """A light crank passes its dead centre within three steps, and energy changes by a tenth."""
     path = tmp_path / "dead.toml"
     path.write_text(DEAD_CENTRE)
@@ -98,7 +91,7 @@ def test_a_short_episode_is_told(tmp_path: Path) -> None:
     ]
 
 
-def test_a_step_that_is_too_long_is_told_with_its_remedy(slider: Callable[..., hl.Run]) -> None:
+def test_a_step_that_is_too_long_is_told_with_its_remedy(slider):
     (line,) = slider(-2.0).run["warnings"]
     assert "steps of virtual_mechanism are too long" in line
     assert "mechanism.substeps" in line
@@ -106,7 +99,7 @@ def test_a_step_that_is_too_long_is_told_with_its_remedy(slider: Callable[..., h
     assert slider(-0.1).run["warnings"] == []
 
 
-def test_light_coupler_under_its_drive_is_told(tmp_path: Path) -> None:
+def test_light_coupler_under_its_drive_is_told(tmp_path):
     light = {"linkage.body.1.mass": 1e-3, "linkage.body.1.inertia": 1e-6}
     assert any("too long" in line for line in hl.run("four-bar", light).run["warnings"])
     finer = hl.run("four-bar", light | {"mechanism.substeps": 20})
@@ -114,9 +107,7 @@ def test_light_coupler_under_its_drive_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scene", ["closed-loop", "obstacles", "trammel"])
-def test_results_do_not_depend_on_the_check(
-    scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_results_do_not_depend_on_the_check(scene, tmp_path, monkeypatch):
     checked = hl.run(scene, {"duration": 0.5}, out=tmp_path / "checked", figures=False)
     monkeypatch.setattr(step_check.StepCheck, "possible", lambda description: False)
     plain = hl.run(scene, {"duration": 0.5}, out=tmp_path / "plain", figures=False)
@@ -130,9 +121,7 @@ def test_results_do_not_depend_on_the_check(
 
 
 @pytest.mark.parametrize("loop", ["python", "compiled"])
-def test_what_is_found_does_not_depend_on_loop_and_room(
-    loop: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_found_does_not_depend_on_loop_and_room(loop, monkeypatch):
     expected = run_once("obstacles", {"duration": 1.0}).run["step_errors"]
     monkeypatch.setenv(CHOICE, loop)
     monkeypatch.setattr(step_check, "ROOM", 1)  # as many checks as grow the arrays three times

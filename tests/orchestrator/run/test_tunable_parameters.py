@@ -1,9 +1,5 @@
 """Connections to parameters: tunable ones act at each communication point, fixed ones once."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -16,13 +12,13 @@ GAIN = PAIR.replace("takes.u", "takes.gain")
 
 
 @pytest.fixture
-def fmus(tmp_path: Path) -> Path:
+def fmus(tmp_path):
     python_fmu(tmp_path, "Gives", "self.y = 100.0 + 400.0 * (time + size)")
     python_fmu(tmp_path, "Takes", "self.y = self.gain")
     return tmp_path
 
 
-def test_a_tunable_parameter_is_set_at_each_communication_point(fmus: Path) -> None:
+def test_a_tunable_parameter_is_set_at_each_communication_point(fmus):
     results = simulate(str(scene(fmus, GAIN)), fmus / "out").results
     given = results.haptics["gives.y"]
     np.testing.assert_array_equal(results.haptics["takes.y"][1:], given[:-1])
@@ -30,13 +26,13 @@ def test_a_tunable_parameter_is_set_at_each_communication_point(fmus: Path) -> N
     assert results.run["delays"]["gives.y -> takes.gain"]["max"] == 0.0
 
 
-def test_a_fixed_parameter_is_set_once(fmus: Path) -> None:
+def test_a_fixed_parameter_is_set_once(fmus):
     edited(fmus / "Takes.fmu", lambda text: text.replace('"tunable"', '"fixed"'))
     results = simulate(str(scene(fmus, GAIN)), fmus / "out").results
     np.testing.assert_array_equal(results.haptics["takes.y"], 0.0)
 
 
-def test_a_gain_held_across_rates_goes_with_an_ssp(fmus: Path) -> None:
+def test_a_gain_held_across_rates_goes_with_an_ssp(fmus):
     text = GAIN.replace('"Gives.fmu"\n', '"Gives.fmu"\nrate = 16\n')
     path = scene(fmus, text + 'hold = "foh"\nfactor = 2.0\noffset = 1.0\n')
     first = simulate(str(path), fmus / "a").results
@@ -62,7 +58,7 @@ fmu = [{ name = "gives", path = "Gives.fmu", rate = "haptics" }]
 
 
 @pytest.mark.parametrize("packaging", ["python", "native"])
-def test_a_spring_that_stiffens_in_steps(fmus: Path, packaging: str) -> None:
+def test_a_spring_that_stiffens_in_steps(fmus, packaging):
     """m x'' = -k(t_k) x over each step, in closed form."""
     path = scene(fmus, f'packaging = "{packaging}"' + MASS, rate=512)
     table = simulate(str(path), fmus / "out").results.haptics

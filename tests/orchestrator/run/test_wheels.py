@@ -1,7 +1,5 @@
 """Platforms that the loop is compiled for: each wheel has one library."""
 
-from pathlib import Path
-
 import pytest
 from packaging.tags import sys_tags
 
@@ -9,7 +7,7 @@ from hapticlink.fmus.native.compiler_cache import linker_cache
 from hapticlink.orchestrator.run.compiled import build
 
 
-def test_pip_takes_the_wheel_of_this_machine() -> None:
+def test_pip_takes_the_wheel_of_this_machine():
     tag = build.this_machine()
     if tag is None:
         pytest.skip("no wheels are made for this platform")
@@ -20,9 +18,7 @@ def test_pip_takes_the_wheel_of_this_machine() -> None:
     ("tag", "magic"),
     [("win_amd64", b"MZ"), ("manylinux_2_17_aarch64", b"\x7fELF\x02\x01")],
 )
-def test_the_loop_compiles_for_another_platform(
-    tag: str, magic: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_loop_compiles_for_another_platform(tag, magic, tmp_path, monkeypatch):
     """With the C library for Windows that other tests of this run link with: zig takes a minute to
     build it."""
     pytest.importorskip("ziglang", reason="cross-compiling needs ziglang")
@@ -36,6 +32,6 @@ def test_the_loop_compiles_for_another_platform(
     assert b"hapticlink_events" in content
 
 
-def test_an_unknown_platform_is_an_error() -> None:
+def test_an_unknown_platform_is_an_error():
     with pytest.raises(KeyError, match="win32"):
         build.zig("win32")

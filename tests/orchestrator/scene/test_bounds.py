@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 
@@ -33,18 +32,18 @@ def refused(scene: object, *options: str) -> str:
         "x = " + "[" * 20 + "{" + "a." * 20 + "b = 1}" + "]" * 20,
     ],
 )
-def test_what_is_too_deep_is_told_before_it_is_parsed(text: str) -> None:
+def test_what_is_too_deep_is_told_before_it_is_parsed(text):
     with pytest.raises(SceneFault, match=r"more than 32 names or brackets deep \(at line [12]\)"):
         read_and_check.read(text)
 
 
-def test_a_key_of_too_many_names_is_no_option() -> None:
+def test_a_key_of_too_many_names_is_no_option():
     assert "a key of 301 names" in refused("four-bar", "a." * 300 + "a=1")
     assert len(refused("four-bar", "a=" + "[" * 60_000)) < 1000
     assert "write it flatter" in refused("four-bar", "linkage.start.x=" + "[" * 31 + "]" * 31)
 
 
-def test_dots_without_an_equals_sign_take_no_time() -> None:
+def test_dots_without_an_equals_sign_take_no_time():
     assert "write key=value" in refused("four-bar", " . " * 40_000)
     assert overrides.parse(' a . "b.c" = 1')[0] == ("a", "b.c")
 
@@ -61,7 +60,7 @@ def test_dots_without_an_equals_sign_take_no_time() -> None:
         ("linkage.body." + "9" * 5000 + ".mass=1", "no entry '999"),
     ],
 )
-def test_values_that_no_scene_can_hold(option: str, message: str) -> None:
+def test_values_that_no_scene_can_hold(option, message):
     said = refused("four-bar", option)
     assert message in said
     assert len(said) < 1000
@@ -72,15 +71,15 @@ def test_values_that_no_scene_can_hold(option: str, message: str) -> None:
     ["1e308", "'1e99999999'", "'1e-99999999'", "'1e+09999'", "nan", "'1/0'", "1e400", "0"],
 )
 @pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
-def test_rates_and_times_out_of_any_range(key: str, value: str) -> None:
+def test_rates_and_times_out_of_any_range(key, value):
     assert f"--set {key}={value}: {key}: " in refused("closed-loop", f"{key}={value}")
 
 
-def test_a_rate_whose_period_outlasts_the_run() -> None:
+def test_a_rate_whose_period_outlasts_the_run():
     assert "less than a haptic period" in refused("closed-loop", "haptics.rate=5e-324")
 
 
-def test_names_that_no_file_can_have() -> None:
+def test_names_that_no_file_can_have():
     for name in ("a" * 300, "." * 300, "./" * 300, "a\0b"):
         assert "neither a file nor a shipped scene" in refused(name)
     text = GOOD + "[[fmu]]\nname = 'x'\npath = '" + "a" * 300 + "'"
@@ -88,7 +87,7 @@ def test_names_that_no_file_can_have() -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="has no such files")
-def test_only_files_of_bounded_size_are_read(tmp_path: Path) -> None:
+def test_only_files_of_bounded_size_are_read(tmp_path):
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "long.toml").write_text(GOOD + "#" * 2**23)
     assert "more than 8388608 bytes" in refused(tmp_path / "long.toml")
@@ -106,12 +105,12 @@ def test_only_files_of_bounded_size_are_read(tmp_path: Path) -> None:
     "values",
     ["1e400..1e401", "1..1e99999999", "0..1e-400..1e-401", "1..2:" + "9" * 5000, "1..2..1e-300"],
 )
-def test_ranges_without_end(values: str) -> None:
+def test_ranges_without_end(values):
     with pytest.raises(InputFault, match="--vary x="):
         grid.parse(f"x={values}")
 
 
-def test_grids_without_end() -> None:
+def test_grids_without_end():
     with pytest.raises(InputFault, match="10000000000 runs"):
         grid.grid([grid.parse("x=1..100000"), grid.parse("y=1..100000")])
 
@@ -124,19 +123,19 @@ def test_grids_without_end() -> None:
         ("runs.toml", "[[run]]\nx = " + "[" * 40, "not TOML: more than 32"),
     ],
 )
-def test_lists_of_runs_without_end(tmp_path: Path, name: str, text: str, message: str) -> None:
+def test_lists_of_runs_without_end(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
     with pytest.raises(InputFault, match=message):
         grid.listed(tmp_path / name)
 
 
-def test_a_date_in_a_list_of_runs_is_told_of_by_its_run(tmp_path: Path) -> None:
+def test_a_date_in_a_list_of_runs_is_told_of_by_its_run(tmp_path):
     (tmp_path / "runs.toml").write_text("[[run]]\nduration = 2020-01-01\n")
     (point,) = grid.listed(tmp_path / "runs.toml")
     assert "2020-01-01" in refused("four-bar", f"duration={point['duration']}")
 
 
-def test_findings_are_shown_to_the_twentieth() -> None:
+def test_findings_are_shown_to_the_twentieth():
     with pytest.raises(SceneFault) as fault:
         read_and_check.read(GOOD + "[holds]\n" + "".join(f"a{i}.b = 'zoo'\n" for i in range(70)))
     assert len(fault.value.findings) == 70
@@ -145,7 +144,7 @@ def test_findings_are_shown_to_the_twentieth() -> None:
     assert lines[-1] == "  and 50 more, left out here"
 
 
-def test_scenes_extend_one_another_to_the_twentieth(tmp_path: Path) -> None:
+def test_scenes_extend_one_another_to_the_twentieth(tmp_path):
     for i in range(300):
         (tmp_path / f"{i}.toml").write_text(f"extends = '{i + 1}.toml'\n")
     assert "the last of 20 scenes" in refused(tmp_path / "0.toml")
@@ -171,7 +170,7 @@ def _lines(function: Callable[[], object]) -> int:
         count += event == "line"
         return trace
 
-    sys.settrace(trace)  # type: ignore[arg-type]
+    sys.settrace(trace)
     try:
         function()
     finally:
@@ -189,9 +188,9 @@ def _lines(function: Callable[[], object]) -> int:
     ],
     ids=["bodies", "faults", "unknown keys", "remarks"],
 )
-def test_time_grows_with_the_size_of_a_file(text: Callable[[int], str]) -> None:
-    def read(n: int) -> Callable[[], object]:
-        def reads() -> None:
+def test_time_grows_with_the_size_of_a_file(text):
+    def read(n):
+        def reads():
             with suppress(SceneFault):
                 read_and_check.read(text(n))
 
@@ -202,13 +201,13 @@ def test_time_grows_with_the_size_of_a_file(text: Callable[[int], str]) -> None:
     assert large < 2.2 * small
 
 
-def test_bodies_that_hold_one_another_are_told_once() -> None:
+def test_bodies_that_hold_one_another_are_told_once():
     text = _chain(5).replace("parent = 'b0'", "parent = 'b4'")
     found = findings(text)
     assert [k for k, (_, m) in found.items() if "circle" in m] == ["linkage.body[1] (b1)"]
 
 
-def test_a_spring_on_a_body_that_is_not_there() -> None:
+def test_a_spring_on_a_body_that_is_not_there():
     spring = "[[linkage.spring]]\nbodies = ['bra', 'ground']\nat = [[0.0, 0.0], [0.0, 0.0]]\n"
     found = findings(GOOD + spring)
     message = "no body 'bra'; did you mean 'bar'?"
@@ -219,7 +218,7 @@ def test_a_spring_on_a_body_that_is_not_there() -> None:
     "corners",
     ["[[0, 0], [1, 0], [1, 0], [0, 1]]", "[[0, 0]]", "[]", "[[0, 0], [0, 0], [0, 0]]"],
 )
-def test_polygons_that_are_none(corners: str) -> None:
+def test_polygons_that_are_none(corners):
     for key in ("contacts.polygon.0.corners", "contacts.enclosure"):
         scene = "obstacles" if "polygon" in key else "enclosure"
         assert "contacts" in refused(scene, f"{key}={corners}")

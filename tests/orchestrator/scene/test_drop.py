@@ -1,9 +1,6 @@
 """`drop`: keys of the base scene that are not inherited."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +8,7 @@ import pytest
 import hapticlink as hl
 
 
-def test_a_dropped_key_of_the_base_is_not_inherited(tmp_path: Path) -> None:
+def test_a_dropped_key_of_the_base_is_not_inherited(tmp_path):
     base, top = tmp_path / "base.toml", tmp_path / "top.toml"
     base.write_text('extends = "five-bar"\nholds = { "a.b" = "foh" }\nmechanism.substeps = 3\n')
     top.write_text(
@@ -36,9 +33,7 @@ def test_a_dropped_key_of_the_base_is_not_inherited(tmp_path: Path) -> None:
         ('title = "t"\ndrop = ["linkage"]', "there is no base scene"),
     ],
 )
-def test_what_cannot_be_dropped_is_refused_with_its_line(
-    lines: str, message: str, tmp_path: Path
-) -> None:
+def test_what_cannot_be_dropped_is_refused_with_its_line(lines, message, tmp_path):
     path = tmp_path / "top.toml"
     path.write_text(lines + "\n")
     with pytest.raises(hl.InputFault, match=r"line 2: drop: .*" + re.escape(message)):

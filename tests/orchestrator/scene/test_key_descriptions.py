@@ -1,7 +1,5 @@
 """Every key of a scene has a meaning, and every number a unit and a range."""
 
-from __future__ import annotations
-
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
@@ -36,13 +34,13 @@ def bare(hint: Any) -> Iterator[Any]:
 RECORDS = tuple(dict.fromkeys(records(Scene)))
 
 
-def test_records_of_every_table_are_found() -> None:
+def test_records_of_every_table_are_found():
     names = {record.__name__ for record in RECORDS}
     assert {"Body", "PDDrive", "Observer", "ArmHand", "VariableRate", "Latency", "Trace"} <= names
 
 
 @pytest.mark.parametrize("record", RECORDS)
-def test_every_key_has_a_meaning_and_every_number_a_quantity(record: Any) -> None:
+def test_every_key_has_a_meaning_and_every_number_a_quantity(record):
     meanings = key_descriptions.meanings(record)
     for name, hint in schema.hints(record).items():
         assert meanings[name].endswith("."), name

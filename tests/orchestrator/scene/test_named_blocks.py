@@ -1,7 +1,5 @@
 """[[fmu]] with a block of the package, in place of an FMU's file."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -23,7 +21,7 @@ start.re = -2.0
 """
 
 
-def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path: Path) -> None:
+def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path):
     """x' = s x: z = 1/(1 - s h) backward, (1 + s h/2)/(1 - s h/2) trapezoidal, of each step."""
     text = HEAD + pole("fast", "backward") + pole("slow", "trapezoidal", "rate = 10")
     results = simulate(
@@ -55,13 +53,13 @@ def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path: Path) -> None:
         ("rate = 10", "line 4: fmu[0] (one).block: is missing, and so is path"),
     ],
 )
-def test_faults_stand_at_their_place(keys: str, finding: str) -> None:
+def test_faults_stand_at_their_place(keys, finding):
     with pytest.raises(SceneFault) as fault:
         read_and_check.read(f'{HEAD}[[fmu]]\nname = "one"\n{keys}\n')
     assert [finding] == [str(f)[: len(finding)] for f in fault.value.findings]
 
 
-def test_a_file_takes_neither_block_nor_settings(tmp_path: Path) -> None:
+def test_a_file_takes_neither_block_nor_settings(tmp_path):
     (tmp_path / "a.fmu").touch()
     text = f'{HEAD}[[fmu]]\nname = "one"\npath = "a.fmu"\nblock = "hand"\nsettings.hand = 1\n'
     with pytest.raises(SceneFault) as fault:
@@ -70,6 +68,6 @@ def test_a_file_takes_neither_block_nor_settings(tmp_path: Path) -> None:
     assert told == [f"fmu[0] (one).{key}" for key in ("settings.hand", "block")]
 
 
-def test_values_that_give_no_component(tmp_path: Path) -> None:
+def test_values_that_give_no_component(tmp_path):
     with pytest.raises(InputFault, match=r"discrete_equivalent: .*'sideways'"):
         simulate(read_and_check.read(HEAD + pole("one", "sideways")), tmp_path / "out")

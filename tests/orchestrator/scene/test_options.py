@@ -3,7 +3,6 @@
 import pickle
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,12 +27,12 @@ VALUES = st.recursive(
 
 
 @given(VALUES)
-def test_a_value_comes_back_from_its_text(value: Any) -> None:
+def test_a_value_comes_back_from_its_text(value):
     (option,) = overrides.written({"a.b": value})
     assert overrides.parse(option) == (("a", "b"), value)
 
 
-def test_words_numbers_and_arrays_are_written_as_on_the_command_line() -> None:
+def test_words_numbers_and_arrays_are_written_as_on_the_command_line():
     given = {
         "hold": "foh", "graphics.rate": 10, "controller.topology": False, "title": "1",
         "hand.wrench": np.array([0.1, 0, 2]), "controller.damping": (1, np.float64(2), 3.5),
@@ -47,22 +46,22 @@ def test_words_numbers_and_arrays_are_written_as_on_the_command_line() -> None:
 
 
 @pytest.mark.parametrize("value", [None, object(), b"10", {1, 2}, [None]])
-def test_what_no_scene_can_hold_is_refused(value: object) -> None:
+def test_what_no_scene_can_hold_is_refused(value):
     with pytest.raises(InputFault, match=r"graphics\.rate: .* is no value of a scene"):
         overrides.written({"graphics.rate": value})
 
 
-def test_pairs_are_no_options() -> None:
+def test_pairs_are_no_options():
     with pytest.raises(InputFault, match=r"option \('graphics.rate', 10\): write key=value, or"):
-        open_scene.load("closed-loop", [("graphics.rate", 10)])  # type: ignore[list-item]
+        open_scene.load("closed-loop", [("graphics.rate", 10)])
 
 
-def test_one_text_is_no_list_of_options() -> None:
+def test_one_text_is_no_list_of_options():
     with pytest.raises(InputFault, match="give a mapping, or a list"):
         overrides.written("graphics.rate=10")
 
 
-def test_a_scene_object_takes_options_as_its_name_does(tmp_path: Path) -> None:
+def test_a_scene_object_takes_options_as_its_name_does(tmp_path):
     (tmp_path / "bar.toml").write_text(BAR)
     more = {"haptics.rate": 100, "linkage.body.bar.mass": 2.0}
     wanted = open_scene.load(tmp_path / "bar.toml", {"duration": 0.1, **more})
@@ -77,7 +76,7 @@ def test_a_scene_object_takes_options_as_its_name_does(tmp_path: Path) -> None:
     assert chain.linkage == open_scene.load("n-four-bar", ["linkage.n=2"]).linkage
 
 
-def test_faults_of_a_scene_object_name_option_and_line(tmp_path: Path) -> None:
+def test_faults_of_a_scene_object_name_option_and_line(tmp_path):
     (tmp_path / "bar.toml").write_text(BAR.replace("0.25", "0.25\nhold = 'foh'"))
     read = open_scene.load(tmp_path / "bar.toml")
     with pytest.raises(SceneFault) as refused:
@@ -90,7 +89,7 @@ def test_faults_of_a_scene_object_name_option_and_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
-def test_a_scene_is_read_again_from_its_records(name: str) -> None:
+def test_a_scene_is_read_again_from_its_records(name):
     read = open_scene.load(name)
     made = replace(read, title="made in Python")
     assert made.source is None
@@ -98,7 +97,7 @@ def test_a_scene_is_read_again_from_its_records(name: str) -> None:
     assert again == read
 
 
-def test_a_scene_made_in_python_is_checked() -> None:
+def test_a_scene_made_in_python_is_checked():
     made = replace(open_scene.load("five-bar"), hold="zho")
     with pytest.raises(SceneFault, match="no hold 'zho'; did you mean 'zoh'"):
         open_scene.load(made)

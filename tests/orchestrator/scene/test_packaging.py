@@ -20,7 +20,7 @@ TABLES = ("haptics.csv", "graphics.csv")
 
 
 @pytest.fixture(scope="module")
-def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def native(tmp_path_factory):
     """The folder of a native run of the report's experiment."""
     folder = tmp_path_factory.mktemp("native")
     assert simulate("closed-loop", folder, NATIVE).outcome.fault is None
@@ -31,19 +31,19 @@ def same(one: Path, two: Path) -> bool:
     return all((one / name).read_bytes() == (two / name).read_bytes() for name in TABLES)
 
 
-def test_a_run_gives_the_same_bytes(native: Path, tmp_path: Path) -> None:
+def test_a_run_gives_the_same_bytes(native, tmp_path):
     assert simulate("closed-loop", tmp_path, SHORT).outcome.fault is None
     assert (native / "haptics.csv").read_text().count("\n") > 100
     assert same(native, tmp_path)
 
 
-def test_run_json_says_it(native: Path, tmp_path: Path) -> None:
+def test_run_json_says_it(native, tmp_path):
     told = json.loads((native / "run.json").read_text())
     assert told["scene"]["packaging"] == "native"
     assert told["versions"]["ziglang"] == compiler.compiler_version()
 
 
-def test_an_exported_scene_runs_again(native: Path, tmp_path: Path) -> None:
+def test_an_exported_scene_runs_again(native, tmp_path):
     """The SSP holds the compiled FMUs, and says nothing of how they were made."""
     assert status("export", "closed-loop", *sets(NATIVE), "--out", tmp_path) == 0
     path = tmp_path / "closed-loop.ssp"
@@ -57,19 +57,17 @@ def test_an_exported_scene_runs_again(native: Path, tmp_path: Path) -> None:
     assert same(native, tmp_path / "again")
 
 
-def test_all_platforms_are_for_what_is_compiled(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_platforms_are_for_what_is_compiled(tmp_path, capsys):
     assert status("build", "five-bar", "--all-platforms", "--out", tmp_path) == 2
     assert "--set packaging=native" in capsys.readouterr().err
 
 
-def test_all_platforms_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_platforms_are_asked_for(tmp_path, monkeypatch):
     """Compiled by a stand-in: tests/fmus/test_native_fmu.py compiles."""
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")
     asked = []
 
-    def compiled(source: Path, library: Path, platform: str) -> Path:
+    def compiled(source, library, platform):
         asked.append(platform)
         library.write_bytes(platform.encode())
         return library
@@ -84,9 +82,7 @@ def test_all_platforms_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("packaging", ["python", "native"])
-def test_two_hands_are_two_fmus(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, packaging: str
-) -> None:
+def test_two_hands_are_two_fmus(tmp_path, monkeypatch, packaging):
     """Of the same component, with the wrench of each; nothing comes from a cache."""
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")
     option = f"packaging={packaging}"
@@ -97,22 +93,20 @@ def test_two_hands_are_two_fmus(
     assert len({(tmp_path / name).read_bytes() for name in built}) == len(built)
 
 
-def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(tmp_path, monkeypatch):
     from hapticlink.orchestrator.system.fmu_files import fmu_files
     from hapticlink.orchestrator.system.timeline import timeline
 
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
 
-    def compiled(source: Path, library: Path, platform: str) -> Path:
+    def compiled(source, library, platform):
         library.write_bytes(platform.encode())
         return library
 
     monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
     scene = open_scene.load("pendulum", ("packaging=native",))
 
-    def built(*platforms: str) -> Path:
+    def built(*platforms):
         return fmu_files(scene, blocks(scene), timeline(scene), tmp_path, platforms)[
             "virtual_mechanism"
         ]
@@ -123,10 +117,8 @@ def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(
     assert len(paths | {built("linux64")}) == 4
 
 
-def test_without_ziglang_it_is_bad_input(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def missing(name: str) -> str:
+def test_without_ziglang_it_is_bad_input(tmp_path, monkeypatch, capsys):
+    def missing(name):
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(compiler, "version", missing)

@@ -1,7 +1,5 @@
 """A number out of its range is refused, with its key, its place, the range and the unit."""
 
-from __future__ import annotations
-
 import math
 import re
 
@@ -23,7 +21,7 @@ SCHEMA = jsonschema.Draft202012Validator(json_schema())
 
 @settings(max_examples=150)
 @given(st.data())
-def test_numbers_of_shipped_scenes_out_of_range(data: st.DataObject) -> None:
+def test_numbers_of_shipped_scenes_out_of_range(data):
     name = data.draw(st.sampled_from(SCENES), "scene")
     number = data.draw(st.sampled_from(of_scene(name)), "number")
     value = data.draw(beyond(number), "value")
@@ -58,9 +56,7 @@ def test_numbers_of_shipped_scenes_out_of_range(data: st.DataObject) -> None:
         ("controller.damping=[-1,-1,-1]", "controller.damping[0]", ">= 0 (N.s/m)"),
     ],
 )
-def test_what_once_ran_is_refused(
-    option: str, key: str, limits: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_once_ran_is_refused(option, key, limits, capsys):
     assert status("run", "closed-loop", "--set", option) == 2
     value = option.partition("=")[2].strip("[]").partition(",")[0]
     expected = f": {key}: {float(value):g} is out of range: give a number {limits}"
@@ -80,6 +76,6 @@ def test_what_once_ran_is_refused(
         (["linkage.family=n-four-bar", "linkage.n=1001"], ">= 1 and <= 1000"),
     ],
 )
-def test_numbers_that_limit_each_other(options: list[str], message: str) -> None:
+def test_numbers_that_limit_each_other(options, message):
     with pytest.raises(SceneFault, match=re.escape(message)):
         read_and_check.read(GOOD, options)

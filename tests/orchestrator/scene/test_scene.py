@@ -48,14 +48,14 @@ def findings(text: str, *options: str) -> dict[str, tuple[int | None, str]]:
     return {f.key: (f.line, f.message) for f in refused.value.findings}
 
 
-def test_a_good_scene_is_read() -> None:
+def test_a_good_scene_is_read():
     scene = read_and_check.read(GOOD)
     assert scene.hand is not None
     assert scene.hand.type == "constant"
     assert scene.ends_when == "haptic_device.workspace_margin < 0"
 
 
-def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tmp_path) -> None:
+def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tmp_path):
     hand = '[hand]\ntype = "spring"\nstiffness = [1.0, 1.0, 1.0]\n'
     rows = hand + "target = [[0.0, 0.0, 0.0, 0.0], [1.0, 0.1, 0.0, 0.0]]\n"
     (tmp_path / "base.toml").write_text(GOOD[: GOOD.index("[hand]")] + rows)
@@ -71,7 +71,7 @@ def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tm
     assert "give a number >= 0 (Hz)" in found["hand.target.frequency[0]"][1]
 
 
-def test_all_faults_at_once_with_line_and_remedy() -> None:
+def test_all_faults_at_once_with_line_and_remedy():
     text = GOOD.replace("mass = 1.0", "mas = 1.0").replace('child = "bar"', 'child = "bra"')
     text = text.replace("rate = 30", "rate = -3").replace("duration = 1.0", 'duration = "1"')
     found = findings(text + "[holds]\nx = 'zog'\n")
@@ -107,13 +107,13 @@ def test_all_faults_at_once_with_line_and_remedy() -> None:
         ('name = "pivot"', 'name = "pivot"\nparent = "bar"', "linkage.body[0] (bar)", "circle"),
     ],
 )
-def test_one_fault(old: str, new: str, key: str, message: str) -> None:
+def test_one_fault(old, new, key, message):
     assert old in GOOD
     found = findings(GOOD.replace(old, new))
     assert message in found[key][1]
 
 
-def test_options_change_the_scene_and_are_named_in_faults() -> None:
+def test_options_change_the_scene_and_are_named_in_faults():
     options = [
         "controller.topology=false",
         "graphics.rate={min=10, max=60, seed=4}",
@@ -138,19 +138,19 @@ def test_options_change_the_scene_and_are_named_in_faults() -> None:
 
 
 @pytest.mark.parametrize("option", ["novalue", "=3", "linkage.body.bax.mass=1"])
-def test_options_that_cannot_be_applied(option: str) -> None:
+def test_options_that_cannot_be_applied(option):
     with pytest.raises(InputFault, match=f"--set {option}"):
         read_and_check.read(GOOD, [option])
 
 
-def test_sensing_reaches_the_device() -> None:
+def test_sensing_reaches_the_device():
     built = {
         b.name: b.settings for b in blocks(read_and_check.read(GOOD, ["sensing=encoders"])).built
     }
     assert built["haptic_device"]["encoders"]
 
 
-def test_every_shipped_scene_is_good_and_found_by_name() -> None:
+def test_every_shipped_scene_is_good_and_found_by_name():
     assert "closed-loop" in find_scene.shipped()
     for name in find_scene.shipped():
         assert open_scene.load(name).title
@@ -158,12 +158,12 @@ def test_every_shipped_scene_is_good_and_found_by_name() -> None:
         open_scene.load("closed-lop")
 
 
-def test_not_toml() -> None:
+def test_not_toml():
     with pytest.raises(SceneFault, match="line 1, column"):
         read_and_check.read("title = =")
 
 
-def test_lines_of_keys_after_texts_and_arrays_over_several_lines() -> None:
+def test_lines_of_keys_after_texts_and_arrays_over_several_lines():
     text = 'a = """\n[x]\nb = 1\n"""\nc.d = [\n  1, # ]\n  2]\n'
     text += '[t]\ne = {f = 1}\n[[s]]\n[[s]]\n"g.h"=1\n'
     lines = key_lines(text)
@@ -183,14 +183,14 @@ def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
     assert scene.linkage == open_scene.load("closed-loop").linkage
 
 
-def test_too_short_a_vector_and_a_misspelt_key_are_both_told() -> None:
+def test_too_short_a_vector_and_a_misspelt_key_are_both_told():
     text = GOOD.replace("  0.0,\n  0.0,\n", "  0.0,\n").replace("rate = 30", "rat = 30")
     found = findings(text)
     assert found["hand.wrench[2]"][1] == "is missing"
     assert "did you mean 'rate'" in found["graphics.rat"][1]
 
 
-def test_a_scene_that_is_not_a_table_where_one_is_needed() -> None:
+def test_a_scene_that_is_not_a_table_where_one_is_needed():
     assert "graphics" in findings(
         GOOD.replace("[graphics]\nrate = 30\n", "").replace(
             "duration = 1.0", "duration = 1.0\ngraphics = 3"
@@ -199,5 +199,5 @@ def test_a_scene_that_is_not_a_table_where_one_is_needed() -> None:
 
 
 @pytest.mark.parametrize("value", ["3", "'x'", "[1.0]"])
-def test_a_hand_that_is_no_table(value: str) -> None:
+def test_a_hand_that_is_no_table(value):
     assert any(key.startswith("hand") for key in findings(GOOD, f"hand = {value}"))

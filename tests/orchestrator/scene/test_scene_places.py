@@ -33,33 +33,33 @@ def told(text: str, *options: str, folder: Path | None = None) -> str:
 @pytest.mark.parametrize(
     "text", ["", '[holds]\n"e.P_c" = "foh"\n', 'holds.e.P_c = "foh"\n', '[holds.e]\nP_c = "foh"\n']
 )
-def test_a_name_with_dots_is_one_name_in_every_spelling(key: str, text: str) -> None:
+def test_a_name_with_dots_is_one_name_in_every_spelling(key, text):
     whole = text + GOOD if text.startswith("holds") else GOOD + text
     scene = read_and_check.read(whole, [f"holds.{key}=lead"])
     assert scene.holds == {"e.P_c": "lead"}
 
 
 @pytest.mark.parametrize("option", ['delays."e.P_c".loss=0.5', "delays.e.P_c.loss=0.5"])
-def test_a_part_of_a_delay_is_set_beside_its_others(option: str) -> None:
+def test_a_part_of_a_delay_is_set_beside_its_others(option):
     late = read_and_check.read(GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option])
     found = late.delays["e.P_c"]
-    assert (found.min, found.loss, found.seed) == (0.1, 0.5, 3)  # type: ignore[union-attr]
+    assert (found.min, found.loss, found.seed) == (0.1, 0.5, 3)
 
 
 @given(st.lists(st.text(min_size=1), min_size=1, max_size=4))
-def test_any_names_in_quotes_come_back(names: list[str]) -> None:
+def test_any_names_in_quotes_come_back(names):
     escaped = ("".join(rf"\U{ord(c):08X}" for c in name) for name in names)
     quoted = ".".join(f'"{name}"' for name in escaped)
     assert overrides.parse(f"{quoted} = 1") == (tuple(names), 1)
 
 
-def test_names_that_are_no_key_of_toml_go_by_their_dots() -> None:
+def test_names_that_are_no_key_of_toml_go_by_their_dots():
     assert overrides.parse("fmu.plant.start.x[1]=a=b") == (("fmu", "plant", "start", "x[1]"), "a=b")
     slow = "a" * 60 + " b=3"  # no time that grows with 2^60
     assert overrides.parse(slow) == (("a" * 60 + " b",), 3)
 
 
-def test_connections_that_are_not_there(tmp_path: Path) -> None:
+def test_connections_that_are_not_there(tmp_path):
     for option in ('holds."controller.P_d"=lead', "delays.controller.P_d=0.1"):
         with pytest.raises(SceneFault) as refused:
             simulate(str(_file(tmp_path, CLOSED)), tmp_path / "out", [option])
@@ -102,7 +102,7 @@ def test_connections_that_are_not_there(tmp_path: Path) -> None:
         ),
     ],
 )  # fmt: skip
-def test_a_shape_is_told_in_words_of_the_scene(option: str, message: str) -> None:
+def test_a_shape_is_told_in_words_of_the_scene(option, message):
     arm = GOOD[: GOOD.index("wrench")] + 'type = "arm"\nmass = [1.0, 1.0, 0.002]\n'
     found = told(arm + "target = [[0.0, 0.0, 0.0, 0.0]]\n", option)
     assert message in found
@@ -110,12 +110,12 @@ def test_a_shape_is_told_in_words_of_the_scene(option: str, message: str) -> Non
     assert others == (option == "hand.type=spring")  # and its stiffness, which is missing
 
 
-def test_nan_as_a_start_value(tmp_path: Path) -> None:
+def test_nan_as_a_start_value(tmp_path):
     text = '[[fmu]]\nname = "p"\npath = "p.fmu"\nstart.mass = nan\n'
     assert "line 4: fmu[0] (p).start.mass: nan is out of range: give a finite number" in told(text)
 
 
-def test_shape_faults_and_others_are_told_together(tmp_path: Path) -> None:
+def test_shape_faults_and_others_are_told_together(tmp_path):
     text = CLOSED + 'hold = "zog"\nduration = "1"\n[graphics]\nrate = "fast"\n[[connection]]\n'
     text += 'from = "handle.F"\n[hand]\ntype = "sprin"\n[holds]\n"controller.x_D" = "zog"\n'
     found = told(text)
@@ -132,13 +132,13 @@ def test_shape_faults_and_others_are_told_together(tmp_path: Path) -> None:
     assert found.startswith("scene: 7 faults")
 
 
-def test_an_unknown_type_of_a_joint_hides_nothing() -> None:
+def test_an_unknown_type_of_a_joint_hides_nothing():
     found = told(GOOD.replace('name = "pivot"', 'name = "pivot"\ntype = "x"'), "haptics.rate=-1")
     assert "joint[0] (pivot).type: 'x' should be 'revolute'" in found
     assert "haptics.rate: -1 is out of range: give a number > 0" in found
 
 
-def test_a_missing_name_makes_no_fault_where_it_is_spoken_of() -> None:
+def test_a_missing_name_makes_no_fault_where_it_is_spoken_of():
     assert told(GOOD.replace('name = "bar"\n', "")).startswith("scene: 1 fault\n")
 
 
@@ -152,9 +152,7 @@ def _file(folder: Path, text: str, name: str = "top.toml") -> Path:
     return path
 
 
-def test_extends_is_looked_up_from_the_file_that_says_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_extends_is_looked_up_from_the_file_that_says_it(tmp_path, monkeypatch):
     _file(tmp_path, GOOD, "a/base/crank.toml")
     _file(tmp_path, 'extends = "base/crank.toml"\nhold = "foh"\n', "a/middle.toml")
     top = _file(tmp_path, 'extends = "../a/middle.toml"\ntitle = "top"\n', "b/top.toml")
@@ -166,7 +164,7 @@ def test_extends_is_looked_up_from_the_file_that_says_it(
         open_scene.load(str(lost))
 
 
-def test_what_a_base_extends_in_vain_names_the_base(tmp_path: Path) -> None:
+def test_what_a_base_extends_in_vain_names_the_base(tmp_path):
     base = _file(tmp_path, 'title = "x"\nextends = "closed-lop"\n', "base.toml")
     top = _file(tmp_path, 'extends = "base.toml"\n')
     with pytest.raises(InputFault) as refused:
@@ -175,14 +173,14 @@ def test_what_a_base_extends_in_vain_names_the_base(tmp_path: Path) -> None:
     assert "did you mean 'closed-loop'?" in str(refused.value)
 
 
-def test_scenes_in_two_folders_that_extend_each_other_are_a_circle(tmp_path: Path) -> None:
+def test_scenes_in_two_folders_that_extend_each_other_are_a_circle(tmp_path):
     _file(tmp_path, 'extends = "../b/two.toml"\n', "a/one.toml")
     two = _file(tmp_path, 'extends = "../a/one.toml"\n', "b/two.toml")
     with pytest.raises(InputFault, match="circle"):
         open_scene.load(str(two))
 
 
-def test_an_inherited_fault_names_the_base_and_its_line(tmp_path: Path) -> None:
+def test_an_inherited_fault_names_the_base_and_its_line(tmp_path):
     text = GOOD.replace("mass = 1.0", "mass = -1.0").replace("rate = 30", "rate = -3")
     base = _file(tmp_path, text, "base.toml")
     top = _file(tmp_path, 'extends = "base.toml"\nhold = "zog"\n[graphics]\nphase = 0.01\n')
@@ -192,7 +190,7 @@ def test_an_inherited_fault_names_the_base_and_its_line(tmp_path: Path) -> None:
     assert "\n  line 2: hold: no hold 'zog'" in found
 
 
-def test_what_replaces_an_array_of_the_base_stands_in_the_file_itself(tmp_path: Path) -> None:
+def test_what_replaces_an_array_of_the_base_stands_in_the_file_itself(tmp_path):
     _file(tmp_path, GOOD, "base.toml")
     text = 'extends = "base.toml"\n[[linkage.body]]\nname = "bar"\ninertia = 0.1\n'
     found = told(text, folder=tmp_path)
@@ -203,9 +201,7 @@ def test_what_replaces_an_array_of_the_base_stands_in_the_file_itself(tmp_path: 
     ("trace", "message"),
     [(None, "cannot be read"), ("t\n0.1\n0.2\n0.1\n", "line 4: 0.1 s is not after")],
 )
-def test_a_bad_trace_is_told_beside_other_faults(
-    tmp_path: Path, trace: str | None, message: str
-) -> None:
+def test_a_bad_trace_is_told_beside_other_faults(tmp_path, trace, message):
     if trace:
         (tmp_path / "frames.csv").write_text(trace)
     text = GOOD.replace("rate = 30", 'rate = { trace = "frames.csv" }')
@@ -215,7 +211,7 @@ def test_a_bad_trace_is_told_beside_other_faults(
     assert "line 13: linkage.body[0] (bar).mass" in found
 
 
-def test_a_hold_that_a_connection_asks_for_is_told_there(tmp_path: Path) -> None:
+def test_a_hold_that_a_connection_asks_for_is_told_there(tmp_path):
     python_fmu(tmp_path, "A")
     python_fmu(tmp_path, "B")
     text = '[[fmu]]\nname = "a"\npath = "A.fmu"\n[[fmu]]\nname = "b"\npath = "B.fmu"\nrate = 32\n'
@@ -231,9 +227,7 @@ def test_a_hold_that_a_connection_asks_for_is_told_there(tmp_path: Path) -> None
         assert "docs/passivity.md" in said
 
 
-def test_a_default_hold_that_fits_nowhere_is_told_once_with_a_scene_where_it_does(
-    tmp_path: Path,
-) -> None:
+def test_a_default_hold_that_fits_nowhere_is_told_once_with_a_scene_where_it_does(tmp_path):
     with pytest.raises(SceneFault, match=r": 1 fault\n.*closed-loop-direct"):
         simulate("closed-loop", tmp_path, ["hold=pspm"])
 
@@ -241,7 +235,7 @@ def test_a_default_hold_that_fits_nowhere_is_told_once_with_a_scene_where_it_doe
 # --- what would do nothing --------------------------------------------------------------------
 
 
-def test_an_ssp_whose_structure_is_to_change(tmp_path: Path) -> None:
+def test_an_ssp_whose_structure_is_to_change(tmp_path):
     assert status("export", "pendulum", "--out", tmp_path) == 0
     path = str(tmp_path / "pendulum.ssp")
     for key in ("controller.topology=false", "linkage.gravity=[0, 0]", "packaging=native"):
@@ -252,12 +246,12 @@ def test_an_ssp_whose_structure_is_to_change(tmp_path: Path) -> None:
     assert not names.is_fixed(("graphics", "rate"))
 
 
-def test_iterated_where_no_plants_of_a_rate_are_connected(tmp_path: Path) -> None:
+def test_iterated_where_no_plants_of_a_rate_are_connected(tmp_path):
     with pytest.raises(SceneFault, match=r"'iterated' repeats the steps of connected plants"):
         simulate("pendulum", tmp_path, ["coupling=iterated"])
 
 
-def test_native_where_no_block_is_ours() -> None:
+def test_native_where_no_block_is_ours():
     text = 'title = "t"\nduration = 1\npackaging = "native"\n[[fmu]]\nname = "a"\npath = "a.fmu"\n'
     assert "packaging: 'native' compiles the scene's own blocks" in told(text)
 
@@ -265,9 +259,7 @@ def test_native_where_no_block_is_ours() -> None:
 @pytest.mark.parametrize(
     ("options", "place"), [([], (11, None)), (["hold=foh"], (None, "--set hold=foh"))]
 )
-def test_a_changed_copy_still_knows_where_it_was_written(
-    tmp_path: Path, options: list[str], place: tuple[int | None, str | None]
-) -> None:
+def test_a_changed_copy_still_knows_where_it_was_written(tmp_path, options, place):
     """`closed-loop` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 11."""
     changed = replace(open_scene.load("closed-loop", options), hold="pspm")
     with pytest.raises(SceneFault) as refused:

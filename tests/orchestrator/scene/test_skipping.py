@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
@@ -28,9 +27,7 @@ def same(one: Table, other: Table, tolerance: float = 0.0) -> None:
         )
 
 
-def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(tmp_path, monkeypatch):
     options = ("controller.topology=false", "controller.impedance=false")
     without = haptics("closed-loop", tmp_path / "without", *options)
     assert "graphics" not in {b.rate for b in blocks(open_scene.load("closed-loop", options)).built}
@@ -40,7 +37,7 @@ def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(
     same(without, shown.results.haptics)
 
 
-def test_directions_without_a_topology_controller_change_no_bit(tmp_path: Path) -> None:
+def test_directions_without_a_topology_controller_change_no_bit(tmp_path):
     off = "controller.topology=false"
     without = haptics("closed-loop", tmp_path / "without", off)
     shown = haptics("closed-loop", tmp_path / "with", off, "mechanism.directions=true")
@@ -49,13 +46,13 @@ def test_directions_without_a_topology_controller_change_no_bit(tmp_path: Path) 
     same(without, shown)
 
 
-def test_bodies_out_of_reach_change_nothing(tmp_path: Path) -> None:
+def test_bodies_out_of_reach_change_nothing(tmp_path):
     near = haptics("obstacles", tmp_path / "near")
     every = haptics("obstacles", tmp_path / "every", "contacts.broad_phase=false")
     same(near, every, 1e-13)
 
 
-def test_terms_that_are_zero_change_nothing(tmp_path: Path) -> None:
+def test_terms_that_are_zero_change_nothing(tmp_path):
     without = haptics("five-bar", tmp_path / "without")
     zero = ("linkage.gravity=[0.0, 0.0]", "linkage.joint.elbow1.friction=0.0")
     same(without, haptics("five-bar", tmp_path / "zero", *zero), 1e-13)

@@ -27,7 +27,7 @@ def annotated(folder: Path, content: Any) -> str:
     return foreign(folder, FOREIGN.replace("</ssd:System>", f"</ssd:System>{annotation}"))
 
 
-def test_an_annotation_says_rates(tmp_path: Path) -> None:
+def test_an_annotation_says_rates(tmp_path):
     path = annotated(tmp_path, {**RUN, "fmu": {"c": {"rate": 25}}})
     assert len(simulate(path, tmp_path / "out").results.tables["25hz"]["c.y"]) == 6
 
@@ -56,13 +56,13 @@ def test_an_annotation_says_rates(tmp_path: Path) -> None:
         ({**RUN, "holds": [1]}, "holds: "),
     ],
 )
-def test_an_annotation_of_another_shape(tmp_path: Path, content: Any, message: str) -> None:
+def test_an_annotation_of_another_shape(tmp_path, content, message):
     with pytest.raises(InputFault, match=message) as refused:
         open_scene.load(annotated(tmp_path, content))
     assert "root:" not in str(refused.value)  # of no file that it names
 
 
-def test_a_file_outside_is_named_by_the_user_alone(tmp_path: Path) -> None:
+def test_a_file_outside_is_named_by_the_user_alone(tmp_path):
     path = annotated(tmp_path, RUN)
     (tmp_path / "frames.csv").write_text("0\n0.1\n0.2\n")
     other = python_fmu(tmp_path, "Other", "self.y = 7.0")
@@ -73,7 +73,7 @@ def test_a_file_outside_is_named_by_the_user_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("step", ["0", "x", "NaN", "1e999", "-1", "1e-99999999", ""])
-def test_a_step_size_that_is_none_is_asked_for(tmp_path: Path, step: str) -> None:
+def test_a_step_size_that_is_none_is_asked_for(tmp_path, step):
     path = Path(foreign(tmp_path))
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
@@ -90,7 +90,7 @@ def test_a_step_size_that_is_none_is_asked_for(tmp_path: Path, step: str) -> Non
 
 
 @pytest.mark.parametrize("name", ["martian", "idna", "shift_jis", "utf-7", "hex"])
-def test_encodings_that_are_none(tmp_path: Path, name: str) -> None:
+def test_encodings_that_are_none(tmp_path, name):
     path = foreign(tmp_path, FOREIGN.replace('encoding="UTF-8"', f'encoding="{name}"'))
     with pytest.raises(InputFault, match="is not well-formed XML"):
         open_scene.load(path)

@@ -1,11 +1,9 @@
 """An exported SSP in other masters, compared with the project's own run."""
 
-from __future__ import annotations
-
 import ctypes
 import sys
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +21,7 @@ def exported(folder: Path, options: Mapping[str, object]) -> Path:
     return hl.export("closed-loop", options, out=folder / "closed-loop.ssp")
 
 
-def test_libcosim_runs_two_rates_to_the_bytes_of_our_jacobi(tmp_path: Path) -> None:
+def test_libcosim_runs_two_rates_to_the_bytes_of_our_jacobi(tmp_path):
     """libcosim's fixed-step algorithm is Jacobi with inputs that stand between samples: all
     outputs, of plants after their step, of sampled blocks after that of the next row."""
     pytest.importorskip("libcosimpy")
@@ -53,7 +51,7 @@ def test_libcosim_runs_two_rates_to_the_bytes_of_our_jacobi(tmp_path: Path) -> N
 
 
 @pytest.fixture
-def ecos() -> Iterator[object]:
+def ecos():
     """Its library asks for TBB's, which pip puts where no loader looks."""
     for library in sorted(Path(sys.prefix, "lib").glob("libtbb.so.12")):
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
@@ -65,9 +63,7 @@ def ecos() -> Iterator[object]:
 
 
 @pytest.mark.parametrize("parameters", [None, "start"])
-def test_ecos_runs_one_rate_to_the_bytes_of_our_jacobi(
-    tmp_path: Path, ecos: object, parameters: str | None
-) -> None:
+def test_ecos_runs_one_rate_to_the_bytes_of_our_jacobi(tmp_path, ecos, parameters):
     """With and without the set of parameters, which Ecos applies where it is asked to."""
     options = {**OPTIONS, "graphics.rate": 512}
     path = exported(tmp_path, options)
@@ -76,7 +72,7 @@ def test_ecos_runs_one_rate_to_the_bytes_of_our_jacobi(
                {f"{fmu}.{port}" for fmu, ports in PLANTS.items() for port in ports}]  # fmt: skip
     assert len(columns) == 14
     names = [c.replace(".", "::", 1) for c in columns]
-    with ecos.EcosSimulation(step_size=1 / 512, ssp_path=str(path)) as simulation:  # type: ignore[attr-defined]
+    with ecos.EcosSimulation(step_size=1 / 512, ssp_path=str(path)) as simulation:
         simulation.init(parameter_set=parameters)
         for row in range(1, STEPS + 1):
             simulation.step(1)
@@ -84,7 +80,7 @@ def test_ecos_runs_one_rate_to_the_bytes_of_our_jacobi(
             assert theirs == [ours[c][row] for c in columns], row
 
 
-def test_built_fmus_start_where_the_scene_does(tmp_path: Path) -> None:
+def test_built_fmus_start_where_the_scene_does(tmp_path):
     """The handle is where the mechanism's operational point is, in a tool that knows no scene."""
     files = hl.build("closed-loop", {"linkage.start.shoulder1": 0.9}, out=tmp_path)
     device = read_model_description(str(files["haptic_device"]))

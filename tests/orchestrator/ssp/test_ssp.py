@@ -42,9 +42,7 @@ def export(source: str, folder: Path, *options: str) -> Path:
         ("local-model", ()),
     ],
 )
-def test_a_shipped_scene_comes_back_to_the_bit(
-    tmp_path: Path, name: str, options: tuple[str, ...]
-) -> None:
+def test_a_shipped_scene_comes_back_to_the_bit(tmp_path, name, options):
     options = ("duration=0.2", *options)
     path = export(name, tmp_path, *options)
     simulate(name, tmp_path / "a", options)
@@ -56,7 +54,7 @@ def test_a_shipped_scene_comes_back_to_the_bit(
         assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
 
 
-def test_others_read_it_and_the_same_scene_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_others_read_it_and_the_same_scene_gives_the_same_bytes(tmp_path):
     path = export("closed-loop", tmp_path)
     content = path.read_bytes()
     ssd = read_ssd(str(path), validate=True)
@@ -71,7 +69,7 @@ def test_others_read_it_and_the_same_scene_gives_the_same_bytes(tmp_path: Path) 
     assert export("closed-loop", tmp_path).read_bytes() == content
 
 
-def test_starts_factors_units_and_own_rates_come_back(tmp_path: Path) -> None:
+def test_starts_factors_units_and_own_rates_come_back(tmp_path):
     with_units(python_fmu(tmp_path, "Gives", "self.y = 1500.0 * self.gain + time"), y="mm")
     with_units(python_fmu(tmp_path, "Takes", "self.y = self.u if self.on else 0.0"), u="m")
     text = PAIR + "factor = -0.1\noffset = 0.3\nhold = 'foh'\n"
@@ -116,7 +114,7 @@ def foreign(folder: Path, text: str = FOREIGN) -> str:
     return str(folder / "their.ssp")
 
 
-def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path: Path) -> None:
+def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path):
     options = ["haptics.rate=50", "duration=0.2", "fmu.c.rate=25"]
     ended = simulate(foreign(tmp_path), tmp_path / "out", options)
     assert ended.outcome.fault is None
@@ -125,7 +123,7 @@ def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path: Path) -> Non
     assert len(ended.results.haptics["a_b.y"]) == 11
 
 
-def test_version_2_in_the_namespaces_of_1_is_read(tmp_path: Path) -> None:
+def test_version_2_in_the_namespaces_of_1_is_read(tmp_path):
     """As OMSimulator writes it."""
     head, version, rest = FOREIGN.rpartition('version="1.0"')
     text = f'{head}version="2.0"{rest}'
@@ -134,7 +132,7 @@ def test_version_2_in_the_namespaces_of_1_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(ended.results.haptics["c.y"][-1], 2.0, rtol=1e-15)
 
 
-def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path: Path) -> None:
+def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path):
     with pytest.raises(SceneFault) as refused:
         open_scene.load(foreign(tmp_path))
     keys = {f.key for f in refused.value.findings}
@@ -152,12 +150,12 @@ def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path: Path
         ("resources/a.ssv", "resources/b.ssv", "holds no resources/b.ssv"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_read_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_what_cannot_be_read_is_refused(tmp_path, old, new, message):
     with pytest.raises(InputFault, match=message):
         open_scene.load(foreign(tmp_path, FOREIGN.replace(old, new)))
 
 
-def test_with_the_cache_off_no_folder_stays(tmp_path: Path) -> None:
+def test_with_the_cache_off_no_folder_stays(tmp_path):
     import subprocess
     import sys
 
@@ -193,7 +191,7 @@ class Takes(Fmi2Slave):
 """
 
 
-def test_whole_and_boolean_parameters_start_as_in_the_scene(tmp_path: Path) -> None:
+def test_whole_and_boolean_parameters_start_as_in_the_scene(tmp_path):
     """Rounded, and true from 0.5 on: -1.8 is -2, and 0.3 is false."""
     python_fmu(tmp_path, "Gives", "pass")
     python_fmu_of(tmp_path, FIXED, tmp_path.name)
@@ -214,7 +212,7 @@ start = { size = 3, array = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], blob = "00ff" }
 """
 
 
-def test_sizes_of_arrays_and_binary_starts_come_back(tmp_path: Path) -> None:
+def test_sizes_of_arrays_and_binary_starts_come_back(tmp_path):
     c_fmu3(tmp_path)
     source = str(scene(tmp_path, SIZES))
     path = export(source, tmp_path)
@@ -225,7 +223,7 @@ def test_sizes_of_arrays_and_binary_starts_come_back(tmp_path: Path) -> None:
     assert starts["blob"] == "00ff"
 
 
-def test_a_start_that_no_ssp_can_hold_is_refused(tmp_path: Path) -> None:
+def test_a_start_that_no_ssp_can_hold_is_refused(tmp_path):
     c_fmu3(tmp_path)
     source = scene(tmp_path, SIZES.replace("size = 3", "in_Int64 = 2147483648, size = 3"))
     with pytest.raises(InputFault, match=r"start\.in_Int64: 2147483648: integers of an SSP"):

@@ -1,7 +1,5 @@
 """SSPs with systems in systems: every number follows from SSP 1.0 by hand."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +9,7 @@ from fmpy.ssp.simulation import simulate_ssp
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read
 from tests.orchestrator.foreign_fmus import edited, python_fmu
 from tests.orchestrator.run.test_bonds import fmus
@@ -51,7 +49,7 @@ TAKER = system(
 CHAIN = system("top", "", GIVER + TAKER, line("left.out", "right.u", "10 1"))
 
 
-def test_a_chain_through_the_borders_of_systems_is_one_connection(tmp_path: Path) -> None:
+def test_a_chain_through_the_borders_of_systems_is_one_connection(tmp_path):
     found = ended(ssp(tmp_path, CHAIN), tmp_path)
     # 1000 mm; 2 y + 3, y + 100 in mm inside left. right.u has the unit of what it feeds: m for t,
     # none for p, so p gets mm.
@@ -69,7 +67,7 @@ def test_a_chain_through_the_borders_of_systems_is_one_connection(tmp_path: Path
         ("output", 'suppressUnitConversion="true"', -(10 * 2.103 + 1) + 0.25),
     ],
 )
-def test_units_between_systems(tmp_path: Path, between: str, how: str, expected: float) -> None:
+def test_units_between_systems(tmp_path, between, how, expected):
     root = CHAIN.replace(connectors(out="output"), connectors(out=between), 1)
     old = line("inner.out", "out", "1 100")
     # Where left.out is in cm, 100 mm are added as 10 cm.
@@ -78,13 +76,13 @@ def test_units_between_systems(tmp_path: Path, between: str, how: str, expected:
     assert ended(path, tmp_path)["right_t.y"] == pytest.approx(expected, rel=1e-14)
 
 
-def test_units_of_two_kinds_across_a_border_are_refused(tmp_path: Path) -> None:
+def test_units_of_two_kinds_across_a_border_are_refused(tmp_path):
     root = CHAIN.replace(connectors(u="input"), connectors(u="input N"))
     with pytest.raises(InputFault, match=r"units of left\.out and right\.u do not fit: m is not"):
         open_scene.load(ssp(tmp_path, root), ["haptics.rate=50"])
 
 
-def test_a_loop_through_borders_runs_as_in_fmpy(tmp_path: Path) -> None:
+def test_a_loop_through_borders_runs_as_in_fmpy(tmp_path):
     """FMPy traces connections through borders too, for Jacobi and without transformations."""
     python_fmu(tmp_path, "Wave", "self.y = 50 * (time + size) - 5 * self.u")
     python_fmu(tmp_path, "Lag", "self.y += size * (3 * self.u - self.y)")
@@ -104,7 +102,7 @@ def test_a_loop_through_borders_runs_as_in_fmpy(tmp_path: Path) -> None:
         np.testing.assert_allclose(found[1:], theirs[f"{connector}.y"], rtol=1e-12)
 
 
-def test_a_vector_through_borders_stays_one(tmp_path: Path) -> None:
+def test_a_vector_through_borders_stays_one(tmp_path):
     entries = {f"x[{i}]": "output m" for i in (1, 2)}
     inner = "".join(line(f"m.x[{i}]", f"x[{i}]", "3 0") for i in (1, 2))
     box = system("box", connectors(**entries), component("m", "Moves"), inner)
@@ -117,7 +115,7 @@ def test_a_vector_through_borders_stays_one(tmp_path: Path) -> None:
     assert (only.factor, only.offset, only.convert) == (pytest.approx(0.003, rel=1e-15), 0.0, False)
 
 
-def test_names_stay_apart(tmp_path: Path) -> None:
+def test_names_stay_apart(tmp_path):
     inner = system("a", connectors(u="input"), component("b", "Plain"), line("u", "b.u"))
     root = system(
         "top",
@@ -134,13 +132,11 @@ def test_names_stay_apart(tmp_path: Path) -> None:
     assert read.fmu[1].rate == 25
 
 
-def test_an_fmu_of_many_components_is_read_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_fmu_of_many_components_is_read_once(tmp_path, monkeypatch):
     """Under names that differ in signs alone: all are numbered."""
     opened: list[Path] = []
 
-    def counted(path: Path) -> Description:
+    def counted(path):
         opened.append(path)
         return describe(path)
 
@@ -170,14 +166,14 @@ def test_an_fmu_of_many_components_is_read_once(
          r"right\.p is a SignalDictionaryReference"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_wired_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_what_cannot_be_wired_is_refused(tmp_path, old, new, message):
     assert old in CHAIN + TAIL
     path = ssp(tmp_path, CHAIN.replace(old, new), TAIL.replace(old, new))
     with pytest.raises(InputFault, match=message):
         open_scene.load(path, ["haptics.rate=50"])
 
 
-def test_text_is_not_connected(tmp_path: Path) -> None:
+def test_text_is_not_connected(tmp_path):
     edited(python_fmu(tmp_path, "Text"), lambda text: text.replace("<Boolean", "<String"))
     root = system("top", "", component("p", "Plain") + component("t", "Text"), line("p.y", "t.on"))
     made = {"Text_fmu": (tmp_path / "Text.fmu").read_bytes()}
@@ -185,7 +181,7 @@ def test_text_is_not_connected(tmp_path: Path) -> None:
         open_scene.load(ssp(tmp_path, root, **made), ["haptics.rate=50"])
 
 
-def test_a_circle_without_an_fmu_is_refused(tmp_path: Path) -> None:
+def test_a_circle_without_an_fmu_is_refused(tmp_path):
     loop = system(
         "loop",
         connectors(a="input", b="output"),

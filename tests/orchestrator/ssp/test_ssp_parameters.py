@@ -1,7 +1,5 @@
 """Parameters of SSPs: bindings, mappings and units, every value by hand from SSP 1.0."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -49,7 +47,7 @@ def starts(
     return {f.name: dict(f.start) for f in read.fmu}
 
 
-def test_bindings_of_a_system_reach_its_parts_and_go_before_theirs(tmp_path: Path) -> None:
+def test_bindings_of_a_system_reach_its_parts_and_go_before_theirs(tmp_path):
     found = starts(
         tmp_path, box=bindings(binding(values(("p.u", "4"))), binding(values(("p.u", "5"))))
     )
@@ -67,7 +65,7 @@ def test_bindings_of_a_system_reach_its_parts_and_go_before_theirs(tmp_path: Pat
     assert found["t"] == {"on": False}
 
 
-def test_a_mapping_renames_scales_and_leaves_out(tmp_path: Path) -> None:
+def test_a_mapping_renames_scales_and_leaves_out(tmp_path):
     given = values(("stiff", "0.5"), ("start", "3"), ("t.on", "false"))
     mapped = mapping(
         ("x.stiff", "box.strength", linear(4, 1)),
@@ -85,7 +83,7 @@ def test_a_mapping_renames_scales_and_leaves_out(tmp_path: Path) -> None:
     assert starts(tmp_path, top=bindings(external), v_ssv=given, m_ssm=mapped) == found
 
 
-def test_a_value_in_a_unit_is_converted_to_that_of_its_variable(tmp_path: Path) -> None:
+def test_a_value_in_a_unit_is_converted_to_that_of_its_variable(tmp_path):
     inch = (
         '<ssv:Units><ssc:Unit xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" '
         'name="inch"><ssc:BaseUnit m="1" factor="0.0254"/></ssc:Unit></ssv:Units>'
@@ -109,19 +107,17 @@ def test_a_value_in_a_unit_is_converted_to_that_of_its_variable(tmp_path: Path) 
     assert starts(tmp_path, gives=bindings(raw))["g"]["gain"] == 61.0
 
 
-def test_what_omsimulator_leaves_out_of_an_inner_mapping_is_not_asked_for(tmp_path: Path) -> None:
+def test_what_omsimulator_leaves_out_of_an_inner_mapping_is_not_asked_for(tmp_path):
     inner = binding(values(("a", "2")), mapping(("a", "u", ""), version=""))
     assert starts(tmp_path, box=bindings(inner))["box_p"]["u"] == 2.0
 
 
-def test_an_item_of_an_enumeration_goes_by_its_name(tmp_path: Path) -> None:
+def test_an_item_of_an_enumeration_goes_by_its_name(tmp_path):
     item = values(("gain", "2")).replace("ssv:Real", "ssv:Enumeration")
     assert starts(tmp_path, gives=bindings(binding(item)))["g"]["gain"] == "2"
 
 
-def test_values_that_match_nothing_are_passed_over_and_told(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_values_that_match_nothing_are_passed_over_and_told(tmp_path, caplog):
     bound = binding(
         values(("gain", "2"), ("lost", "1")), mapping(("lost", "away", ""), ("no", "u", ""))
     )
@@ -129,9 +125,7 @@ def test_values_that_match_nothing_are_passed_over_and_told(
     assert "ignored: box.no, box.away" in caplog.text
 
 
-def test_of_what_is_passed_over_few_are_told_without_escape_codes(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_of_what_is_passed_over_few_are_told_without_escape_codes(tmp_path, caplog):
     bound = binding(values(*((f"&#155;31m{i}", "1") for i in range(1000))))
     starts(tmp_path, box=bindings(bound))
     assert "box.\\x9b31m19 and 980 more" in caplog.text
@@ -153,9 +147,7 @@ def test_of_what_is_passed_over_few_are_told_without_escape_codes(
         (binding(about='source="resources/v.ssv"'), "declares a document type"),
     ],
 )  # fmt: skip
-def test_parameters_that_cannot_be_read_are_refused(
-    tmp_path: Path, bound: str, message: str
-) -> None:
+def test_parameters_that_cannot_be_read_are_refused(tmp_path, bound, message):
     bomb = '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
     with pytest.raises(InputFault, match=message):
         starts(tmp_path, gives=bindings(bound), v_ssv=bomb)

@@ -1,8 +1,6 @@
 """Declarations of ports come from the FMU, under any instance name, for two instances and in an
 SSP; nothing is inferred from a port's name."""
 
-from __future__ import annotations
-
 import re
 import uuid
 import zipfile
@@ -74,7 +72,7 @@ to = "fast.u"
 
 
 @pytest.mark.parametrize("matrix", ["M", "P_c", "Lambda_inv", "D", "contacts"])
-def test_a_foreign_matrix_passes_unchanged_whatever_its_name(tmp_path: Path, matrix: str) -> None:
+def test_a_foreign_matrix_passes_unchanged_whatever_its_name(tmp_path, matrix):
     experiment, found = run(tmp_path, rotating(tmp_path, matrix))
     assert found.run["holds"] == {f"slow.{matrix} -> fast.u": "foh"}
     assert found.run["held_as"] == {}
@@ -83,7 +81,7 @@ def test_a_foreign_matrix_passes_unchanged_whatever_its_name(tmp_path: Path, mat
     np.testing.assert_array_equal(seen[1:], np.broadcast_to(ROTATION, seen[1:].shape))
 
 
-def test_a_scene_says_what_a_foreign_matrix_is(tmp_path: Path) -> None:
+def test_a_scene_says_what_a_foreign_matrix_is(tmp_path):
     text = rotating(tmp_path, "M") + '[kinds]\n"slow.M" = "semidefinite"\n'
     _, found = run(tmp_path, text)
     assert found.run["held_as"] == {"slow.M -> fast.u": "semidefinite"}
@@ -97,9 +95,7 @@ def test_a_scene_says_what_a_foreign_matrix_is(tmp_path: Path) -> None:
         ('[holds]\n"slow.x" = "passive"', "it is not a declared power connection"),
     ],
 )
-def test_nothing_is_guessed_from_the_name_of_a_foreign_port(
-    tmp_path: Path, more: str, why: str
-) -> None:
+def test_nothing_is_guessed_from_the_name_of_a_foreign_port(tmp_path, more, why):
     wire = '[[connection]]\nfrom = "slow.x"\nto = "fast.F_hand"\n'
     text = rotating(tmp_path, "M") + wire + more
     with pytest.raises(SceneFault, match=why):
@@ -126,7 +122,7 @@ SCALARS = {"x": 1.0, "F": 1.0, "F_env": 1.0, "q": 1.0, "n_constraints": 1e5, "br
 
 @pytest.mark.parametrize("outputs", [POSES | {"workspace_margin": -1.0}, SCALARS])
 @pytest.mark.parametrize("more", ["", 'stop_when = "haptic_device.workspace_margin < 0"\n'])
-def test_an_fmu_is_no_block_for_its_name(tmp_path: Path, outputs: object, more: str) -> None:
+def test_an_fmu_is_no_block_for_its_name(tmp_path, outputs, more):
     """Neither what its outputs are, nor that it has diverged or left a workspace."""
     python_fmu_of(tmp_path, NAMESAKE.format(name="Any", outputs=outputs), uuid.uuid4().hex)
     names = (
@@ -141,7 +137,7 @@ def test_an_fmu_is_no_block_for_its_name(tmp_path: Path, outputs: object, more: 
 
 
 @pytest.mark.parametrize("name", ["controller", "gives"])
-def test_what_an_fmu_puts_in_counts_whatever_its_name(tmp_path: Path, name: str) -> None:
+def test_what_an_fmu_puts_in_counts_whatever_its_name(tmp_path, name):
     """A force of 3 N and more, held over 1/16 s and pushed along 2 m, generates less than it
     does."""
     for fmu, body in (("Gives", "self.y = 3.0 + time"), ("Takes", "self.y = 4.0 * time")):
@@ -165,7 +161,7 @@ DERIVATIVES = (
 )
 
 
-def test_a_scene_says_which_output_is_a_derivative_and_its_ssp_too(tmp_path: Path) -> None:
+def test_a_scene_says_which_output_is_a_derivative_and_its_ssp_too(tmp_path):
     rotating(tmp_path, "M")
     path = scene(tmp_path, DERIVATIVES.format('x = "v"'))
     assert status("export", path, "--out", tmp_path) == 0
@@ -182,7 +178,7 @@ def test_a_scene_says_which_output_is_a_derivative_and_its_ssp_too(tmp_path: Pat
         ('x = "M"', "M has 4 entries for the 1 of x"),
     ],
 )
-def test_a_derivative_that_cannot_be_is_refused(tmp_path: Path, said: str, why: str) -> None:
+def test_a_derivative_that_cannot_be_is_refused(tmp_path, said, why):
     rotating(tmp_path, "M")
     with pytest.raises(SceneFault, match=why) as refused:
         system_of(scene(tmp_path, DERIVATIVES.format(said)))
@@ -228,7 +224,7 @@ HOLDS = [
 ]  # fmt: skip
 
 
-def test_two_of_each_block_keep_what_their_ports_mean(tmp_path: Path) -> None:
+def test_two_of_each_block_keep_what_their_ports_mean(tmp_path):
     made = system_of(twice(tmp_path, "start.K_pc = [5, 6, 7]\n"), *HOLDS)
     for side in ("left", "right"):
         kinds = {c.source_port: c.kind for c in made.connections if c.source.startswith(side)}
@@ -248,7 +244,7 @@ def test_two_of_each_block_keep_what_their_ports_mean(tmp_path: Path) -> None:
     assert {c.hold for c in made.connections} == {None, "foh", "pspm", "passive"}
 
 
-def test_the_derivative_is_the_blocks_own_too(tmp_path: Path) -> None:
+def test_the_derivative_is_the_blocks_own_too(tmp_path):
     holds = [f'holds."left_mechanism.{port}"="foh-derivative"' for port in ("x", "Lambda_inv")]
     path = twice(tmp_path)
     assert system_of(path, holds[0])
@@ -263,7 +259,7 @@ def test_the_derivative_is_the_blocks_own_too(tmp_path: Path) -> None:
         ("", "sets no spring whose energy is known"),
     ],
 )
-def test_a_spring_of_gains_that_do_not_do_is_refused(tmp_path: Path, more: str, why: str) -> None:
+def test_a_spring_of_gains_that_do_not_do_is_refused(tmp_path, more, why):
     path = twice(tmp_path, more)
     if not more:  # gains that come over a connection are not known before the run
         wire = '[[connection]]\nfrom = "left_mechanism.x"\nto = "right_control.K_pc"\n'
@@ -272,7 +268,7 @@ def test_a_spring_of_gains_that_do_not_do_is_refused(tmp_path: Path, more: str, 
         system_of(path, *HOLDS)
 
 
-def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path: Path) -> None:
+def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path):
     options = ("duration=0.2", "hold=pspm", "holds.virtual_mechanism.F_drift=passive")
     assert status("export", "closed-loop-direct", "--out", tmp_path, *sets(options)) == 0
     path, renamed = tmp_path / "closed-loop-direct.ssp", tmp_path / "renamed.ssp"
@@ -295,7 +291,7 @@ def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path: Pat
     assert len(own.results.run["energies"]) == 2
 
 
-def test_none_is_a_kind_too(tmp_path: Path) -> None:
+def test_none_is_a_kind_too(tmp_path):
     """Mobility, its entries held each for itself; P_c stays what it is."""
     option = 'kinds."virtual_environment.Lambda_inv"="none"'
     made = system_of("closed-loop", "hold=foh", option)
@@ -308,7 +304,7 @@ def test_none_is_a_kind_too(tmp_path: Path) -> None:
     [("projector", "x has 3 entries, and a projector matrix is square"),
      ("rotation", "'projector', 'semidefinite', 'angle', 'table' or 'none'")],
 )  # fmt: skip
-def test_a_kind_that_cannot_be_is_refused_at_its_key(tmp_path: Path, kind: str, why: str) -> None:
+def test_a_kind_that_cannot_be_is_refused_at_its_key(tmp_path, kind, why):
     with pytest.raises(SceneFault, match=why) as refused:
         system_of("closed-loop", f'kinds."virtual_mechanism.x"="{kind}"')
     assert "--set" in str(refused.value)

@@ -1,9 +1,5 @@
 """Further users: their blocks and connections, and what a scene may ask of them."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 import hapticlink as hl
@@ -14,11 +10,11 @@ from hapticlink.orchestrator.system import haptic_loop
 BLOCKS = ("hand", "controller", "haptic_device")
 
 
-def test_every_user_has_the_same_connections() -> None:
+def test_every_user_has_the_same_connections():
     """The rows of a further user are those of the first one, with the suffix and the prefix."""
     rows = {(w.from_, w.to) for w in haptic_loop.rows(hl.scene("two-users"))}
 
-    def of_left(end: str) -> str:
+    def of_left(end):
         fmu, port = end.split(".", 1)
         return f"{fmu}_left.{port}" if fmu in BLOCKS else f"{fmu}.left.{port}"
 
@@ -28,7 +24,7 @@ def test_every_user_has_the_same_connections() -> None:
     assert len(own) == 19
 
 
-def test_a_user_without_a_controller_of_its_own_has_the_scenes() -> None:
+def test_a_user_without_a_controller_of_its_own_has_the_scenes():
     scene = hl.scene("two-users", {"controller.bias": "none"})
     made = {b.name: b.settings for b in blocks(scene).built}
     assert made["controller_left"]["controller"].bias == "none"
@@ -38,7 +34,7 @@ def test_a_user_without_a_controller_of_its_own_has_the_scenes() -> None:
     assert made["controller_left"]["controller"].topology is False
 
 
-def test_encoders_are_those_of_every_device(tmp_path: Path) -> None:
+def test_encoders_are_those_of_every_device(tmp_path):
     """Controller and mechanism get each hand's wrench from its own device's observer."""
     options = {"sensing": "encoders", "duration": 0.1}
     run = simulate("two-users", tmp_path, [f"{k}={v}" for k, v in options.items()]).results.run
@@ -57,7 +53,7 @@ def test_encoders_are_those_of_every_device(tmp_path: Path) -> None:
         ({"devices.left.base_y_a": 1.0}, "is not below base_y_b"),
     ],
 )
-def test_a_scene_that_does_not_fit(options: dict[str, object], said: str) -> None:
+def test_a_scene_that_does_not_fit(options, said):
     with pytest.raises(hl.InputFault) as caught:
         hl.scene("two-users", options)
     assert said in str(caught.value)

@@ -1,11 +1,8 @@
 """Latency and loss: no sample is used before it has arrived, and seeds are reproducible."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,14 +43,8 @@ def late(system: System, delays: dict[str, Latency], hold: str = "zoh") -> Syste
     st.integers(0, 99),
 )
 def test_no_input_is_stamped_later_than_its_step_less_the_latency(
-    stamped: Make,
-    timeline: Timeline,
-    coupling: str,
-    least: float,
-    spread: float,
-    loss: float,
-    seed: int,
-) -> None:
+    stamped, timeline, coupling, least, spread, loss, seed
+):
     drawn = Latency(min=least, max=least + spread, loss=loss, seed=seed)
     constant = Latency(min=least)
     delays = {LATE: drawn, "controller.stamp -> device.f": constant}
@@ -67,9 +58,7 @@ def test_no_input_is_stamped_later_than_its_step_less_the_latency(
 
 
 @pytest.mark.parametrize("coupling", CAUSAL)
-def test_what_the_plan_says_is_what_the_fmus_see(
-    stamped: Make, tmp_path: Path, coupling: str
-) -> None:
+def test_what_the_plan_says_is_what_the_fmus_see(stamped, tmp_path, coupling):
     from tests.orchestrator.timelines import fixed
 
     timeline = fixed(Fraction(512), Fraction(60), 256)
@@ -91,7 +80,7 @@ def test_what_the_plan_says_is_what_the_fmus_see(
 
 
 @pytest.mark.parametrize("rate", [60, 30, 24, 10])
-def test_extrapolated_stamps_are_the_time_itself(stamped: Make, tmp_path: Path, rate: int) -> None:
+def test_extrapolated_stamps_are_the_time_itself(stamped, tmp_path, rate):
     """A stamp is a straight line: from exact ticks, first order gives it back at any rate, and
     with any latency."""
     from tests.orchestrator.timelines import fixed
@@ -106,8 +95,8 @@ def test_extrapolated_stamps_are_the_time_itself(stamped: Make, tmp_path: Path, 
         np.testing.assert_allclose(seen[started:], time[started:], rtol=0, atol=1e-12)
 
 
-def test_loss_takes_its_share_and_a_seed_repeats() -> None:
-    def kept(latency: Latency) -> list[int]:
+def test_loss_takes_its_share_and_a_seed_repeats():
+    def kept(latency):
         link = Link(latency, Fraction(1, 1000))
         for stamp in range(4000):
             link.send(stamp)
@@ -119,7 +108,7 @@ def test_loss_takes_its_share_and_a_seed_repeats() -> None:
     assert len(kept(Latency(min=0.5))) == 4000
 
 
-def test_a_scene_with_delays(tmp_path: Path) -> None:
+def test_a_scene_with_delays(tmp_path):
     options = [
         "duration=0.2",
         "delays.haptic_device.x=0.004",
@@ -132,7 +121,7 @@ def test_a_scene_with_delays(tmp_path: Path) -> None:
     assert run["links"]["controller.F_motor -> haptic_device.F_motor"]["sent"] == 103
 
 
-def test_a_late_derivative_goes_with_its_sample_and_is_counted(tmp_path: Path) -> None:
+def test_a_late_derivative_goes_with_its_sample_and_is_counted(tmp_path):
     name = "virtual_mechanism.x -> controller.x_S"
     options = [
         "duration=0.2",

@@ -1,7 +1,5 @@
 """FMUs in the place of blocks."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -52,20 +50,18 @@ def spring(folder: Path, size: int = 3, output: str = "F_motor") -> Path:
 
 
 @pytest.fixture(scope="module")
-def own_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def own_files(tmp_path_factory):
     """The FMU of each block."""
     return hl.build("closed-loop", SHORT, out=tmp_path_factory.mktemp("fmus"))
 
 
 @pytest.fixture(scope="module")
-def own_run(tmp_path_factory: pytest.TempPathFactory) -> hl.Run:
+def own_run(tmp_path_factory):
     return hl.run("closed-loop", SHORT, out=tmp_path_factory.mktemp("run"), figures=False)
 
 
 @pytest.mark.parametrize("block", ["hand", "controller", "haptic_device", "virtual_environment"])
-def test_a_block_s_own_fmu_in_its_place_changes_no_byte(
-    tmp_path: Path, own_files: dict[str, Path], own_run: hl.Run, block: str
-) -> None:
+def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path, own_files, own_run, block):
     """Connections, order, rate and timing are those of the block."""
     swap = {**SHORT, "fmu.+": {"replaces": block, "path": str(own_files[block])}}
     swapped = hl.run("closed-loop", swap, out=tmp_path, figures=False)
@@ -75,9 +71,7 @@ def test_a_block_s_own_fmu_in_its_place_changes_no_byte(
         assert (own_run.folder / table).read_bytes() == (tmp_path / table).read_bytes()
 
 
-def test_by_one_option_and_what_does_not_meet_is_listed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_by_one_option_and_what_does_not_meet_is_listed(tmp_path, capsys):
     out, file = tmp_path / "run", spring(tmp_path)
     command = ["run", "closed-loop", "--set", "duration=0.2", "--swap", f"controller={file}"]
     command += ["--set", "fmu.controller.start.own=[1.0, 2.0, 3.0]"]  # acts after the swap
@@ -96,16 +90,14 @@ def test_by_one_option_and_what_does_not_meet_is_listed(
     assert run["fmus"]["controller"] == own
 
 
-def test_a_port_of_another_size_is_refused_by_its_connection(tmp_path: Path) -> None:
+def test_a_port_of_another_size_is_refused_by_its_connection(tmp_path):
     swap = {"fmu.+": {"replaces": "controller", "path": str(spring(tmp_path, 2))}}
     with pytest.raises(SceneFault, match=r"virtual_mechanism\.x has 3 .* controller\.x_S takes 2"):
         hl.run("closed-loop", {**SHORT, **swap})
 
 
 @pytest.mark.parametrize("block", ["hand", "controller", "virtual_mechanism"])
-def test_an_fmu_that_fits_nothing_is_refused(
-    tmp_path: Path, block: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_fmu_that_fits_nothing_is_refused(tmp_path, block, capsys):
     """With what the block has and what the FMU has, as every command says it."""
     swap = f"{block}={spring(tmp_path, output='z')}"
     for command in ("run", "info"):
@@ -150,9 +142,7 @@ def pull(folder: Path, *names: str) -> Path:
         (("F(0)", "F(1)", "F(2)"), []),
     ],
 )
-def test_an_fmu_of_other_names_acts_as_the_block(
-    tmp_path: Path, names: tuple[str, ...], given: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_fmu_of_other_names_acts_as_the_block(tmp_path, names, given, capsys):
     """As the scene's own hand, which pushes with the same constant wrench, in signals of its
     names, which figures and measures know."""
     file = pull(tmp_path, *names)
@@ -178,22 +168,20 @@ def test_an_fmu_of_other_names_acts_as_the_block(
         ("controller.F=force0", "no port of the block 'controller.F'"),
     ],
 )
-def test_a_map_that_does_not_fit_is_refused(
-    tmp_path: Path, given: str, said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_map_that_does_not_fit_is_refused(tmp_path, given, said, capsys):
     file = pull(tmp_path, "force0", "force1", "force2")
     command = ["info", "closed-loop", "--swap", f"hand={file}", "--map", given]
     assert status(*command) == 2
     assert said in " ".join(capsys.readouterr().err.split())
 
 
-def test_a_scene_has_the_map_too(tmp_path: Path) -> None:
+def test_a_scene_has_the_map_too(tmp_path):
     file = pull(tmp_path, "pull0", "pull1", "pull2")
     swap = {"replaces": "hand", "path": str(file), "map": {"F": ["pull0", "pull1", "pull2"]}}
     assert hl.run("closed-loop", {**SHORT, "fmu.+": swap})["hand.F"][0, 0] == -0.5
 
 
-def test_an_fmu_of_other_names_fits_by_a_connection_of_the_scene(tmp_path: Path) -> None:
+def test_an_fmu_of_other_names_fits_by_a_connection_of_the_scene(tmp_path):
     swap = {"replaces": "hand", "path": str(spring(tmp_path, output="z"))}
     wire = {"from": "hand.z", "to": "haptic_device.F_hand"}
     made = hl.run("closed-loop", {**SHORT, "fmu.+": swap, "connection.+": wire})
@@ -208,15 +196,13 @@ def test_an_fmu_of_other_names_fits_by_a_connection_of_the_scene(tmp_path: Path)
         ({"replaces": "hand_left"}, "no block 'hand_left'"),
     ],
 )
-def test_what_replaces_no_block_is_refused(
-    tmp_path: Path, table: dict[str, str], message: str
-) -> None:
+def test_what_replaces_no_block_is_refused(tmp_path, table, message):
     given = {**table, "path": str(spring(tmp_path))}
     with pytest.raises(SceneFault, match=message):
         hl.scene("closed-loop", {"fmu.+": given})
 
 
-def test_faults_of_a_swap_are_told_as_it_was_typed() -> None:
+def test_faults_of_a_swap_are_told_as_it_was_typed():
     with pytest.raises(SceneFault) as raised:
         hl.scene("closed-loop", Changes(swap=["controler=/missing.fmu"]).options)
     said = "--swap controler=/missing.fmu: fmu[0]"
@@ -224,16 +210,14 @@ def test_faults_of_a_swap_are_told_as_it_was_typed() -> None:
     assert f"{said}.replaces: no block 'controler'" in str(raised.value)
 
 
-def test_two_in_one_place_are_refused(tmp_path: Path) -> None:
+def test_two_in_one_place_are_refused(tmp_path):
     file = str(spring(tmp_path))
     one = f'fmu.+={{ replaces = "controller", path = "{file}" }}'
     with pytest.raises(SceneFault, match="'controller' is taken"):
         hl.scene("closed-loop", [one, one])
 
 
-def test_info_does_not_run_another_s_mechanism(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_info_does_not_run_another_s_mechanism(tmp_path, capsys):
     """Its coordinates are its own, and it may hang."""
     swap = f"virtual_mechanism={spring(tmp_path, output='x')}"
     assert status("info", "closed-loop", "--swap", swap) == 0

@@ -1,9 +1,5 @@
 """FMUs are built for no step size: one for all rates, which a run tells its own."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -25,8 +21,8 @@ from tests.blocks import Running
         ("virtual-wall", ()),
     ],
 )
-def test_every_rate_has_the_same_fmus(scene: str, options: tuple[str, ...], tmp_path: Path) -> None:
-    def files(*rates: str) -> dict[str, Path]:
+def test_every_rate_has_the_same_fmus(scene, options, tmp_path):
+    def files(*rates):
         read = open_scene.load(scene, (*options, *rates))
         return fmu_files(read, blocks(read), timeline(read), tmp_path)
 
@@ -35,7 +31,7 @@ def test_every_rate_has_the_same_fmus(scene: str, options: tuple[str, ...], tmp_
 
 
 @pytest.mark.parametrize("rate", [400, 1000])
-def test_friction_and_stabilization_take_the_step_of_the_run(rate: int) -> None:
+def test_friction_and_stabilization_take_the_step_of_the_run(rate):
     """As the component does that starts with that step."""
     options = {"haptics.rate": rate, "duration": 0.1, "mechanism.stabilization": "baumgarte"}
     scene = hl.scene("slider-crank", options)
@@ -52,7 +48,7 @@ def test_friction_and_stabilization_take_the_step_of_the_run(rate: int) -> None:
     assert (found != other.state["q"]).any()
 
 
-def test_friction_too_fast_for_the_steps_of_a_run_is_refused() -> None:
+def test_friction_too_fast_for_the_steps_of_a_run_is_refused():
     stiff = {"linkage.joint.0.friction_speed": 1e-6, "duration": 0.01}
     with pytest.raises(SceneFault, match=r"`friction_speed` or .* too fast for steps of 0\.00"):
         hl.run("pendulum", stiff)

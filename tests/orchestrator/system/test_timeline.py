@@ -1,14 +1,11 @@
 """Rates of every FMU: exact ticks, shared clocks, stamps on real FMUs, SSP, faults."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,7 +21,6 @@ from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.rates import VariableRate
-from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks, timeline
 from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
@@ -35,7 +31,7 @@ Make = Callable[[Timeline, str], System]
 
 
 @given(scenes())
-def test_every_fmu_steps_at_the_times_that_its_rate_and_phase_say(scene: Scene) -> None:
+def test_every_fmu_steps_at_the_times_that_its_rate_and_phase_say(scene):
     time = timeline(scene)
     haptic = 1 / exact(scene.haptics.rate)
     for fmu in scene.fmu:
@@ -55,7 +51,7 @@ def test_every_fmu_steps_at_the_times_that_its_rate_and_phase_say(scene: Scene) 
 
 
 @given(scenes())
-def test_fmus_share_a_clock_where_they_step_together(scene: Scene) -> None:
+def test_fmus_share_a_clock_where_they_step_together(scene):
     of, time = clocks(scene).of, timeline(scene)
     pace = {}
     for fmu in scene.fmu:
@@ -71,9 +67,7 @@ def test_fmus_share_a_clock_where_they_step_together(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("coupling", CAUSAL)
-def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(
-    stamped: Make, tmp_path: Path, coupling: str
-) -> None:
+def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(stamped, tmp_path, coupling):
     rates = {
         "device": "haptics",
         "controller": "haptics",
@@ -99,7 +93,7 @@ def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(
         np.testing.assert_array_equal(tables[clock.name]["time"], at)
 
 
-def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path: Path) -> None:
+def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path):
     python_fmu(tmp_path, "Gives")
     python_fmu(tmp_path, "Takes", "self.y = self.u")
     (tmp_path / "stamps.csv").write_text("time\n7.00\n7.10\n7.26\n7.50")
@@ -125,7 +119,7 @@ def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path: Path) -> None:
     assert by_list.results.tables.keys() == found.tables.keys()
 
 
-def test_variable_rates_of_fmus_survive_an_ssp(tmp_path: Path) -> None:
+def test_variable_rates_of_fmus_survive_an_ssp(tmp_path):
     python_fmu(tmp_path, "Gives")
     python_fmu(tmp_path, "Takes", "self.y = self.u")
     gives = '"Gives.fmu"\nrate = { min = 8, max = 32, seed = 3 }\n'
@@ -153,14 +147,14 @@ def test_variable_rates_of_fmus_survive_an_ssp(tmp_path: Path) -> None:
         ("{ trace = 'none.csv' }", "cannot be read as a trace"),
     ],
 )
-def test_rates_of_an_fmu_that_make_no_sense_are_told(tmp_path: Path, rate: str, why: str) -> None:
+def test_rates_of_an_fmu_that_make_no_sense_are_told(tmp_path, rate, why):
     python_fmu(tmp_path, "Gives")
     text = f'[[fmu]]\nname = "gives"\npath = "Gives.fmu"\nrate = {rate}\n'
     with pytest.raises(InputFault, match=why):
         open_scene.load(str(scene(tmp_path, text)))
 
 
-def test_rates_without_a_whole_tick_are_told_where_they_stand(tmp_path: Path) -> None:
+def test_rates_without_a_whole_tick_are_told_where_they_stand(tmp_path):
     python_fmu(tmp_path, "Gives")
     text = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\nrate = { min = 60, max = 61 }\n'
     with pytest.raises(SceneFault, match="is a whole haptic tick") as refused:
@@ -175,9 +169,7 @@ def test_rates_without_a_whole_tick_are_told_where_they_stand(tmp_path: Path) ->
         ("rate = { min = 8, max = 32 }", "fmu[0] (gives).rate"),
     ],
 )
-def test_an_fmu_of_one_step_size_is_refused_where_steps_differ(
-    tmp_path: Path, line: str, where: str
-) -> None:
+def test_an_fmu_of_one_step_size_is_refused_where_steps_differ(tmp_path, line, where):
     flag = 'canHandleVariableCommunicationStepSize="true"'
     edited(python_fmu(tmp_path, "Gives"), lambda text: text.replace(flag, ""))
     head = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
