@@ -1,10 +1,13 @@
 """FMUs of others for tests: pythonfmu's and pythonfmu3's, and one in C that fails on demand."""
 
+import os
+import subprocess
 import sys
 import uuid
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from fmpy import platform, platform_tuple
 from pythonfmu.builder import FmuBuilder
@@ -44,6 +47,49 @@ def python_fmu(
     return python_fmu_of(folder, SLAVE.format(name=name, body=body), uuid.uuid4().hex, **options)
 
 
+GENERAL = """
+from math import cos, nan, sin
+from pythonfmu import (
+    Boolean, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Integer, Real, String)
+
+class {name}(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.values = {{}}
+        for causality, starts in {variables}:
+            for name, start in starts.items():
+                self.add(Fmi2Causality[causality], name, start)
+
+    def add(self, causality, name, start):
+        kind = {{bool: Boolean, int: Integer, float: Real, str: String}}[type(start)]
+        fixed = Fmi2Variability.fixed if causality == Fmi2Causality.parameter else None
+        self.values[name] = start
+        self.register_variable(kind(
+            name, causality=causality, variability=fixed, initial={initial},
+            getter=lambda: self.values[name], setter=lambda v: self.values.update({{name: v}})))
+
+    def do_step(self, time, size):
+        values, end = self.values, time + size
+        {body}
+        return True
+"""
+Starts = Mapping[str, bool | int | float | str]
+
+
+def slave(
+    folder: Path, name: str, *variables: tuple[str, Starts], body: str = "", initial: str = "None"
+) -> Path:
+    """An FMI 2.0 FMU of `variables`, (causality, start value of each name), of the types of their
+    start values. `body` is run in a step to `end` (s), with all of them in `values`."""
+    text = GENERAL.format(name=name, variables=variables, body=body, initial=initial)
+    return python_fmu_of(folder, text, uuid.uuid4().hex)
+
+
+def entries(name: str, size: int, each: Any = 0.0) -> dict[str, Any]:
+    """The same, 0 by default, for each entry of a vector."""
+    return {f"{name}[{i + 1}]": each for i in range(size)}
+
+
 def python_fmu_of(folder: Path, text: str, module: str, **options: bool) -> Path:
     """The FMU of a slave's text, in a module of that name."""
     script = folder / f"m{module}.py"
@@ -67,12 +113,16 @@ UNITS = """<UnitDefinitions>
 
 def edited(path: Path, change: Callable[[str], str]) -> Path:
     """The FMU with its modelDescription.xml changed."""
+    name = "modelDescription.xml"
+    return edited_entries(path, lambda all_: all_ | {name: change(all_[name].decode()).encode()})
+
+
+def edited_entries(path: Path, change: Callable[[dict[str, bytes]], dict[str, bytes]]) -> Path:
+    """The archive with other entries."""
     with zipfile.ZipFile(path) as archive:
-        entries = {n: archive.read(n) for n in archive.namelist()}
-    text = change(entries["modelDescription.xml"].decode())
-    entries["modelDescription.xml"] = text.encode()
+        entries = {name: archive.read(name) for name in archive.namelist()}
     with zipfile.ZipFile(path, "w") as archive:
-        for name, content in entries.items():
+        for name, content in change(entries).items():
             archive.writestr(name, content)
     return path
 
@@ -217,3 +267,23 @@ def scene(folder: Path, text: str, rate: int = 64, duration: float = 0.5) -> Pat
 def run(folder: Path, text: str, *options: str) -> tuple[Experiment, tables.Results]:
     experiment = simulate(str(scene(folder, text)), folder / "out", options)
     return experiment, experiment.results
+
+
+def process(path: Path | str, out: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """`hapticlink run` of a scene, in a process of its own."""
+    command, environment = [*RUN, str(path), "--out", str(out)], os.environ | environment
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def ran(folder: Path, text: str, *options: str) -> tables.Results:
+    """The results of a run without a fault."""
+    experiment, results = run(folder, text, *options)
+    assert experiment.outcome.fault is None
+    return results
+
+
+def fault(folder: Path, text: str, *options: str) -> str:
+    """What a run says of the fault that ended it."""
+    experiment, _ = run(folder, text, *options)
+    assert experiment.outcome.fault is not None
+    return str(experiment.outcome.fault)

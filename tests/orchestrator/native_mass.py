@@ -55,16 +55,23 @@ def native(
     return describe(path)
 
 
-def held(folder: Path, **values: Mapping[str, float]) -> dict[str, Description]:
-    """Both masses with inputs that are constant within a step, other parameters in `values`."""
-    return {n: native(folder, n, FLAGS[1:3], **values.get(n, {})) for n in ("one", "two")}
+def held(folder: Path) -> dict[str, Description]:
+    """Both masses with inputs that are constant within a step."""
+    return {n: native(folder, n, FLAGS[1:3]) for n in ("one", "two")}
 
 
-def stiff(folder: Path, k_1: float, k_2: float, k_c: float, c_c: float) -> dict[str, Description]:
+STIFF = (100.0, 300.0, 2e4, 200.0)
+
+
+def stiff(
+    folder: Path, k_1: float, k_2: float, k_c: float, c_c: float,
+    flags: tuple[str, ...] = FLAGS[1:3], **both: float,
+) -> dict[str, Description]:  # fmt: skip
     """Unit masses on k_1 and k_2, at rest at 1 m, joined by k_c and c_c."""
-    rest = {"warm": 0.0, "x": 1.0}
-    two = {"k": k_2 + k_c, "c": c_c, "p": k_c, "q": c_c, "a": 1.0}
-    return held(folder, one={"k": k_1, "c": 0.0, **rest}, two={**two, **rest})
+    rest = {"warm": 0.0, "x": 1.0, **both}
+    one = native(folder, "one", flags, k=k_1, c=0.0, **rest)
+    two = native(folder, "two", flags, k=k_2 + k_c, c=c_c, p=k_c, q=c_c, a=1.0, **rest)
+    return {"one": one, "two": two}
 
 
 def _description(

@@ -48,6 +48,15 @@ axis = 0.0
 type = "push"
 name = "push"
 """
+GREET = """
+from hapticlink.commands import COMMANDS
+
+def greet() -> int:
+    print("good day")
+    return 3
+
+COMMANDS.register("greet", greet)
+"""
 EXPLAIN = "hapticlink run sampled-spring --explain"
 
 
@@ -56,26 +65,37 @@ def write(folder: Path, **files: str) -> None:
         (folder / f"{name}.py").write_text(text)
 
 
+def said(folder: Path, status: int, *cases: tuple[str, str, str, str]) -> None:
+    """Each case: a plugin and its text, a command that takes it, and what that says as it ends
+    with `status`; FOLDER is that of the plugins."""
+    write(folder, **{name: text for name, text, _, _ in cases})
+    lines = (f"{command} --plugin {name}" for name, _, command, _ in cases)
+    for ended, (*_, message) in zip(hapticlink(folder, *lines), cases, strict=True):
+        assert ended.status == status, ended.said
+        assert message.replace("FOLDER", str(folder)) in ended.said
+        assert "error of hapticlink itself" not in ended.said
+        assert status == 1 or ended.said.count("\n") == 1 + ended.said.count("\n  ")
+
+
 def test_modules_that_are_no_plugins(tmp_path):
-    write(tmp_path, mine=HOLD.format(name="mine"), lacks="import not_there", empty="x = 1")
-    write(tmp_path, broken="\n\n1 / 0\n", taken=HOLD.format(name="foh"), misspelt="x = 1\nx = = 2")
-    messages = {
-        "nowhere": "--plugin nowhere: no such module, nor a file in",
-        "mine.py": "give its name, without .py",
-        "lacks": "--plugin lacks: it imports 'not_there', which is not there",
-        "broken": "broken.py, line 3: ZeroDivisionError: division by zero",
-        "misspelt": "misspelt.py, line 2: SyntaxError: invalid syntax",
-        "empty": "empty.py registers no part (docs/extending.md)",
-        "taken": "taken.py, line 5: ValueError: hold 'foh' is one of hapticlink: take another",
+    texts = {
+        "lacks": ("import not_there", "--plugin lacks: it imports 'not_there', which is not there"),
+        "broken": ("\n\n1 / 0\n", "broken.py, line 3: ZeroDivisionError: division by zero"),
+        "misspelt": ("x = 1\nx = = 2", "misspelt.py, line 2: SyntaxError: invalid syntax"),
+        "ends": ("import sys\nsys.exit('usage')", "ends.py, line 2: SystemExit: usage"),
+        "empty": ("x = 1", "empty.py registers no part (docs/extending.md)"),
+        "taken": (
+            HOLD.format(name="foh"),
+            "taken.py, line 5: ValueError: hold 'foh' is one of hapticlink: take another",
+        ),
+        "named": (HOLD.format(name="my hold"), "hold 'my hold': name it by letters, digits, _ and"),
     }
-    for ended, message in zip(
-        hapticlink(tmp_path, *(f"{EXPLAIN} --plugin {module}" for module in messages)),
-        messages.values(),
-        strict=True,
-    ):
-        assert ended.status == 2
+    said(tmp_path, 2, *((name, text, EXPLAIN, message) for name, (text, message) in texts.items()))
+    write(tmp_path, mine=HOLD.format(name="mine"))
+    for name, message in (("nowhere", "no such module, nor a file in"), ("mine.py", "without .py")):
+        (ended,) = hapticlink(tmp_path, f"{EXPLAIN} --plugin {name}")
+        assert (ended.status, ended.said.count("\n")) == (2, 1)
         assert message in ended.said
-        assert len(ended.said.splitlines()) == 1
 
 
 HOLDING = """
@@ -92,67 +112,78 @@ class Mine(Hold):
 
 HOLDS.register("mine", Mine)
 """
-REGISTER = "from hapticlink.{0} import {1}\n{2}\n{1}.register('mine', {3})\n"
-HOLDS, METHODS, BLOCKS, FAMILIES, SCHEMES, COMMANDS, FORCES = (
-    ("orchestrator.holds", "HOLDS"), ("components.integrators", "METHODS"),
-    ("components.blocks", "BLOCKS"), ("orchestrator.scene.families", "FAMILIES"),
-    ("orchestrator.plan.schemes", "SCHEMES"), ("commands", "COMMANDS"),
-    ("components.forces", "FORCES"),
-)  # fmt: skip
+VAGUE = "from hapticlink.orchestrator.holds import Hold\nclass Mine(Hold): needs = 'speed'"
+SPEED = VAGUE.replace("holds import Hold", "holds.zero_order import ZeroOrder as Hold")
+INTEGRATOR = """from hapticlink.components.integrators.base import Integrator
+class Mine(Integrator):
+    order = 1
+    def step(self, ode, x, u, p, t, h): return {}"""
+SCHEME = "from hapticlink.orchestrator.plan.schemes import Scheme"
+RAISING = "def mine(n: int = 0): raise RuntimeError('no')"
+REGISTRIES = {
+    "HOLDS": "orchestrator.holds", "METHODS": "components.integrators", "COMMANDS": "commands",
+    "BLOCKS": "components.blocks", "FAMILIES": "orchestrator.scene.families",
+    "SCHEMES": "orchestrator.plan.schemes", "FORCES": "components.forces",
+}  # fmt: skip
+INTEGRATED = "hapticlink run pendulum --set mechanism.integrator=mine"
+COUPLED = "hapticlink run sampled-spring --set coupling=mine"
+BLOCK, FAMILY = "hapticlink run block.toml", "hapticlink run family.toml"
+PARTS = [
+    # Of another kind than the registry's, refused where they are registered.
+    ("HOLDS", "", "3", EXPLAIN, "hold 'mine': 3 is no class derived from Hold"),
+    ("HOLDS", VAGUE, "Mine", EXPLAIN, "does not define __init__, push, value"),
+    ("HOLDS", SPEED, "Mine", EXPLAIN, "needs 'speed', which is none of (None, 'derivative',"),
+    ("METHODS", "", "7", EXPLAIN, "integrator 'mine': 7 is no Integrator"),
+    ("FORCES", "", "dict", EXPLAIN, "force 'mine': <class 'dict'> is no class derived from Force"),
+    ("BLOCKS", "", "3", EXPLAIN, "block 'mine': 3 is no function"),
+    ("BLOCKS", "", "lambda x: 0", EXPLAIN, "an argument x: a setting has a name and an annot"),
+    ("FAMILIES", "", "{}", EXPLAIN, "family 'mine': {} is no function"),
+    ("SCHEMES", "", "print", EXPLAIN, "scheme 'mine': <built-in function print> is no Scheme"),
+    ("COMMANDS", "", "'Help'", EXPLAIN, "command 'mine': 'Help' is no function"),
+    # Failing, or giving something else, where they are used.
+    ("METHODS", INTEGRATOR.format("x[:1]"), "Mine()", INTEGRATED,
+     "virtual_mechanism: integrator Mine: its step gives (1, 1), not (3, 1)"),
+    ("METHODS", INTEGRATOR.format("[][1]"), "Mine()", INTEGRATED,
+     "plugin part11: FOLDER/part11.py, line 5: IndexError"),
+    ("SCHEMES", SCHEME, "Scheme(lambda *_: None)", COUPLED, "'mine': None is no tuple of operat"),
+    ("SCHEMES", SCHEME, "Scheme(lambda *_: ())", COUPLED, "coupling = 'mine' leaves out "),
+    ("BLOCKS", "", "lambda: 7", BLOCK, "mine: the block gives 7"),
+    ("BLOCKS", "def mine(n: 'Never' = 0): return 7", "mine", BLOCK,
+     "part15: the annotations of Settings cannot be read"),
+    ("FAMILIES", "", "lambda n: None", FAMILY,
+     "line 3: linkage.family: mine gives None for n = 4, no tables"),
+    ("FAMILIES", RAISING, "mine", FAMILY, "plugin part17: FOLDER/part17.py, line 2: RuntimeError"),
+    ("COMMANDS", RAISING, "mine", "hapticlink mine",
+     "plugin part18: FOLDER/part18.py, line 2: RuntimeError: no"),
+]  # fmt: skip
 
 
-def test_parts_of_another_kind_are_refused_where_they_are_registered(tmp_path):
-    vague = "from hapticlink.orchestrator.holds import Hold\nclass Vague(Hold): needs = 'speed'"
-    speed = (
-        "from hapticlink.orchestrator.holds.zero_order import ZeroOrder\n"
-        "class Speed(ZeroOrder): needs = 'speed'"
-    )
-    parts = {
-        (*HOLDS, "", "3"): "hold 'mine': 3 is no class derived from Hold",
-        (*HOLDS, vague, "Vague"): "does not define __init__, push, value",
-        (*HOLDS, speed, "Speed"): "needs 'speed', which is none of (None, 'derivative',",
-        (*METHODS, "", "7"): "integrator 'mine': 7 is no Integrator",
-        (*FORCES, "", "dict"): "force 'mine': <class 'dict'> is no class derived from Force",
-        (*BLOCKS, "", "3"): "block 'mine': 3 is no function",
-        (*BLOCKS, "", "lambda x: 0"): "has an argument x: a setting has a name and an annot",
-        (*FAMILIES, "", "{}"): "family 'mine': {} is no function",
-        (*SCHEMES, "", "print"): "scheme 'mine': <built-in function print> is no Scheme",
-        (*COMMANDS, "", "'Help'"): "command 'mine': 'Help' is no function",
-    }
-    for i, part in enumerate(parts):
-        write(tmp_path, **{f"part{i}": REGISTER.format(*part)})
-    write(tmp_path, named=HOLD.format(name="my hold"), ends="import sys\nsys.exit('usage')")
-    messages = {f"part{i}": message for i, message in enumerate(parts.values())} | {
-        "named": "hold 'my hold': name it by letters, digits, _ and -",
-        "ends": "ends.py, line 2: SystemExit: usage",
-    }
-    lines = (f"{EXPLAIN} --plugin {module}" for module in messages)
-    for ended, message in zip(hapticlink(tmp_path, *lines), messages.values(), strict=True):
-        assert ended.status == 2
-        assert message in ended.said
-        assert len(ended.said.splitlines()) == 1
+def test_parts_of_another_kind_and_parts_that_fail(tmp_path):
+    head = 'title = "a"\nduration = 1.0\n'
+    (tmp_path / "block.toml").write_text(f'{head}[[fmu]]\nname = "a"\nblock = "mine"\n')
+    (tmp_path / "family.toml").write_text(f'{head}linkage = {{ family = "mine", n = 4 }}\n')
+    cases = []
+    for i, (registry, text, part, command, message) in enumerate(PARTS):
+        head = f"from hapticlink.{REGISTRIES[registry]} import {registry}\n{text}\n"
+        plugin = f"{head}{registry}.register('mine', {part})\n"
+        cases.append((f"part{i}", plugin, command, message))
+    said(tmp_path, 2, *cases)
 
 
 def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path):
     late = "if self.pushed > 3: 1 / 0\n        return np.ones(self.size)"
     values = {
-        late: "plugin mine0: {}/mine0.py, line 11: ZeroDivisionError: division by zero",
+        late: "plugin mine0: FOLDER/mine0.py, line 11: ZeroDivisionError: division by zero",
         "return None": "its value is None, where 9 finite numbers in a NumPy array are needed",
         "return np.ones(2)": "its value is array([1., 1.]), where 9 finite numbers",
         "return np.full(self.size, np.nan)": "its value is array([nan, nan, nan,",
         "return np.array(['1'] * 9)": "its value is array(['1', '1',",
     }
-    for i, value in enumerate(values):
-        write(tmp_path, **{f"mine{i}": HOLDING.format(value=value)})
-    lines = (
-        f"hapticlink run closed-loop --plugin mine{i} --set hold=mine --out {i} "
-        "--set graphics.rate=100 --set duration=0.1 --no-figures"
-        for i in range(len(values))
-    )
-    for ended, message in zip(hapticlink(tmp_path, *lines), values.values(), strict=True):
-        assert ended.status == 1
-        assert message.format(tmp_path) in ended.said
-        assert "error of hapticlink itself" not in ended.said
+    run = "hapticlink run closed-loop --set graphics.rate=100 --set duration=0.1 --no-figures"
+    said(tmp_path, 1, *(
+        (f"mine{i}", HOLDING.format(value=value), f"{run} --set hold=mine --out {i}", message)
+        for i, (value, message) in enumerate(values.items())
+    ))  # fmt: skip
     told = json.loads((tmp_path / "0" / "run.json").read_text())
     assert (told["end"]["reason"], told["fault"]["kind"]) == ("fault", "Fault")
     assert len((tmp_path / "0" / "haptics.csv").read_text().splitlines()) > 3
@@ -161,61 +192,17 @@ def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path):
 def test_a_law_with_an_unknown_argument_is_the_plugin_s_error(tmp_path):
     law = (
         "from hapticlink.orchestrator.holds import HOLDS\n"
-        "from hapticlink.orchestrator.holds.history import {base}\n"
+        "from hapticlink.orchestrator.holds.history import {0} as Base\n"
         "def law(y, speed): return y\n"
-        "class Mine({base}):\n    laws = (law,)\n"
+        "class Mine(Base):\n    laws = (law,)\n"
         'HOLDS.register("mine", Mine)\n'
     )
-    write(tmp_path, of=law.format(base="OfSamples"), to=law.format(base="Transition"))
-    known = {"of": "y, y1, y2, yd, yd1, s, H,", "to": "y, y1, w, wd, r, H"}
-    lines = (f"hapticlink run pendulum --plugin {module}" for module in known)
-    for ended, (module, names) in zip(hapticlink(tmp_path, *lines), known.items(), strict=True):
-        assert ended.status == 2
-        said = f"{module}.py, line 4: TypeError: law 'law': no argument 'speed'; there are {names}"
-        assert said in ended.said
-
-
-def test_parts_that_fail_or_give_something_else(tmp_path):
-    integrator = (
-        "from hapticlink.components.integrators.base import Integrator\n"
-        "class Mine(Integrator):\n    order = 1\n"
-        "    def step(self, ode, x, u, p, t, h): return {}"
-    )
-    scheme = "from hapticlink.orchestrator.plan.schemes import Scheme"
-    raising = "def mine(*_, n: int = 0): raise RuntimeError('no')"
-    (tmp_path / "block.toml").write_text(
-        'title = "b"\nduration = 1.0\n[[fmu]]\nname = "a"\nblock = "mine"\n'
-    )
-    (tmp_path / "family.toml").write_text(
-        'title = "f"\nduration = 1.0\nlinkage = { family = "mine", n = 4 }\n'
-    )
-    run, mine = "hapticlink run", "pendulum --set mechanism.integrator=mine"
-    coupled = "sampled-spring --set coupling=mine"
-    cases = [
-        (METHODS, integrator.format("x[:1]"), "Mine()", f"{run} {mine}",
-         "virtual_mechanism: integrator Mine: its step gives (1, 1), not (3, 1)"),
-        (METHODS, integrator.format("[][1]"), "Mine()", f"{run} {mine}",
-         "plugin part1: {}/part1.py, line 5: IndexError"),
-        (SCHEMES, scheme, "Scheme(lambda *_: None)", f"{run} {coupled}",
-         "coupling = 'mine': None is no tuple of operations"),
-        (SCHEMES, scheme, "Scheme(lambda *_: ())", f"{run} {coupled}",
-         "coupling = 'mine' leaves out "),
-        (BLOCKS, "", "lambda: 7", f"{run} block.toml", "mine: the block gives 7"),
-        (BLOCKS, "def mine(n: 'Never' = 0): return 7", "mine", f"{run} block.toml",
-         "part5: the annotations of Settings cannot be read"),
-        (FAMILIES, "", "lambda n: None", f"{run} family.toml",
-         "line 3: linkage.family: mine gives None for n = 4, no tables"),
-        (FAMILIES, raising, "mine", f"{run} family.toml",
-         "plugin part7: {}/part7.py, line 2: RuntimeError: no"),
-        (COMMANDS, raising.replace("*_, ", ""), "mine", "hapticlink mine",
-         "plugin part8: {}/part8.py, line 2: RuntimeError: no"),
-    ]  # fmt: skip
-    for i, (registry, text, part, _, _) in enumerate(cases):
-        write(tmp_path, **{f"part{i}": REGISTER.format(*registry, text, part)})
-    lines = (f"{line} --plugin part{i}" for i, (*_, line, _) in enumerate(cases))
-    for ended, (*_, message) in zip(hapticlink(tmp_path, *lines), cases, strict=True):
-        assert ended.status == 2, ended.said
-        assert message.format(tmp_path) in ended.said
+    wrong = "line 4: TypeError: law 'law': no argument 'speed'; there are"
+    known = {"OfSamples": "y, y1, y2, yd, yd1, s, H,", "Transition": "y, y1, w, wd, r, H"}
+    said(tmp_path, 2, *(
+        (base, law.format(base), EXPLAIN, f"{base}.py, {wrong} {names}")
+        for base, names in known.items()
+    ))  # fmt: skip
 
 
 def test_a_part_is_known_where_its_plugin_is_named(tmp_path):
@@ -240,26 +227,13 @@ def test_an_installed_plugin(tmp_path):
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-parts\nVersion: 1.2\n")
     (about / "entry_points.txt").write_text("[hapticlink.plugins]\nparts = my_parts.holds\n")
     (site / "my_parts").mkdir()
-    (site / "my_parts" / "holds.py").write_text(
-        HOLD.format(name="mine")
-        + """
-from hapticlink.commands import COMMANDS
-
-def greet() -> int:
-    print("good day")
-    return 3
-
-COMMANDS.register("greet", greet)
-"""
-    )
+    (site / "my_parts" / "holds.py").write_text(HOLD.format(name="mine") + GREET)
     run, greeted = hapticlink(
         folder, "hapticlink run sampled-spring --set hold=mine", "hapticlink greet", path=site
     )
     assert (run.status, run.said and greeted.status, greeted.said) == (0, 3, "good day\n")
-    told = json.loads((folder / "runs" / "sampled-spring,hold=mine" / "run.json").read_text())[
-        "plugins"
-    ]
-    assert told["my_parts.holds"]["version"] == "1.2"
+    told = json.loads((folder / "runs" / "sampled-spring,hold=mine" / "run.json").read_text())
+    assert told["plugins"]["my_parts.holds"]["version"] == "1.2"
     (site / "my_parts" / "holds.py").write_text("1 / 0")
     (ended,) = hapticlink(folder, "hapticlink run sampled-spring", path=site)
     assert "hapticlink: plugin parts of my-parts: " in ended.said
@@ -285,9 +259,7 @@ def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path):
 
     assert reached(run) == pytest.approx(0.5, rel=1e-12)
     assert reached(f"{run} --plugin mine") == pytest.approx(0.5, rel=1e-12)
-    assert (
-        len([entry for entry in cache.iterdir() if entry.name not in ("libraries", "locks")]) == 1
-    )
+    assert len({entry.name for entry in cache.iterdir()} - {"libraries", "locks"}) == 1
     assert (rows(), rows()) == (2, 2)
     write(tmp_path, push=PUSH.replace("[1.0, 0.0]", "[-2.0, 0.0]"))
     assert reached(run) == pytest.approx(-1.0, rel=1e-12)
@@ -296,8 +268,7 @@ def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path):
 
 def test_keys_of_a_force(tmp_path):
     write(tmp_path, push=PUSH)
-    entry = '[[linkage.force]]\ntype = "push"\nname = "push"\n'
-    assert SCENE.endswith(entry)  # its lines are 16 to 18
+    head, entry = SCENE.split("[[linkage.force]]\n")
     messages = {
         entry.replace('"push"\nn', '"psh"\nn'): "line 17: linkage.force[0] (push).type: no force",
         entry.replace('type = "push"\n', ""): "linkage.force[0] (push).type: is missing",
@@ -305,10 +276,10 @@ def test_keys_of_a_force(tmp_path):
         entry + "bdy = 1": "line 19: linkage.force[0] (push).bdy: unknown key; did you mean 'body'",
         entry + "body = 3": "line 19: linkage.force[0] (push).body: 3 should be a valid string",
         entry + 'body = "crt"': "force `push`: the linkage has no 'crt'",
-        entry + entry: "line 21: linkage.force[1] (push).name: 'push' is taken",
+        f"{entry}[[linkage.force]]\n{entry}": "line 21: linkage.force[1] (push).name: 'push' is t",
     }
     for i, text in enumerate(messages):
-        (tmp_path / f"{i}.toml").write_text(SCENE.removesuffix(entry) + text)
+        (tmp_path / f"{i}.toml").write_text(f"{head}[[linkage.force]]\n{text}")
     lines = (f"hapticlink run {i}.toml --plugin push" for i in range(len(messages)))
     for ended, message in zip(hapticlink(tmp_path, *lines), messages.values(), strict=True):
         assert ended.status == 2
@@ -316,7 +287,7 @@ def test_keys_of_a_force(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("raise BaseException('broken')", "BaseException: broken"),
         ("raise KeyboardInterrupt", "KeyboardInterrupt"),
@@ -324,12 +295,12 @@ def test_keys_of_a_force(tmp_path):
         ("class E(Exception):\n    def __str__(self): raise ValueError\nraise E", "cannot be read"),
     ],
 )
-def test_a_plugin_cannot_end_a_command_without_a_word(tmp_path, monkeypatch, text, said):
+def test_a_plugin_cannot_end_a_command_without_a_word(tmp_path, monkeypatch, text, message):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     name = f"ends_{abs(hash(text))}"
-    (tmp_path / f"{name}.py").write_text(text)
-    with pytest.raises(InputFault, match=re.escape(said)):
+    write(tmp_path, **{name: text})
+    with pytest.raises(InputFault, match=re.escape(message)):
         plugins.load([name])
 
 

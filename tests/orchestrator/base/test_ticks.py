@@ -65,16 +65,29 @@ def test_variable_periods_stay_in_their_bounds_and_follow_the_seed(seed, end):
     assert starts == variable(Fraction(10), Fraction(60), seed, base, end)
 
 
-def test_bounds_without_a_whole_tick_between_them_are_refused():
-    with pytest.raises(ValueError, match="no period between"):
-        variable(Fraction(60), Fraction(60), 0, Fraction(1, 512), 10)
+BASE = Fraction(1, 512)
+CLOSE = [Fraction(1, 30), Fraction(1, 30) + Fraction(1, 9999)]
 
 
-def test_listed_times_go_to_ticks_and_two_on_one_are_refused():
-    base = Fraction(1, 512)
-    assert listed([Fraction(0), Fraction(1, 30), Fraction(1, 10)], base) == (0, 18, 52)
-    with pytest.raises(ValueError, match="falls on tick 18"):
-        listed([Fraction(1, 30), Fraction(171, 5130) + Fraction(1, 9999)], base)
+def test_listed_times_go_to_ticks():
+    assert listed([Fraction(0), Fraction(1, 30), Fraction(1, 10)], BASE) == (0, 18, 52)
+
+
+@pytest.mark.parametrize(
+    ("starts", "why"),
+    [
+        (lambda: variable(Fraction(60), Fraction(60), 0, BASE, 10), "no period between"),
+        (
+            lambda: variable(Fraction(10), Fraction(60), 0, BASE, 512 * 10**9),
+            "at most 1000000 are: take a",
+        ),
+        (lambda: listed(CLOSE, BASE), "falls on tick 18"),
+        (lambda: periodic(Fraction(1, 30), BASE, 10), "not a whole number of ticks"),
+    ],
+)
+def test_starts_that_cannot_be_are_refused(starts, why):
+    with pytest.raises(ValueError, match=why):
+        starts()
 
 
 @given(
@@ -98,13 +111,3 @@ def test_steps_that_are_made_when_asked_for_tell_their_bounds(fast, ratio, phase
         assert clock.shortest <= min(steps[1:], default=clock.longest)
         if len(steps) > getattr(frames, "round", 1):
             assert (clock.longest, clock.shortest) == (max(steps), min(steps[1:]))
-
-
-def test_more_periods_than_are_drawn_are_refused():
-    with pytest.raises(ValueError, match="at most 1000000 are: take a shorter duration"):
-        variable(Fraction(10), Fraction(60), 0, Fraction(1, 512), 512 * 10**9)
-
-
-def test_a_period_off_the_base_is_refused():
-    with pytest.raises(ValueError, match="not a whole number of ticks"):
-        periodic(Fraction(1, 30), Fraction(1, 512), 10)

@@ -12,46 +12,37 @@ from fmpy import fmi3
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.results.tables import Table
-from hapticlink.orchestrator.run.execute_plan import Outcome
-from hapticlink.orchestrator.scene.records import Iteration
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.compiled import compiled
-from tests.orchestrator.coupled import ROWS, simulate, system
-from tests.orchestrator.native_mass import FLAGS, native
+from tests.orchestrator.coupled import NEWTON, ROWS, simulate, system
+from tests.orchestrator.native_mass import FLAGS, STIFF, native, stiff
 from tests.orchestrator.systems import with_coupling
 
 STEP, WRONG, FAILING = 1.0, 2.0, 3.0
 """What an FMU offers: derivatives of its step, others, or an error."""
-STIFF = (100.0, 300.0, 2e4, 200.0)
 
 
 def iterated(folder: Path, offered: float, between: str, flags: tuple[str, ...] = FLAGS) -> System:
-    """The stiff pair of masses, each 1 kg at rest at 1 m, which takes constant inputs."""
-    k_1, k_2, k_c, c_c = STIFF
-    own = {"warm": 0.0, "offered": offered, "x": 1.0}
-    one = native(folder, "one", flags[1:], k=k_1, c=0.0, **own)
-    two = native(folder, "two", flags[1:], k=k_2 + k_c, c=c_c, p=k_c, q=c_c, a=1.0, **own)
-    return system(
-        {"one": one, "two": two}, ROWS, "iterated", Fraction(1, 400), Fraction(1, 4),
-        between=between, iteration=Iteration(method="newton", tolerance=1e-10),
-    )  # fmt: skip
+    """The stiff pair of masses, which takes constant inputs."""
+    fmus = stiff(folder, *STIFF, flags=flags[1:], offered=offered)
+    period, until = Fraction(1, 400), Fraction(1, 4)
+    return system(fmus, ROWS, "iterated", period, until, between=between, iteration=NEWTON)
 
 
-def solved(made: System, folder: Path) -> tuple[Outcome, Table]:
+def solved(made: System, folder: Path) -> tuple[Iterations | None, Table]:
+    """What was iterated, and the rows."""
     outcome, table = simulate(made, folder)
     assert outcome.fault is None
-    return outcome, table
+    return outcome.details.iterations, table
 
 
 @pytest.mark.parametrize("between", ["zoh", "foh"])
 def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path, between):
     """Linear plants: the Jacobian told is exact, so Newton needs no differences."""
-    outcome, table = solved(iterated(tmp_path, STEP, between), tmp_path)
-    without, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]), tmp_path)
-    counts, plain = outcome.details.iterations, without.details.iterations
-    assert counts is not None
-    assert plain is not None
+    counts, table = solved(iterated(tmp_path, STEP, between), tmp_path)
+    plain, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]), tmp_path)
     assert (counts.jacobians, counts.directional_jacobians) == (0, 1)
     assert (plain.jacobians, plain.directional_jacobians) == (1, 0)
     assert counts.max_iterations <= 3
@@ -63,11 +54,10 @@ def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path, between):
 
 @pytest.mark.parametrize("offered", [WRONG, FAILING])
 def test_derivatives_that_do_not_help_give_way_to_differences(tmp_path, offered):
-    outcome, table = solved(iterated(tmp_path, offered, "foh"), tmp_path)
+    counts, table = solved(iterated(tmp_path, offered, "foh"), tmp_path)
     _, same = solved(iterated(tmp_path, STEP, "foh"), tmp_path)
-    assert outcome.details.iterations is not None
-    assert outcome.details.iterations.jacobians >= 1
-    assert outcome.details.iterations.unconverged == 0
+    assert counts.jacobians >= 1
+    assert counts.unconverged == 0
     np.testing.assert_allclose(table["one.x"], same["one.x"], rtol=0, atol=1e-8)
 
 
@@ -78,10 +68,9 @@ def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path
         with_coupling(made, substeps={"one": 1, "two": 2}),
         with_coupling(made, get_after_set=("two",)),
     ):
-        outcome, table = solved(other, tmp_path)
-        assert outcome.details.iterations is not None
-        assert outcome.details.iterations.directional_jacobians == 0
-        assert outcome.details.iterations.jacobians >= 1
+        counts, table = solved(other, tmp_path)
+        assert counts.directional_jacobians == 0
+        assert counts.jacobians >= 1
         assert table["two.calls"][-1] == 0
 
 
@@ -141,15 +130,11 @@ def test_fmi3_arrays_are_derived_whole(tmp_path):
     """Of single entries of arrays, in any order; the arrays' sizes are what the standard asks."""
     (tmp_path / "linear.c").write_text(LINEAR)
     library = compiled(tmp_path / "linear.c", tmp_path, "linear")
-    sizes = {
-        "u": (5, 3, "input"),
-        "w": (6, 1, "input"),
-        "y": (7, 2, "output"),
-        "z": (8, 1, "output"),
-    }
+    ports = {"u": (5, 3), "w": (6, 1)}, {"y": (7, 2), "z": (8, 1)}
     scalars = {
         (name, i): Scalar(f"{name}[{i + 1}]", ref, "Float64", causality, None, entry=i)
-        for name, (ref, size, causality) in sizes.items()
+        for causality, sizes in zip(("input", "output"), ports, strict=True)
+        for name, (ref, size) in sizes.items()
         for i in range(size)
     }
     described = Description(Path("x.fmu"), "", "", "continuous", tuple(scalars.values()), "3")

@@ -2,7 +2,6 @@
 
 import math
 import sys
-import uuid
 from pathlib import Path
 
 import numpy as np
@@ -16,17 +15,19 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 from tests.orchestrator.foreign_fmus import (
+    ISOLATED,
     PAIR,
-    SLAVE,
     edited,
     fmu_table,
     python_fmu,
-    python_fmu_of,
+    ran,
     run,
     scene,
+    slave,
     wire_table,
     with_units,
 )
+from tests.shared_fixtures import BAR
 
 SHIPPED = Path(pythonfmu.__file__).parent / "tests" / "slaves"
 
@@ -48,20 +49,9 @@ STARTED = 'start = { intParam = 7, booleanParameter = true, stringParameter = "c
 def test_pythonfmus_examples_run_and_connect(tmp_path):
     shipped(tmp_path, "pythonslave.py")
     shipped(tmp_path, "slavewithdep.py", "localmodule.py")
-    experiment, found = run(
-        tmp_path,
-        (
-            "\n"
-            + fmu_table(
-                "clock",
-                "PythonSlave",
-                STARTED,
-            )
-            + fmu_table("decay", "PythonSlaveWithDep", "rate = 16\n")
-            + wire_table("clock.realOut", "decay.realIn")
-        ),
-    )
-    assert experiment.outcome.fault is None
+    decay = fmu_table("decay", "PythonSlaveWithDep", "rate = 16\n")
+    wire = wire_table("clock.realOut", "decay.realIn")
+    found = ran(tmp_path, fmu_table("clock", "PythonSlave", STARTED) + decay + wire)
     time = np.arange(33) / 64
     np.testing.assert_array_equal(found.haptics["clock.realOut"][1:], time[1:])
     slow = found.tables["16hz"]
@@ -72,33 +62,25 @@ def test_pythonfmus_examples_run_and_connect(tmp_path):
     np.testing.assert_allclose(slow["decay.realOut"][1:], 5 * u * np.exp(ends / 0.1), rtol=1e-14)
 
 
-STARTS = """
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
-
-class Starts(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.n, self.on, self.text, self.y = 0, False, "", 0.0
-        fixed = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed}
-        self.register_variable(Integer("n", **fixed))
-        self.register_variable(Boolean("on", **fixed))
-        self.register_variable(String("text", **fixed))
-        self.register_variable(Real("y", causality=Fmi2Causality.output))
-
-    def do_step(self, time, size):
-        self.y = self.n + 0.5 * self.on + int(self.text == "Maß = 3") * 100.0
-        return True
-"""
+@pytest.mark.parametrize("name", ["a,b", '"a", b', '"', '""', "'", ",',", "a b", "λ[1,2]"])
+def test_any_name_comes_back_from_the_csv(tmp_path, name):
+    """It shifts no column."""
+    path = slave(tmp_path, "Gives", ("output", {"first": 6.0, "NAME": 7.0, "last": 8.0}))
+    edited(path, lambda text: text.replace("NAME", name.replace('"', "&quot;")))
+    found = ran(tmp_path, fmu_table("gives", "Gives")).haptics
+    assert found.columns == ("time", "gives.first", f"gives.{name}", "gives.last")
+    assert found.rows[-1, 1:].tolist() == [6.0, 7.0, 8.0]
 
 
-@pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_start_values_that_are_no_reals(tmp_path, isolate):
-    python_fmu_of(tmp_path, STARTS, "starts")
-    one = '[[fmu]]\nname = "one"\npath = "Starts.fmu"\n' + isolate
+    parameters = {"n": 0, "on": False, "text": ""}
+    body = """values["y"] = values["n"] + 0.5 * values["on"]
+        values["y"] += 100.0 * (values["text"] == "Maß = 3")"""
+    slave(tmp_path, "Starts", ("parameter", parameters), ("output", {"y": 0.0}), body=body)
     starts = 'start = { n = -2147483648, on = true, text = "Maß = 3" }\n'
     for given, expected in ((starts, -(2.0**31) + 100.5), ("", 0.0)):
-        experiment, found = run(tmp_path, one + given)
-        assert experiment.outcome.fault is None
+        found = ran(tmp_path, fmu_table("one", "Starts", isolate + given))
         assert found.haptics["one.y"][-1] == expected
 
 
@@ -143,30 +125,10 @@ def test_fmi3_arrays_and_types_beside_fmi2(tmp_path):
     pytest.importorskip("pythonfmu3")
     three(tmp_path)
     python_fmu(tmp_path, "Takes", "self.y = self.u + 10 * self.on")
-    experiment, found = run(
-        tmp_path,
-        """
-coupling = "jacobi"
-[[fmu]]
-name = "three"
-path = "Three.fmu"
-start.u = [1.0, 2.0, 3.0]
-[[fmu]]
-name = "takes"
-path = "Takes.fmu"
-[[connection]]
-from = "three.n"
-to = "takes.u"
-[[connection]]
-from = "three.on"
-to = "takes.on"
-[[connection]]
-from = "takes.steps"
-to = "three.u[2]"
-""",
-    )
-    assert experiment.outcome.fault is None
-    h, k = found.haptics, np.arange(33)
+    text = 'coupling = "jacobi"\n' + fmu_table("three", "Three", "start.u = [1.0, 2.0, 3.0]\n")
+    text += fmu_table("takes", "Takes") + wire_table("three.n", "takes.u")
+    text += wire_table("three.on", "takes.on") + wire_table("takes.steps", "three.u[2]")
+    h, k = ran(tmp_path, text).haptics, np.arange(33)
     assert describe(tmp_path / "Three.fmu").fmi == "3"
     np.testing.assert_array_equal(h["three.n"], k)
     np.testing.assert_array_equal(h["three.f"], 3 * k)
@@ -195,40 +157,16 @@ def test_dependencies_on_an_array_are_those_on_its_entries(tmp_path):
     assert follows == {**{f"y[{i}]": True for i in (1, 2, 3)}, "n": False, "f": True, "on": True}
 
 
-MANY = """self.value = {"u[1]": 0.0, "u[10]": 0.0, "u[2]": 0.0}
-        for n in self.value:
-            self.register_variable(Real(n, causality=Fmi2Causality.input,
-                                        getter=lambda n=n: self.value[n],
-                                        setter=lambda v, n=n: self.value.__setitem__(n, v)))"""
-
-
 def test_a_vector_goes_by_its_indices_not_by_the_order_of_the_file(tmp_path):
-    text = SLAVE.format(name="Listed", body="self.y = self.value['u[2]'] - self.value['u[10]']")
-    text = text.replace('self.register_variable(Real("u", causality=Fmi2Causality.input))', MANY)
-    python_fmu_of(tmp_path, text, "listed")
-    found = describe(tmp_path / "Listed.fmu")
-    assert [s.name for s in found.port("u", "input")] == ["u[1]", "u[2]", "u[10]"]
-    fmu = '[[fmu]]\nname = "listed"\npath = "Listed.fmu"\nstart.u = [1.0, 2.0, 10.0]\n'
-    assert run(tmp_path, fmu)[1].haptics["listed.y"][-1] == -8.0
+    inputs = {"u[1]": 0.0, "u[10]": 0.0, "u[2]": 0.0}
+    body = "values['y'] = values['u[2]'] - values['u[10]']"
+    path = slave(tmp_path, "Listed", ("input", inputs), ("output", {"y": 0.0}), body=body)
+    assert [s.name for s in describe(path).port("u", "input")] == ["u[1]", "u[2]", "u[10]"]
+    found = ran(tmp_path, fmu_table("listed", "Listed", "start.u = [1.0, 2.0, 10.0]\n"))
+    assert found.haptics["listed.y"][-1] == -8.0
 
 
-DECAY = """
-from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Integer, Real
-
-class Decay(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.x, self.mode = 1.0, 1
-        self.register_variable(Real("x", causality=Fmi2Causality.output,
-                                    initial=Fmi2Initial.exact))
-        self.register_variable(Integer("mode", causality=Fmi2Causality.parameter,
-                                       variability=Fmi2Variability.fixed))
-
-    def do_step(self, time, size):
-        self.x *= 0.5 ** self.mode
-        return True
-"""
-DECAY_FMU = '[[fmu]]\nname = "decay"\npath = "Decay.fmu"\n'
+DECAY_FMU = fmu_table("decay", "Decay")
 MODES = """<TypeDefinitions><SimpleType name="Mode"><Enumeration>
 <Item name="slow" value="1"/><Item name="fast" value="3"/>
 </Enumeration></SimpleType></TypeDefinitions>
@@ -238,20 +176,21 @@ MODES = """<TypeDefinitions><SimpleType name="Mode"><Enumeration>
 def decay(folder: Path) -> None:
     """x (an output with a start of its own) halves `mode` times a step; mode is slow or fast."""
 
-    def enumerated(text: str) -> str:
-        text = text.replace("<ModelVariables>", MODES)
-        head, tail = text.split('name="mode"', 1)
-        return (
-            head + 'name="mode"' + tail.replace("<Integer", '<Enumeration declaredType="Mode"', 1)
-        )
+    def enumerated(text):
+        head, tail = text.replace("<ModelVariables>", MODES).split('name="mode"', 1)
+        tail = tail.replace("<Integer", '<Enumeration declaredType="Mode"', 1)
+        return f'{head}name="mode"{tail}'
 
-    edited(python_fmu_of(folder, DECAY, uuid.uuid4().hex), enumerated)
+    exact = 'Fmi2Initial.exact if name == "x" else None'
+    variables = ("output", {"x": 1.0}), ("parameter", {"mode": 1})
+    body = "values['x'] *= 0.5 ** values['mode']"
+    edited(slave(folder, "Decay", *variables, body=body, initial=exact), enumerated)
 
 
 def test_states_take_their_start_and_enumerations_the_names_of_their_items(tmp_path):
     decay(tmp_path)
     for start, first, share in (('mode = "fast", x = 4', 4.0, 0.125), ("mode = 1", 1.0, 0.5)):
-        x = run(tmp_path, f"{DECAY_FMU}start = {{ {start} }}\n")[1].haptics["decay.x"]
+        x = ran(tmp_path, f"{DECAY_FMU}start = {{ {start} }}\n").haptics["decay.x"]
         np.testing.assert_array_equal(x, first * share ** np.arange(len(x)))
 
 
@@ -265,34 +204,14 @@ def test_items_that_an_enumeration_does_not_have(tmp_path, start, message):
     assert message in found["fmu[0] (decay).start.mode"][1]
 
 
-def test_a_filter_between_our_blocks_takes_the_place_of_a_connection(tmp_path):
+def test_an_fmu_acts_on_our_mechanism(tmp_path):
+    """x = t^2/2 F/m."""
     python_fmu(tmp_path, "Push", "self.y = 3.0")
-    bar = """
-[[fmu]]
-name = "push"
-path = "Push.fmu"
-start.gain = 1
-timing = "sampled"
-[[connection]]
-from = "push.y"
-to = "virtual_mechanism.F_hand[1]"
-[linkage]
-operational_point = { body = "bar" }
-[[linkage.body]]
-name = "bar"
-mass = 2.0
-inertia = 0.01
-[[linkage.joint]]
-name = "slide"
-type = "prismatic"
-axis = 0.0
-child = "bar"
-"""
-    experiment, found = run(tmp_path, bar)
-    assert experiment.outcome.fault is None
-    time = found.haptics["time"]
-    x = found.haptics["virtual_mechanism.x"][:, 0]
-    np.testing.assert_allclose(x, 0.75 * time**2, rtol=1e-9, atol=1e-12)
+    text = fmu_table("push", "Push", 'start.gain = 1\ntiming = "sampled"\n')
+    text += wire_table("push.y", "virtual_mechanism.F_hand[1]") + BAR[BAR.index("[linkage]") :]
+    found = ran(tmp_path, text, "linkage.body.bar.mass=2", "linkage.start_velocity.slide=0").haptics
+    x = found["virtual_mechanism.x"][:, 0]
+    np.testing.assert_allclose(x, 0.75 * found["time"] ** 2, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -303,7 +222,7 @@ child = "bar"
 def test_units_convert(tmp_path, source, target, value, expected):
     with_units(python_fmu(tmp_path, "Gives", f"self.y = {value}"), y=source)
     with_units(python_fmu(tmp_path, "Takes", "self.y = self.u"), u=target)
-    _, found = run(tmp_path, PAIR)
+    found = ran(tmp_path, PAIR)
     np.testing.assert_allclose(found.haptics["takes.y"][-1], expected, rtol=1e-15, atol=1e-12)
 
 
@@ -318,10 +237,8 @@ def test_a_difference_of_temperatures_has_no_offset():
 def test_factor_and_offset_come_after_the_units(tmp_path):
     with_units(python_fmu(tmp_path, "Gives", "self.y = 1500.0"), y="mm")
     with_units(python_fmu(tmp_path, "Takes", "self.y = self.u"), u="m")
-    _, found = run(tmp_path, PAIR + "factor = -2.0\noffset = 10.0\n")
-    assert found.haptics["takes.y"][-1] == 7.0
-    _, found = run(tmp_path, PAIR + "convert = false\n")
-    assert found.haptics["takes.y"][-1] == 1500.0
+    for how, value in (("factor = -2.0\noffset = 10.0\n", 7.0), ("convert = false\n", 1500.0)):
+        assert ran(tmp_path, PAIR + how).haptics["takes.y"][-1] == value
 
 
 def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
@@ -329,6 +246,9 @@ def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
     with pytest.raises(SceneFault) as refused:
         simulate(str(scene(folder, text)), folder / "out")
     return {f.key: (f.line, f.message) for f in refused.value.findings}
+
+
+AGAIN = wire_table("takes.y", "takes.u")
 
 
 @pytest.mark.parametrize(
@@ -350,12 +270,13 @@ def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
         ("\n[[conn", "\nstart.u = [1, 2]\n[[conn", "fmu[1] (takes).start.u", 11, "2 values"),
         ("\n[[conn", "\nsteps = 1\n[[conn", "fmu[1] (takes).steps", 11, "unknown key"),
         ("[[conn", "[[connection]]\nhold = 'zog'\n#", "connection[0].hold", 12, "did you mean"),
+        ("#end", AGAIN, "connection[1].to", 16, "takes.u is fed by gives.y already"),
     ],
 )  # fmt: skip
 def test_faults_of_tables_have_their_place(tmp_path, old, new, key, line, message):
     python_fmu(tmp_path, "Gives")
     python_fmu(tmp_path, "Takes")
-    found = findings(tmp_path, PAIR.replace(old, new, 1))
+    found = findings(tmp_path, (PAIR + "#end").replace(old, new, 1))
     assert key in found, found
     assert found[key][0] == line
     assert message in found[key][1]
@@ -371,42 +292,21 @@ def test_units_that_do_not_convert_are_refused_with_both(tmp_path):
     assert "furlong has no BaseUnit" in findings(tmp_path, PAIR)["connection[0]"][1]
 
 
-def test_an_input_has_one_source(tmp_path):
-    python_fmu(tmp_path, "Gives")
-    python_fmu(tmp_path, "Takes")
-    again = '[[connection]]\nfrom = "takes.y"\nto = "takes.u"\n'
-    line, message = findings(tmp_path, PAIR + again)["connection[1].to"]
-    assert line == 16
-    assert "takes.u is fed by gives.y already" in message
-
-
 def test_paths_are_relative_to_the_scene_file_and_options_reach_in(tmp_path):
     (tmp_path / "below").mkdir()
     python_fmu(tmp_path, "Gives")
-    text = PAIR.split("[[connection]]")[0].replace("Gives.fmu", "../Gives.fmu")
-    text = text.split('[[fmu]]\nname = "takes"')[0]
-    path = scene(tmp_path / "below", text)
+    path = scene(tmp_path / "below", fmu_table("gives", "../Gives"))
     read = open_scene.load(str(path), ["fmu.gives.rate=30"])
     assert Path(read.fmu[0].path).samefile(tmp_path / "Gives.fmu")
     assert read.fmu[0].rate == 30
 
 
-TURNING = """
-[[fmu]]
-name = "slow"
-path = "Slow.fmu"
-rate = 16
-[[fmu]]
-name = "fast"
-path = "Fast.fmu"
-[[connection]]
-from = "slow.y"
-to = "fast.u"
-[holds]
-"slow.y" = "foh"
-[kinds]
-"slow.y" = "angle"
-"""
+TURNING = (
+    fmu_table("slow", "Slow", "rate = 16\n")
+    + fmu_table("fast", "Fast")
+    + wire_table("slow.y", "fast.u")
+    + '[holds]\n"slow.y" = "foh"\n[kinds]\n"slow.y" = "angle"\n'
+)
 
 
 def test_an_angle_in_degrees_is_continued_over_its_seam(tmp_path):
@@ -414,8 +314,8 @@ def test_an_angle_in_degrees_is_continued_over_its_seam(tmp_path):
     body = "self.y = (400 * (time + size) + 180) % 360 - 180"
     with_units(python_fmu(tmp_path, "Slow", body), y="deg")
     with_units(python_fmu(tmp_path, "Fast", "self.y = self.u"), u="deg", y="deg")
-    _, found = run(tmp_path, TURNING, "duration=2.0")
-    time, seen = found.haptics["time"][12:], found.haptics["fast.y"][12:]
+    found = ran(tmp_path, TURNING, "duration=2.0").haptics
+    time, seen = found["time"][12:], found["fast.y"][12:]
     # The value for the middle of the step that ends here.
     np.testing.assert_allclose(seen, 400 * (time - 0.5 / 64), rtol=0, atol=1e-8)
 

@@ -1,7 +1,7 @@
 """Observed order, size of the error and limit of stability of every hold, on real FMUs.
 
 The two-mass oscillator with exact subsystems (computed independently, two ways). Where the plant
-must take inputs that vary within a step it takes substeps.
+must take inputs that vary within a step it takes substeps, or it interpolates its inputs itself.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ import pytest
 
 from hapticlink.orchestrator.fmi.description import Description
 from tests.orchestrator import coupled
-from tests.orchestrator.native_mass import held
+from tests.orchestrator.native_mass import held, native
 from tests.orchestrator.oscillator import WARM
 
 Fmus = Mapping[str, Description]
@@ -22,11 +22,18 @@ Hold = str | Mapping[str, str]
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
-    return held(tmp_path_factory.mktemp("oscillator"))
+    """Of inputs that are constant within a step, and of interpolated ones."""
+    constant, interpolating = (tmp_path_factory.mktemp(name) for name in ("constant", "within"))
+    return {
+        "constant": held(constant),
+        "interpolating": {name: native(interpolating, name) for name in ("one", "two")},
+    }
 
 
 OWN = {"two.F": "lead", "one.x": "foh-derivative", "one.v": "foh-derivative"}
 """A force has no derivative to send along."""
+PASSIVE, NEPCE = ({**OWN, "two.F": hold} for hold in ("passive", "nepce"))
+SLOPE = {**OWN, "one.x": "foh", "one.v": "slope"}
 
 
 def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how: object) -> float:
@@ -39,43 +46,42 @@ def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how:
 
 
 @pytest.mark.parametrize(
-    ("hold", "substeps", "order", "coupling"),
+    ("hold", "inputs", "substeps", "order", "coupling", "coarsest"),
     [
-        ("zoh", 1, 1, "jacobi"),
-        ("zoh", 4, 1, "gauss-seidel-plants"),
-        ("latest", 1, 1, "jacobi"),
-        ("lead", 1, 2, "jacobi"),
-        ("foh", 1, 2, "jacobi"),
-        ("foh", 4, 2, "jacobi"),
-        ("foh", 4, 2, "gauss-seidel-plants"),
-        (OWN, 1, 2, "jacobi"),
-        ("second-order", 16, 3, "jacobi"),
-        ("delayed", 4, 1, "jacobi"),
-        ("smooth", 4, 1, "jacobi"),
-        ("mean", 1, 1, "jacobi"),
+        ("zoh", "constant", 1, 1, "jacobi", 200),
+        ("zoh", "constant", 4, 1, "gauss-seidel-plants", 200),
+        ("latest", "constant", 1, 1, "jacobi", 200),
+        ("lead", "constant", 1, 2, "jacobi", 200),
+        ("foh", "constant", 1, 2, "jacobi", 200),
+        ("foh", "constant", 4, 2, "jacobi", 200),
+        ("foh", "constant", 4, 2, "gauss-seidel-plants", 200),
+        ("foh", "interpolating", 1, 2, "jacobi", 200),
+        (OWN, "constant", 1, 2, "jacobi", 200),
+        ("second-order", "constant", 16, 3, "jacobi", 200),
+        ("second-order", "interpolating", 1, 3, "jacobi", 200),
+        ("delayed", "constant", 4, 1, "jacobi", 200),
+        ("delayed", "interpolating", 1, 1, "jacobi", 200),
+        ("smooth", "constant", 4, 1, "jacobi", 200),
+        ("mean", "constant", 1, 1, "jacobi", 200),
+        # These reach it at higher rates.
+        (PASSIVE, "constant", 1, 1, "jacobi", 400),
+        (NEPCE, "constant", 1, 1, "jacobi", 400),
+        (SLOPE, "constant", 1, 1, "jacobi", 400),
     ],
 )
-def test_order_of_a_hold(fmus, tmp_path, hold, substeps, order, coupling):
-    rates = [200, 400, 800]
-    errors = [error(fmus, tmp_path, rate, hold, substeps, coupling=coupling) for rate in rates]
-    assert coupled.order(rates, errors) == pytest.approx(order, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    "further",
-    [{"two.F": "passive"}, {"two.F": "nepce"}, {"one.x": "foh", "one.v": "slope"}],
-    ids=["passive", "nepce", "slope"],
-)
-def test_holds_that_reach_order_one_at_higher_rates(fmus, tmp_path, further):
-    rates = [400, 800, 1600]
-    errors = [error(fmus, tmp_path, rate, {**OWN, **further}, 1) for rate in rates]
-    assert coupled.order(rates, errors) == pytest.approx(1, abs=0.15)
+def test_order_of_a_hold(fmus, tmp_path, hold, inputs, substeps, order, coupling, coarsest):
+    rates = [coarsest, 2 * coarsest, 4 * coarsest]
+    errors = [
+        error(fmus[inputs], tmp_path, rate, hold, substeps, coupling=coupling) for rate in rates
+    ]
+    within = 0.1 if coarsest == 200 else 0.15
+    assert coupled.order(rates, errors) == pytest.approx(order, abs=within)
 
 
 def test_a_set_position_that_is_not_paid_for_has_no_order(fmus, tmp_path):
     """The motion that the other mass sends is refused in part, at any rate."""
     hold = {"two.F": "lead", "one.x": "pspm", "one.v": "pspm"}
-    coarse, fine = (error(fmus, tmp_path, rate, hold, 1) for rate in (800, 1600))
+    coarse, fine = (error(fmus["constant"], tmp_path, rate, hold, 1) for rate in (800, 1600))
     assert fine > 0.7 * coarse
 
 
@@ -88,8 +94,11 @@ def test_a_set_position_that_is_not_paid_for_has_no_order(fmus, tmp_path):
         ("lead", 1, 7.08e-3),
     ],
 )
-def test_largest_error_at_a_hundredth(fmus, tmp_path, hold, substeps, published):
-    assert error(fmus, tmp_path, 100, hold, substeps) == pytest.approx(published, rel=0.02)
+@pytest.mark.parametrize("inputs", ["constant", "interpolating"])
+def test_largest_error_at_a_hundredth(fmus, tmp_path, inputs, hold, substeps, published):
+    substeps = 1 if inputs == "interpolating" else substeps
+    found = error(fmus[inputs], tmp_path, 100, hold, substeps)
+    assert found == pytest.approx(published, rel=0.02)
 
 
 def growth(
@@ -104,38 +113,43 @@ def growth(
     return float(size[-quarter:].max() / size[-2 * quarter : -quarter].max())
 
 
-JACOBI = [
-    ("zoh", 1, ".0404", True),
-    ("foh", 8, ".0630", True),
-    ("second-order", 16, ".0765", True),
-    ("lead", 1, ".0712", True),
-    ("delayed", 8, ".0198", True),
-    ("zoh", 1, ".0250", False),  # get all, set all, step all, as FMI wants it
-]
-SEIDEL = [("zoh", 1, ".0402"), ("foh", 8, ".0763"), ("second-order", 16, ".0843")]
-LIMITS = [(*row, "jacobi") for row in JACOBI]
-LIMITS += [(*row, True, "gauss-seidel-plants") for row in SEIDEL]
-
-
-@pytest.mark.parametrize(("hold", "substeps", "limit", "get_after_set", "coupling"), LIMITS)
+@pytest.mark.parametrize(
+    ("inputs", "hold", "substeps", "coupling", "get_after_set", "limit"),
+    [
+        ("constant", "zoh", 1, "jacobi", ("two",), ".0404"),
+        (
+            "constant",
+            "zoh",
+            1,
+            "jacobi",
+            (),
+            ".0250",
+        ),  # get all, set all, step all, as FMI wants it
+        ("constant", "foh", 8, "jacobi", ("two",), ".0630"),
+        ("interpolating", "foh", 1, "jacobi", ("two",), ".0630"),
+        ("constant", "second-order", 16, "jacobi", ("two",), ".0765"),
+        ("interpolating", "second-order", 1, "jacobi", ("two",), ".0765"),
+        ("constant", "lead", 1, "jacobi", ("two",), ".0712"),
+        ("constant", "delayed", 8, "jacobi", ("two",), ".0198"),
+        ("interpolating", "delayed", 1, "jacobi", ("two",), ".0198"),
+        ("constant", "zoh", 1, "gauss-seidel-plants", ("two",), ".0402"),
+        ("constant", "foh", 8, "gauss-seidel-plants", ("two",), ".0763"),
+        ("interpolating", "foh", 1, "gauss-seidel-plants", ("two",), ".0763"),
+        ("constant", "second-order", 16, "gauss-seidel-plants", ("two",), ".0843"),
+        ("interpolating", "second-order", 1, "gauss-seidel-plants", ("two",), ".0843"),
+        # `one.a` follows the force and is not connected: whatever the order of the file, `one`
+        # steps first, with the limit of that order (.0569 the other way round).
+        ("reversed", "foh", 8, "gauss-seidel-plants", ("two",), ".0763"),
+    ],
+)
 def test_limit_of_stability_to_one_percent(
-    fmus, tmp_path, hold, substeps, limit, get_after_set, coupling
+    fmus, tmp_path, inputs, hold, substeps, coupling, get_after_set, limit
 ):
-    how = {"get_after_set": ("two",) * get_after_set, "coupling": coupling}
-    steps = 500 if substeps > 1 else 2000
+    pair = fmus.get(inputs) or dict(reversed(fmus["constant"].items()))
+    steps = 2000 if substeps == 1 and inputs == "constant" else 500
+    how = {"get_after_set": get_after_set, "coupling": coupling}
     below, above = (
-        growth(fmus, tmp_path, Fraction(limit) * part, hold, substeps, steps, **how)
+        growth(pair, tmp_path, Fraction(limit) * part, hold, substeps, steps, **how)
         for part in (Fraction(99, 100), Fraction(101, 100))
-    )
-    assert below < 1 < above
-
-
-def test_an_output_that_nobody_reads_makes_no_order(fmus, tmp_path):
-    """`one.a` follows the force and is not connected: whatever the order of the file, `one` steps
-    first, with the limit of that order (.0569 the other way round)."""
-    turned = dict(reversed(fmus.items()))
-    below, above = (
-        growth(turned, tmp_path, Fraction(step), "foh", 8, 500, coupling="gauss-seidel-plants")
-        for step in (".0755", ".0771")
     )
     assert below < 1 < above

@@ -1,7 +1,7 @@
 """Passive set-position modulation: a spring whose far end is held gives no more than it got."""
 
-import uuid
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.build_system import built
-from tests.orchestrator.foreign_fmus import python_fmu_of, run
+from tests.orchestrator.foreign_fmus import fmu_table, ran, run, slave, wire_table
 
 Vector = NDArray[np.float64]
 TICK = 1e-3
@@ -140,13 +140,8 @@ def test_the_controllers_spring_creates_one_steps_surplus_at_most(tmp_path, rate
         options += [f"sensing={sensing}"]
         found = simulate("closed-loop-direct", tmp_path / hold, options).results
         assert [found.run["holds"][name] for name in sets] == [hold, hold]
-        force, x, v, handle = (
-            found.haptics[name]
-            for name in (
-                "controller.F_drift",
-                *(f"haptic_device.{n}" for n in ("x", "v", "x_true")),
-            )
-        )
+        force = found.haptics["controller.F_drift"]
+        x, v, handle = (found.haptics[f"haptic_device.{n}"] for n in ("x", "v", "x_true"))
         dx = np.diff(x, axis=0)
         surplus = ((K / 2 * dx + B * (dx * 512.0 - v[:-1])) * dx).sum(axis=1)
         steps[hold] = surplus
@@ -177,25 +172,6 @@ def test_both_sides_share_what_either_puts_in(tmp_path, rate):
     net = np.interp(frames, found.haptics["time"], near) + energy - energy[0]
     assert net.max() <= 1e-9
     assert tracking(found)[1].max() < 5.0
-
-
-@pytest.mark.parametrize(
-    ("scene", "option", "why"),
-    [
-        ("closed-loop", "hold=pspm", "no held connection sets a spring"),
-        ("closed-loop-direct", "holds.virtual_mechanism.F_drift=pspm", "sets no spring"),
-        ("closed-loop-direct", "holds.controller.x_S=pspm", "controller.v_S sets the same spring"),
-        ("closed-loop-direct", "holds.controller.v_S=pspm", "controller.x_S sets the same spring"),
-    ],
-)
-def test_where_no_spring_is_set_or_half_of_one_it_is_refused(tmp_path, scene, option, why):
-    with pytest.raises(SceneFault, match=why):
-        simulate(scene, tmp_path, [option])
-
-
-def test_a_near_end_that_is_late_is_refused(tmp_path):
-    with pytest.raises(SceneFault, match="near end of its spring must be read unheld"):
-        simulate("closed-loop-direct", tmp_path, ["hold=pspm", "delays.controller.x_D=0.004"])
 
 
 def test_a_near_end_that_is_an_angle_is_known_as_one():
@@ -241,51 +217,28 @@ def test_a_latency_of_nothing_changes_nothing():
     assert np.array_equal(x, none)
 
 
-MOVES = """
-from math import sin
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+def moving(folder: Path, **rates: float) -> None:
+    """FMUs whose outputs y = sin(rate t) go their own way; `seen` is the input of the last step."""
+    for name, rate in rates.items():
+        outputs = {"y": 0.0, "seen": 0.0}
+        body = f"values['y'], values['seen'] = sin({rate} * end), values['u']"
+        slave(folder, name, ("input", {"u": 0.0}), ("output", outputs), body=body)
 
-class {name}(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.u, self.y, self.seen = 0.0, 0.0, 0.0
-        self.register_variable(Real("u", causality=Fmi2Causality.input))
-        self.register_variable(Real("y", causality=Fmi2Causality.output))
-        self.register_variable(Real("seen", causality=Fmi2Causality.output))
 
-    def do_step(self, time, size):
-        self.y, self.seen = sin({rate} * (time + size)), self.u
-        return True
-"""
-SPRING = """
-[[fmu]]
-name = "far"
-path = "Far.fmu"
-rate = 20
-
-[[fmu]]
-name = "near"
-path = "Near.fmu"
-
-[[connection]]
-from = "far.y"
-to = "near.u"
-
-[[spring]]
-set_position = "near.u"
-position = "near.{position}"
-stiffness = [{stiffness}]
-"""
+SPRING = (
+    fmu_table("far", "Far", "rate = 20\n")
+    + fmu_table("near", "Near")
+    + wire_table("far.y", "near.u")
+    + '[[spring]]\nset_position = "near.u"\nposition = "near.{}"\nstiffness = [{}]\n'
+)
 
 
 def test_a_spring_of_another_fmu_is_kept_in_check(tmp_path):
     """Its near end goes its own way, as an output of the FMU that holds the spring."""
-    for name, rate in (("Far", 9.0), ("Near", 5.0)):
-        python_fmu_of(tmp_path, MOVES.format(name=name, rate=rate), f"{name}{uuid.uuid4().hex}")
+    moving(tmp_path, Far=9.0, Near=5.0)
     made = {}
     for hold in ("zoh", "pspm"):
-        text = SPRING.format(position="y", stiffness=100.0)
-        near = run(tmp_path, text, f"hold={hold}", "duration=2.0")[1].haptics
+        near = ran(tmp_path, SPRING.format("y", 100.0), f"hold={hold}", "duration=2.0").haptics
         x, y = near["near.y"], near["near.seen"][1:]
         work = np.cumsum(50.0 * ((y - x[:-1]) ** 2 - (y - x[1:]) ** 2))
         made[hold] = float(np.max(work + 50.0 * (y - x[1:]) ** 2))
@@ -302,31 +255,6 @@ def test_a_spring_of_another_fmu_is_kept_in_check(tmp_path):
     ],
 )
 def test_a_spring_that_is_not_there_is_told(tmp_path, position, stiffness, why):
-    for name in ("Far", "Near"):
-        python_fmu_of(tmp_path, MOVES.format(name=name, rate=1.0), f"{name}{uuid.uuid4().hex}")
+    moving(tmp_path, Far=1.0, Near=1.0)
     with pytest.raises(SceneFault, match=why):
-        run(tmp_path, SPRING.format(position=position, stiffness=stiffness), "hold=zoh")
-
-
-SWITCHED = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class {name}(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.u, self.y, self.x, self.v, self.most = 0.0, {start}, 0.05, 0.0, 0.0
-        self.register_variable(Real("u", causality=Fmi2Causality.input))
-        for name in ("y", "x", "v", "most"):
-            self.register_variable(Real(name, causality=Fmi2Causality.output))
-
-    def do_step(self, time, size):
-        {body}
-        return True
-"""
-MASS = """
-        from math import cos, sin
-        e, c, s = self.x - self.u, cos(10 * size), sin(10 * size)
-        self.x, self.v = self.u + e * c + self.v / 10 * s, self.v * c - 10 * e * s
-        self.most = max(self.most, 0.5 * self.v ** 2 + 50.0 * (self.x - self.u) ** 2)
-        self.y = self.x"""
-BACK_AND_FORTH = "self.y = 0.3 if int((time + size) * 20 + 1e-6) % 2 == 0 else -0.3"
+        run(tmp_path, SPRING.format(position, stiffness), "hold=zoh")

@@ -8,18 +8,16 @@ import pytest
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.explain import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from tests.orchestrator.foreign_fmus import edited, python_fmu, scene
+from tests.orchestrator.foreign_fmus import edited, fmu_table, python_fmu, scene, wire_table
 
-FMU = '[[fmu]]\nname = "{0}"\npath = "{0}.fmu"\n'
-WIRE = '[[connection]]\nfrom = "{}.y"\nto = "{}.u"\n'
 COUPLING = "coupling=gauss-seidel-plants"
 CHAIN = ("a", "b", "c")
 
 
 def wired(folder: Path, names: tuple[str, ...], *wires: tuple[str, str]) -> Path:
     """A scene of FMUs, each of which adds its step to what it takes."""
-    text = "".join(FMU.format(n) for n in names) + "".join(WIRE.format(*w) for w in wires)
-    return scene(folder, text)
+    text = "".join(fmu_table(n, n) for n in names)
+    return scene(folder, text + "".join(wire_table(f"{a}.y", f"{b}.u") for a, b in wires))
 
 
 @pytest.fixture

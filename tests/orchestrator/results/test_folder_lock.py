@@ -12,9 +12,8 @@ from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import folder_lock, tables
 from tests.orchestrator.foreign_fmus import RUN as COMMAND
+from tests.orchestrator.foreign_fmus import process
 from tests.shared_fixtures import status
-
-RUN = "import hapticlink as hl; print(hl.run('pendulum', out={!r}, figures=False).folder)"
 
 
 def test_a_second_run_is_refused_at_once(tmp_path):
@@ -23,17 +22,14 @@ def test_a_second_run_is_refused_at_once(tmp_path):
     def second(time):
         if refusals:
             return
-        command = [sys.executable, "-c", RUN.format(str(tmp_path / "out"))]
-        said = subprocess.run(command, capture_output=True, text=True, check=False).stderr
-        refusals.append(said.splitlines()[-1])
+        refusals.append(process("pendulum", out).stderr)
 
-    first = hl.run(
-        "pendulum", {"duration": 20}, out=tmp_path / "out", figures=False, progress=second
-    )
-    assert f"--out {tmp_path / 'out'}: another run writes there, in process" in refusals[0]
+    out = tmp_path / "out"
+    first = hl.run("pendulum", {"duration": 20}, out=out, figures=False, progress=second)
+    assert f"--out {out}: another run writes there, in process" in refusals[0]
     assert first.run["end"]["reason"] == "duration"
-    assert tables.load(tmp_path / "out").haptics["time"][-1] == first.run["end"]["time"] == 20
-    assert status("run", "pendulum", "--out", tmp_path / "out", "--no-figures") == 0  # afterwards
+    assert tables.load(out).haptics["time"][-1] == first.run["end"]["time"] == 20
+    assert status("run", "pendulum", "--out", out, "--no-figures") == 0  # afterwards
 
 
 def test_a_thread_of_this_process_is_refused_too(tmp_path):

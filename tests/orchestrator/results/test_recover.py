@@ -13,23 +13,31 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.recover import Recovered, recover
-from tests.orchestrator.foreign_fmus import COMMAND, RUN, c_fmu, fmu_table, python_fmu, scene
+from tests.orchestrator.foreign_fmus import (
+    COMMAND,
+    ISOLATED,
+    RUN,
+    c_fmu,
+    fmu_table,
+    process,
+    python_fmu,
+    scene,
+)
 from tests.orchestrator.results.records import run_json
 
 LAST = 3.5
 KILLS = f"if time >= {LAST}: __import__('os').kill(__import__('os').getpid(), 9)"
 
 
-@pytest.mark.parametrize("extra", ["", "isolate = true\n"])
+@pytest.mark.parametrize("extra", ["", ISOLATED])
 def test_a_run_that_is_killed_keeps_every_row(tmp_path, extra):
     """By an FMU, before the first block of rows was full; or with all FMUs of others in processes
     of their own, from outside, where no watchdog is."""
     body = KILLS if not extra else f"if time >= {LAST}: __import__('time').sleep(1000)"
     python_fmu(tmp_path, "Dies", f"self.y = time + size\n        {body}")
     path, out = scene(tmp_path, fmu_table("one", "Dies", extra), duration=5), tmp_path / "out"
-    command = [*RUN, str(path), "--out", str(out)]
     if extra:
-        with subprocess.Popen(command, stderr=subprocess.DEVNULL) as running:
+        with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.DEVNULL) as running:
             while not (table := out / "haptics.rows").exists() or (
                 len(rows.read(table)[1]) < LAST * 64 + 1
             ):
@@ -39,7 +47,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path, extra):
             running.send_signal(signal.SIGKILL)
         assert subprocess.run([*COMMAND, "recover", out], check=True, capture_output=True)
     else:  # the watchdog does it, which holds the same stream
-        subprocess.run(command, stderr=subprocess.PIPE, check=False)
+        process(path, out)
     run = json.loads((out / "run.json").read_text())
     assert run["recovered"] == {"haptics": {"rows": LAST * 64 + 1, "time": LAST, "lost": 0}}
     assert run["end"] == {"reason": "fault", "time": LAST}

@@ -1,7 +1,6 @@
 """CSV files preserve every double exactly."""
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +19,15 @@ def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
     return made
 
 
-@given(st.lists(st.floats(allow_nan=False), min_size=3, max_size=3))
+@given(st.lists(st.floats(), min_size=3, max_size=3))
 def test_every_float_reads_back_to_the_bit(tmp_path_factory, values):
     path = tmp_path_factory.getbasetemp() / "floats.csv"
     with recorder_of(path, ["a.x", "a.P[1,1]", "a.P[1,2]"], np.array(values)) as recorder:
         recorder.row(1 / 3)
     table = read_table(path)
     assert table["time"].tolist() == [1 / 3]
-    assert [float(v).hex() for v in (table["a.x"][0], *table["a.P"].ravel())] == [
-        v.hex() for v in values
-    ]
+    found = (table["a.x"][0], *table["a.P"].ravel())
+    assert [float(v).hex() for v in found] == [v.hex() for v in values]
 
 
 def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path):
@@ -48,16 +46,6 @@ def test_rows_are_on_disk_before_the_end_and_after_an_exception(tmp_path):
     assert read_table(path)["y"].tolist() == list(range(5))
 
 
-def test_vectors_and_matrices_stack(tmp_path):
-    path = tmp_path / "m.csv"
-    columns = [f"e.L[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)]
-    with recorder_of(path, columns, np.arange(6.0)) as recorder:
-        recorder.row(0.0)
-    assert read_table(path)["e.L"].tolist() == [[[0, 1, 2], [3, 4, 5]]]
-    with pytest.raises(KeyError, match=r"no signal 'e.K'"):
-        read_table(path)["e.K"]
-
-
 @pytest.mark.parametrize(
     ("columns", "value"),
     [
@@ -67,6 +55,7 @@ def test_vectors_and_matrices_stack(tmp_path):
         (["a.x[3]", "a.x[1]"], [1, 0]),  # a gap
         (["a.x[1,1]", "a.x[2,2]"], [0, 1]),
         (["a.x", "a.x[1]"], 0),
+        ([f"a.x[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)], [[0, 1, 2], [3, 4, 5]]),
     ],
 )
 def test_entries_stack_by_their_indices(tmp_path, columns, value):
@@ -77,6 +66,8 @@ def test_entries_stack_by_their_indices(tmp_path, columns, value):
     found = read_table(path)["a.x"]
     assert found.shape[0] == 2
     assert found[1].tolist() == value
+    with pytest.raises(KeyError, match=r"no signal 'a.y'"):
+        read_table(path)["a.y"]
 
 
 def test_arrays_of_records_have_their_own_names(tmp_path):
@@ -87,12 +78,6 @@ def test_arrays_of_records_have_their_own_names(tmp_path):
     assert table.signals == ("time", "a.leg[1].x", "a.leg[2].y")
     assert [table[name].tolist() for name in table.signals] == [[0], [[0, 1]], [2]]
     assert "a.leg" not in table
-
-
-def test_nan_is_written_as_such(tmp_path):
-    with recorder_of(tmp_path / "n.csv", ["y"], np.array([math.nan])) as recorder:
-        recorder.row(0.0)
-    assert math.isnan(read_table(tmp_path / "n.csv")["y"][0])
 
 
 def test_the_end_of_a_run_is_written_over_what_is_there(tmp_path):

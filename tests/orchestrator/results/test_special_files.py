@@ -3,6 +3,7 @@ them refuses them at once."""
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,19 +17,14 @@ from tests.shared_fixtures import status
 resource = pytest.importorskip("resource")
 
 
-def fifo(out: Path) -> None:
-    (out / "run.json").unlink()
-    os.mkfifo(out / "run.json")
+def replaced(name: str, *, by: str = "", gone: str = "") -> Callable[[Path], object]:
+    """A file that a link takes the place of, or a pipe."""
 
+    def spoil(out: Path) -> None:
+        (out / (gone or name)).unlink()
+        (out / name).symlink_to(by) if by else os.mkfifo(out / name)
 
-def endless(out: Path) -> None:
-    (out / "haptics.csv").unlink()
-    (out / "haptics.csv").symlink_to("/dev/zero")
-
-
-def endless_rows(out: Path) -> None:
-    (out / "haptics.csv").unlink()
-    (out / "haptics.rows").symlink_to("/dev/zero")
+    return spoil
 
 
 def brackets(out: Path) -> None:
@@ -52,9 +48,9 @@ def folder_as_story(out: Path) -> None:
     (out / "run.json").mkdir()
 
 
-def endless_story(out: Path) -> None:
-    (out / "run.json").unlink()
-    (out / "run.json").symlink_to("/dev/zero")
+fifo, endless_story = replaced("run.json"), replaced("run.json", by="/dev/zero")
+endless = replaced("haptics.csv", by="/dev/zero")
+endless_rows = replaced("haptics.rows", by="/dev/zero", gone="haptics.csv")
 
 
 @pytest.fixture

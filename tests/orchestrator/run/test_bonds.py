@@ -1,7 +1,6 @@
 """Energy of connections whose numbers are converted on the way, or stand apart on the board: the
 sampled spring in closed form, whatever its units, factors and the order of its outputs."""
 
-import uuid
 from pathlib import Path
 
 import numpy as np
@@ -9,30 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from tests.orchestrator.foreign_fmus import python_fmu_of, scene, with_units
+from tests.orchestrator.foreign_fmus import entries, fmu_table, scene, slave, wire_table, with_units
 
-SLAVE = """
-from math import cos, sin
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class {name}(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.u, self.y = [0.0, 0.0], [0.0, 0.0, 7.0]
-        for i in (0, 1):
-            self.add("{input}[%d]" % (i + 1), Fmi2Causality.input, self.u, i)
-        for name, i in {outputs}:
-            self.add(name, Fmi2Causality.output, self.y, i)
-
-    def add(self, name, causality, values, i):
-        self.register_variable(Real(name, causality=causality, getter=lambda: values[i],
-                                    setter=lambda v: values.__setitem__(i, v)))
-
-    def do_step(self, t, size):
-        u, end = self.u, t + size
-        self.y[0], self.y[1] = {motion}
-        return True
-"""
 STIFFNESS = np.array([300.0, 50.0])
 """N/m, along x[1] and x[2]."""
 
@@ -42,45 +19,30 @@ def path(t: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([0.02 * np.sin(9 * t), 0.03 * (np.cos(7 * t) - 1)], axis=1)
 
 
-def made(folder: Path, name: str, units: tuple[str, str], *parts: object) -> None:
-    keys = ("input", "outputs", "motion")
-    text = SLAVE.format(name=name, **dict(zip(keys, parts, strict=True)))
-    entry, output = str(parts[0]), parts[1][0][0][0]
-    said = {f"{n}[{i}]": u for n, u in zip((entry, output), units, strict=True) for i in (1, 2)}
-    with_units(python_fmu_of(folder, text, uuid.uuid4().hex), **said)
-
-
 def fmus(folder: Path, length: str = "m", force: str = "N", sign: int = -1) -> None:
-    """Moves goes its way in `length` and takes efforts in `force`; Spring takes m and gives N."""
+    """Moves goes its way in `length` and takes efforts in `force`; Spring takes m and gives N. Of
+    each, what is put out stands apart in the file, or not in order."""
     scale = {"m": 1.0, "mm": 1e3}[length]
-    moves = f"{scale} * .02 * sin(9 * end), {scale} * .03 * (cos(7 * end) - 1)"
-    made(folder, "Moves", (force, length), "f", [("x[1]", 0), ("z", 2), ("x[2]", 1)], moves)
-    pull = ", ".join(f"{sign * k} * u[{i}]" for i, k in enumerate(STIFFNESS))
-    made(folder, "Spring", ("m", "N"), "d", [("F[2]", 1), ("e", 2), ("F[1]", 0)], pull)
+    way = f"""values["x[1]"] = {scale} * .02 * sin(9 * end)
+        values["x[2]"] = {scale} * .03 * (cos(7 * end) - 1)"""
+    x = {"x[1]": 0.0, "z": 7.0, "x[2]": 0.0}
+    moves = slave(folder, "Moves", ("input", entries("f", 2)), ("output", x), body=way)
+    with_units(moves, **entries("f", 2, force), **entries("x", 2, length))
+    pull = "\n        ".join(
+        f"values['F[{i}]'] = {sign * k} * values['d[{i}]']" for i, k in enumerate(STIFFNESS, 1)
+    )
+    f = {"F[2]": 0.0, "e": 7.0, "F[1]": 0.0}
+    spring = slave(folder, "Spring", ("input", entries("d", 2)), ("output", f), body=pull)
+    with_units(spring, **entries("d", 2, "m"), **entries("F", 2, "N"))
 
 
-FMUS = """
-[[fmu]]
-name = "moves"
-path = "Moves.fmu"
-[[fmu]]
-name = "spring"
-path = "Spring.fmu"
-timing = "sampled"
-[[power]]
-effort = "moves.f"
-displacement = "moves.x"
-"""
-BACK = """
-[[connection]]
-from = "moves.x[{0}]"
-to = "spring.d[{0}]"
-"""
-PULL = """
-[[connection]]
-from = "spring.F[{0}]"
-to = "moves.f[{0}]"
-"""
+FMUS = (
+    fmu_table("moves", "Moves")
+    + fmu_table("spring", "Spring", 'timing = "sampled"\n')
+    + '[[power]]\neffort = "moves.f"\ndisplacement = "moves.x"\n'
+)
+BACK = wire_table("moves.x[{0}]", "spring.d[{0}]")
+PULL = wire_table("spring.F[{0}]", "moves.f[{0}]")
 
 
 def run(folder: Path, how: str = "", head: str = "") -> Experiment:

@@ -18,7 +18,14 @@ from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled
-from tests.orchestrator.foreign_fmus import c_fmu, fmu_table, python_fmu, scene
+from tests.orchestrator.foreign_fmus import (
+    ISOLATED,
+    c_fmu,
+    fmu_table,
+    python_fmu,
+    scene,
+    wire_table,
+)
 from tests.orchestrator.native_mass import held
 
 try:
@@ -106,36 +113,22 @@ def test_every_scheme_and_rate(tmp_path, monkeypatch, options):
     both("closed-loop", tmp_path, monkeypatch, "duration=0.2", *options)
 
 
-STEPS = """
-coupling = "{coupling}"
-[substeps]
-two = 3
-[[fmu]]
-name = "one"
-path = "Gives.fmu"
-[[fmu]]
-name = "two"
-path = "Gives.fmu"
-rate = 24
-[[connection]]
-from = "one.y"
-to = "two.u"
-factor = 0.3
-hold = "foh"
-[[connection]]
-from = "two.y"
-to = "one.u"
-hold = "smooth"
-"""
+STEPS = (
+    'coupling = "{coupling}"\nsubsteps.two = 3\n'
+    + fmu_table("one", "Gives")
+    + fmu_table("two", "Gives", "rate = 24\n{isolate}")
+    + wire_table("one.y", "two.u", 'factor = 0.3\nhold = "foh"\n')
+    + wire_table("two.y", "one.u", 'hold = "smooth"\n')
+)
 
 
 @pytest.mark.parametrize(
     ("coupling", "isolate"),
-    [("gauss-seidel", ""), ("jacobi", ""), ("jacobi", "isolate = true")],
+    [("gauss-seidel", ""), ("jacobi", ""), ("jacobi", ISOLATED)],
 )
 def test_substeps_and_isolated_fmus(tmp_path, monkeypatch, coupling, isolate):
     python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
-    text = STEPS.format(coupling=coupling).replace("rate = 24", f"rate = 24\n{isolate}")
+    text = STEPS.format(coupling=coupling, isolate=isolate)
     _, left = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
     assert ("step two" in left) == bool(isolate)
 
@@ -179,30 +172,21 @@ def test_every_status_of_a_step(tmp_path, monkeypatch, mode):
     assert (run["fault"] is None) == (mode == 1)
 
 
-ITERATED = {"iteration": Iteration(method="newton", tolerance=1e-10), "between": "hermite"}
-REPEATED: dict[str, tuple[str, dict[str, Any]]] = {
-    "Newton": ("iterated", ITERATED),
-    "Aitken, substeps": ("iterated", {"between": "foh", "substeps": 2}),
+REPEATED: dict[str, dict[str, Any]] = {
+    "Newton": {"between": "hermite"},
+    "Aitken, substeps": {"between": "foh", "substeps": 2, "iteration": Iteration()},
 }
 
 
-@pytest.mark.parametrize("how", REPEATED)
-def test_steps_that_are_taken_back(tmp_path, monkeypatch, how):
+@pytest.mark.parametrize("settings", REPEATED.values(), ids=REPEATED)
+def test_steps_that_are_taken_back(tmp_path, monkeypatch, settings):
     """The two-mass oscillator, iterated."""
-    coupling, settings = REPEATED[how]
     fmus = held(tmp_path)
     found = []
     for choice in ("python", "compiled"):
         monkeypatch.setenv(CHOICE, choice)
-        made = coupled.system(
-            fmus,
-            coupled.HERMITE,
-            coupling,
-            Fraction(1, 50),
-            Fraction(1, 2),
-            get_after_set=("one", "two"),
-            power=coupled.POWER,
-            **settings,
+        made = coupled.iterated(
+            fmus, Fraction(1, 2), rate=50, rows=coupled.HERMITE, power=coupled.POWER, **settings
         )
         outcome, table = coupled.simulate(made, tmp_path)
         assert outcome.fault is None

@@ -1,6 +1,7 @@
 """Results of an earlier run in the same folder go when the first rows of the next one are there."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -11,10 +12,10 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.foreign_fmus import SLAVE, c_fmu, python_fmu_of, run, scene
+from tests.orchestrator.foreign_fmus import c_fmu, edited_entries, fmu_table, run, scene, slave
 from tests.shared_fixtures import status
 
-ONE = '[[fmu]]\nname = "one"\npath = "faults.fmu"\n'
+ONE = fmu_table("one", "faults")
 
 
 def flipped(folder: Path) -> None:
@@ -28,18 +29,13 @@ def flipped(folder: Path) -> None:
 
 
 def nan_at_the_start(folder: Path) -> None:
-    text = SLAVE.format(name="Never", body="pass")
-    python_fmu_of(folder, text.replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1.0"), "never")
-    (folder / "Never.fmu").replace(folder / "faults.fmu")
+    slave(folder, "Never", ("output", {"y": math.nan})).replace(folder / "faults.fmu")
 
 
 def elsewhere(folder: Path) -> None:
-    path = c_fmu(folder)
-    with zipfile.ZipFile(path) as archive:
-        entries = {e.filename: archive.read(e) for e in archive.infolist()}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in entries.items():
-            archive.writestr(name.replace("binaries/", "binaries/other-"), content)
+    edited_entries(c_fmu(folder), lambda entries: {
+        name.replace("binaries/", "binaries/other-"): each for name, each in entries.items()
+    })  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Faults made to happen through real FMUs: what each policy does, that results are kept, and that
 no process and no folder stays behind."""
 
+import math
 import os
 import shutil
 import signal
@@ -8,7 +9,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +24,17 @@ from tests.orchestrator.foreign_fmus import (
     RUN,
     SLAVE,
     c_fmu,
+    c_fmu3,
+    edited_entries,
+    fault,
     fmu_table,
+    process,
     python_fmu,
     python_fmu_of,
+    ran,
     run,
     scene,
+    slave,
     wire_table,
 )
 from tests.plugins import hapticlink, server
@@ -76,45 +82,36 @@ def test_a_value_that_is_not_finite_stops_or_is_held(tmp_path, value, isolate):
     experiment, found = run(tmp_path, one)
     assert f"output y is {value[7:10]} at t = 0.078125 s" in str(experiment.outcome.fault)
     assert found.haptics["one.y"].tolist() == [0, 1, 2, 3, 4]
-    experiment, found = run(tmp_path, one, "faults.nan=hold")
-    assert experiment.outcome.fault is None
+    found = ran(tmp_path, one, "faults.nan=hold")
     assert found.haptics["one.y"][:8].tolist() == [0, 1, 2, 3, 4, 4, 6, 7]
     assert found.run["held_outputs"] == {"one": 1}
 
 
 def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path):
-    never = SLAVE.format(name="Never", body="pass").replace("0.0, 0.0, 1.0", "0.0, float('nan'), 1")
-    python_fmu_of(tmp_path, never, "never")
-    experiment, _ = run(tmp_path, fmu_table("one", "Never"), "faults.nan=hold")
-    assert "one: output y is nan at t = 0 s" in str(experiment.outcome.fault)
-
-
-HALF = "\n        ".join(
-    ["if size > 0.005: return False", "self.gain += size", "self.y = self.gain"]
-)
+    slave(tmp_path, "Never", ("output", {"y": math.nan}))
+    said = fault(tmp_path, fmu_table("one", "Never"), "faults.nan=hold")
+    assert "one: output y is nan at t = 0 s" in said
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path, isolate):
-    python_fmu(tmp_path, "Stiff", HALF, canGetAndSetFMUstate=True)
+    half = "if size > 0.005: return False\n        self.gain += size; self.y = self.gain"
+    python_fmu(tmp_path, "Stiff", half, canGetAndSetFMUstate=True)
     one = fmu_table("one", "Stiff", isolate)
     experiment, found = run(tmp_path, one)
     assert "one: fmi2DoStep returned discard at t = 0 s" in str(experiment.outcome.fault)
     assert found.haptics["time"].tolist() == [0.0]
-    experiment, found = run(tmp_path, one, "faults.discard=retry")
-    assert experiment.outcome.fault is None
+    found = ran(tmp_path, one, "faults.discard=retry")
     np.testing.assert_allclose(found.haptics["one.y"][1:], 1 + found.haptics["time"][1:], 1e-15)
     assert found.haptics["one.steps"][-1] == 32 * 4  # quarters of 1/64 s are below 5 ms
     assert found.run["smaller_steps"] == {"one": 32}
 
 
 def test_a_retry_that_cannot_be_says_why(tmp_path):
-    python_fmu(tmp_path, "Stiff", "return False")
-    experiment, _ = run(tmp_path, fmu_table("one", "Stiff"), "faults.discard=retry")
-    assert "not retried: the FMU lacks canGetAndSetFMUstate" in str(experiment.outcome.fault)
-    python_fmu(tmp_path, "Stiffer", "return False", canGetAndSetFMUstate=True)
-    experiment, _ = run(tmp_path, fmu_table("one", "Stiffer"), "faults.discard=retry")
-    assert "in steps of 1/1024 too" in str(experiment.outcome.fault)
+    lacks = "not retried: the FMU lacks canGetAndSetFMUstate"
+    for able, why in ((False, lacks), (True, "in steps of 1/1024 too")):
+        python_fmu(tmp_path, "Stiff", "return False", canGetAndSetFMUstate=able)
+        assert why in fault(tmp_path, fmu_table("one", "Stiff"), "faults.discard=retry")
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
@@ -129,6 +126,7 @@ def test_an_exception_in_a_python_fmu(tmp_path, isolate):
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize("fmi", ["2", "3"])
 @pytest.mark.parametrize(
     ("mode", "named", "calls"),
     [
@@ -138,22 +136,26 @@ def test_an_exception_in_a_python_fmu(tmp_path, isolate):
         (4, "fatal", []),
     ],
 )
-def test_every_status(tmp_path, mode, named, calls, isolate, monkeypatch):
-    """What is called after a fault: FMI 2.0.5 sections 2.1.3 and 4.2.4."""
+def test_every_status(tmp_path, fmi, mode, named, calls, isolate, monkeypatch):
+    """What is called after a fault: FMI 2.0.5 sections 2.1.3 and 4.2.4, FMI 3.0 section 2.3.1.
+    After an error only freeing is allowed, after a fatal error nothing; a discarded step leaves the
+    FMU as it was, and a warning is no fault."""
     log = tmp_path / "log"
     monkeypatch.setenv("FAULT_FMU_LOG", str(log))
-    c_fmu(tmp_path)
+    {"2": c_fmu, "3": c_fmu3}[fmi](tmp_path)
     python_fmu(tmp_path, "Other")
-    text = fmu_table("one", "faults", isolate) + f"start.mode = {mode}\n" + OTHER
-    experiment, found = run(tmp_path, text)
-    fault = experiment.outcome.fault
+    name, y = {"2": ("faults", "one.y"), "3": ("types", "one.out_Int8")}[fmi]
+    start = f"start.mode = {mode}\n" + "start.in_Int8 = 7\n" * (fmi == "3")
+    experiment, found = run(tmp_path, fmu_table("one", name, isolate + start) + OTHER)
     said = log.read_text().splitlines() if log.exists() else []
     assert [line for line in said if "unloaded" not in line] == calls
-    if named is None:  # a warning is no fault
-        assert fault is None
+    if named is None:
+        assert experiment.outcome.fault is None
+        assert len(found.haptics["time"]) == 33
         return
-    assert str(fault) == f"one: fmi2DoStep returned {named} at t = 0.046875 s"
-    assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
+    told = f"one: fmi{fmi}DoStep returned {named} at t = 0.046875 s"
+    assert str(experiment.outcome.fault) == told
+    assert found.haptics[y].tolist() == ([0, 1, 2, 3] if fmi == "2" else [0, 7, 7, 7])
     assert found.run["fault"]["kind"] == "FmuFault"
 
 
@@ -162,31 +164,32 @@ def test_every_status(tmp_path, mode, named, calls, isolate, monkeypatch):
     [
         ("if time > 0.2: __import__('os')._exit(3)", "its process ended with exit status 3"),
         ("if time > 0.2: __import__('ctypes').string_at(0)", "its process ended by SIGSEGV"),
-        ("if time > 0.2: __import__('time').sleep(60)", "did not answer within 2 s"),
+        (
+            "if time > 0.2: __import__('time').sleep(60)",
+            "its process did not answer within 2 s and was",
+        ),
+        ("native", "its process did not answer within 2 s and was"),  # an endless loop
     ],
 )
 def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(tmp_path, body, how):
-    python_fmu(tmp_path, "Dies", body)
+    start, native = "", body == "native"
+    if native:
+        c_fmu(tmp_path).rename(tmp_path / "Dies.fmu")
+        start = "start.mode = 6\n"
+    else:
+        python_fmu(tmp_path, "Dies", body)
     ended = tmp_path / "ended"
     said = f"\n    def terminate(self):\n        open({str(ended)!r}, 'w').close()\n"
     python_fmu_of(tmp_path, SLAVE.format(name="Other", body="pass") + said, tmp_path.name)
-    text = fmu_table("one", "Dies", ISOLATED) + OTHER
+    text = fmu_table("one", "Dies", ISOLATED + start) + OTHER
     experiment, found = run(tmp_path, text, "faults.timeout=2")
     message = str(experiment.outcome.fault)
-    assert message.startswith("one: ")
-    assert how in message
-    assert message.endswith("at t = 0.203125 s")
-    np.testing.assert_array_equal(found.haptics["time"], np.arange(14) / 64)
+    assert message.startswith(f"one: {how}")
+    steps = 3 if native else 13
+    assert message.endswith(f"at t = {steps / 64} s")
+    np.testing.assert_array_equal(found.haptics["time"], np.arange(steps + 1) / 64)
     assert found.run["end"]["reason"] == "fault"
     assert ended.exists()  # the other FMU was terminated
-
-
-def test_a_native_endless_loop_is_ended(tmp_path):
-    c_fmu(tmp_path)
-    text = fmu_table("one", "faults", ISOLATED + "start.mode = 6\n")
-    experiment, found = run(tmp_path, text, "faults.timeout=2")
-    assert "did not answer within 2 s and was ended" in str(experiment.outcome.fault)
-    assert found.haptics["one.y"].tolist() == [0, 1, 2, 3]
 
 
 def test_isolated_runs_give_the_same_bytes(tmp_path):
@@ -207,10 +210,8 @@ def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path):
         slave = SLAVE.format(name="Same", body=f"self.y = {value}")
         python_fmu_of(tmp_path / name, slave, "same")
     text = fmu_table("one", "first/Same") + fmu_table("two", "second/Same")
-    experiment, found = run(tmp_path, text)
-    assert experiment.outcome.fault is None
-    assert found.haptics["one.y"][-1] == 1.0
-    assert found.haptics["two.y"][-1] == 2.0
+    found = ran(tmp_path, text)
+    assert (found.haptics["one.y"][-1], found.haptics["two.y"][-1]) == (1.0, 2.0)
     assert "another module 'msame'" in found.run["isolated"]["two"]
 
 
@@ -222,8 +223,7 @@ def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(tmp_pat
     c_fmu(tmp_path, python=True)
     path = scene(tmp_path, fmu_table("one", "faults", isolate))
     log = tmp_path / "log"
-    command = [*RUN, str(path), "--out", str(tmp_path / "out")]
-    subprocess.run(command, check=True, env=os.environ | {"FAULT_FMU_LOG": str(log)})
+    assert process(path, tmp_path / "out", FAULT_FMU_LOG=str(log)).returncode == 0
     assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
 
 
@@ -235,10 +235,8 @@ def test_threads_that_an_fmu_leaves_running_keep_no_process(tmp_path, command):
     path = scene(tmp_path, fmu_table("one", "Bad", ISOLATED * ("isolated" in command)))
     arguments = [command.split()[0], str(path), "--out", str(tmp_path / "out")]
     arguments += ["--vary", "duration=0.1,0.2", "--jobs", "2"] if command == "sweep" else []
-    ended = subprocess.run(
-        [*COMMAND, *arguments],
-        capture_output=True, timeout=60, text=True, check=False,
-    )  # fmt: skip
+    command_line = [*COMMAND, *arguments]
+    ended = subprocess.run(command_line, capture_output=True, timeout=60, text=True, check=False)
     begun = "scene: sweep\n" if command == "sweep" else ""
     assert (ended.returncode, ended.stderr) == (0, begun)
     assert ended.stdout.startswith("scene: ")
@@ -273,8 +271,8 @@ def test_a_process_that_dies_in_terminate_is_told(tmp_path):
     slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format("__import__('os')._exit(3)")
     python_fmu_of(tmp_path, slave, tmp_path.name)
     experiment, found = run(tmp_path, fmu_table("one", "Bad", ISOLATED))
-    said = "one: its process ended with exit status 3 at t = 0.5 s"
-    assert str(experiment.outcome.fault) == said
+    said = str(experiment.outcome.fault)
+    assert said == "one: its process ended with exit status 3 at t = 0.5 s"
     assert found.haptics["time"][-1] == 0.5
 
 
@@ -289,11 +287,10 @@ def test_a_process_that_dies_in_terminate_is_told(tmp_path):
 def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, crash, status):
     python_fmu(tmp_path, "Dies", f"self.y = time + size\n        if time >= 2.0: {crash}")
     path, out = scene(tmp_path, fmu_table("one", "Dies"), duration=5), tmp_path / "out"
-    command = [*RUN, str(path), "--out", str(out)]
     # Its end is that of the process beside it, which holds the same stream.
-    ended = subprocess.run(command, stderr=subprocess.PIPE, check=False)
+    ended = process(path, out)
     assert ended.returncode == status
-    assert b"isolate = true" in ended.stderr
+    assert "isolate = true" in ended.stderr
     found = tables.load(out)
     np.testing.assert_array_equal(found.haptics["time"], np.arange(2 * 64 + 1) / 64)
     np.testing.assert_array_equal(found.haptics["one.y"][1:], found.haptics["time"][1:])
@@ -308,11 +305,9 @@ def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path)
     kill = "__import__('os').kill(__import__('os').getpid(), 9)"
     script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
     dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())
-    others = [
-        Path(temporary_folders.new()),
-        dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}"),
-    ]
-    others[1].mkdir()
+    elsewhere = dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}")
+    others = [Path(temporary_folders.new()), elsewhere]
+    elsewhere.mkdir()
     assert dead.is_dir()
     subprocess.run([*COMMAND, "--version"], check=True, capture_output=True)
     assert not dead.exists()
@@ -351,12 +346,10 @@ def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path):
     limit = f"__import__('resource').setrlimit({resource.RLIMIT_FSIZE}, ({most}, {most}))"
     python_fmu(tmp_path, "Fine", f"self.y = 1 / 3 + time; self.steps == 1 and {limit}")
     path = scene(tmp_path, fmu_table("one", "Fine"), duration=60)
-    out = tmp_path / "out"
-    command = [*RUN, str(path), "--out", str(out)]
-    ended = subprocess.run(command, capture_output=True, check=False)
+    ended, out = process(path, tmp_path / "out"), tmp_path / "out"
     assert ended.returncode == 1
-    assert b"File too large" in ended.stderr
-    assert b"Traceback" not in ended.stderr
+    assert "File too large" in ended.stderr
+    assert "Traceback" not in ended.stderr
     found = tables.load(out)
     assert found.run["end"]["time"] == found.haptics["time"][-1]
     rows = found.haptics["time"]
@@ -388,9 +381,8 @@ def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path, step):
     out = disk / "out"
     command = f"{mount}; {' '.join(RUN)} {path} --out {out}; echo $?"
     command += f"; cp -r {out} {tmp_path}"
-    ended = subprocess.run(
-        ["unshare", "-rm", "sh", "-c", command], capture_output=True, check=False
-    )
+    shell = ["unshare", "-rm", "sh", "-c", command]
+    ended = subprocess.run(shell, capture_output=True, check=False)
     assert ended.stdout.splitlines()[-1] == b"1", ended.stderr
     assert told.encode() in ended.stderr
     found = tables.load(tmp_path / "out")
@@ -403,16 +395,12 @@ def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path, step):
 @pytest.mark.parametrize("gone", [".py", "slavemodule.txt"])
 def test_a_python_fmu_without_its_module_is_told(tmp_path, gone):
     """The libraries of pythonfmu crash the process."""
-    path = python_fmu(tmp_path, "Bare")
-    with zipfile.ZipFile(path) as archive:
-        entries = {n: archive.read(n) for n in archive.namelist()}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in entries.items():
-            if not name.startswith("resources/") or not name.endswith(gone):
-                archive.writestr(name, content)
-    experiment, _ = run(tmp_path, fmu_table("one", "Bare"))
+    edited_entries(python_fmu(tmp_path, "Bare"), lambda entries: {
+        name: each for name, each in entries.items()
+        if not name.startswith("resources/") or not name.endswith(gone)
+    })  # fmt: skip
     said = "could not be loaded: resources/slavemodule.txt names no module beside it; build"
-    assert said in str(experiment.outcome.fault)
+    assert said in fault(tmp_path, fmu_table("one", "Bare"))
 
 
 def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path):

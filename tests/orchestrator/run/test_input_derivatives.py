@@ -1,8 +1,5 @@
-"""Inputs that vary within a step: polynomial holds on compiled FMUs that interpolate.
-
-Against the two-mass oscillator's published errors, orders and limits of stability, which exact
-subsystems reach only where the hold acts within the step; without substeps.
-"""
+"""Inputs that vary within a step: polynomial holds on compiled FMUs that interpolate. What they
+reach is in holds/test_order_of_accuracy.py and test_coupling.py."""
 
 import math
 from collections.abc import Mapping
@@ -20,8 +17,8 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled
-from tests.orchestrator.holds.test_order_of_accuracy import error, growth
-from tests.orchestrator.native_mass import FLAGS, native
+from tests.orchestrator.holds.test_order_of_accuracy import error
+from tests.orchestrator.native_mass import held, native
 from tests.shared_fixtures import status
 
 Fmus = Mapping[str, Description]
@@ -31,6 +28,12 @@ Fmus = Mapping[str, Description]
 def fmus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("native")
     return {name: native(folder, name) for name in ("one", "two")}
+
+
+@pytest.fixture(scope="module")
+def constant(tmp_path_factory):
+    """The same, of inputs that are constant within a step."""
+    return held(tmp_path_factory.mktemp("constant"))
 
 
 @given(st.lists(st.floats(-10, 10), min_size=2, max_size=4), st.floats(1e-4, 10))
@@ -77,39 +80,6 @@ def test_what_an_fmu_is_told_is_the_hold(name, data):
     np.testing.assert_allclose(mean, gauss, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("hold", "published"),
-    [("zoh", 8.75e-2), ("foh", 8.90e-3), ("second-order", 1.53e-3), ("lead", 7.08e-3)],
-)
-def test_largest_error_at_a_hundredth(fmus, tmp_path, hold, published):
-    assert error(fmus, tmp_path, 100, hold, 1) == pytest.approx(published, rel=0.02)
-
-
-@pytest.mark.parametrize(("hold", "order"), [("foh", 2), ("second-order", 3), ("delayed", 1)])
-def test_order_of_a_hold(fmus, tmp_path, hold, order):
-    rates = [200, 400, 800]
-    errors = [error(fmus, tmp_path, rate, hold, 1) for rate in rates]
-    assert coupled.order(rates, errors) == pytest.approx(order, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("hold", "limit", "coupling"),
-    [
-        ("foh", ".0630", "jacobi"),
-        ("second-order", ".0765", "jacobi"),
-        ("delayed", ".0198", "jacobi"),
-        ("foh", ".0763", "gauss-seidel-plants"),
-        ("second-order", ".0843", "gauss-seidel-plants"),
-    ],
-)
-def test_limit_of_stability_to_one_percent(fmus, tmp_path, hold, limit, coupling):
-    below, above = (
-        growth(fmus, tmp_path, Fraction(limit) * part, hold, 1, 500, coupling=coupling)
-        for part in (Fraction(99, 100), Fraction(101, 100))
-    )
-    assert below < 1 < above
-
-
 @pytest.mark.parametrize("hold", ["foh", "second-order", "delayed", "smooth"])
 def test_substeps_change_nothing(fmus, tmp_path, hold):
     """Each substep goes on along the same polynomial."""
@@ -120,17 +90,8 @@ def test_substeps_change_nothing(fmus, tmp_path, hold):
     np.testing.assert_allclose(rows[0], rows[1], rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize(("between", "published"), [("foh", 1.73e-3), ("hermite", 7.8e-7)])
-def test_iterated_coupling_needs_no_substeps(fmus, tmp_path, between, published):
-    made = coupled.iterated(fmus, Fraction("1.06"), between, rows=coupled.HERMITE)
-    outcome, table = coupled.simulate(made, tmp_path)
-    assert outcome.fault is None
-    assert coupled.error(table) == pytest.approx(published, rel=0.02)
-
-
-def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, tmp_path):
+def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, constant, tmp_path):
     """`foh` on it is the lead; where only one of the two can, each gets what it can take."""
-    constant = {n: native(tmp_path, n, FLAGS[1:]) for n in ("one", "two")}
     assert error(constant, tmp_path, 100, "foh", 1) == pytest.approx(7.08e-3, rel=0.02)
     mixed = {"one": fmus["one"], "two": constant["two"]}
     made = coupled.masses(mixed, Fraction(1, 100), 10, "foh")
@@ -139,15 +100,6 @@ def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, tmp_path):
         "one.x -> two.x1": 0,
         "one.v -> two.v1": 0,
     }
-
-
-def test_energy_is_booked_with_the_mean(fmus, tmp_path):
-    """Iterated and linear, what is held has the mean of the source's two samples: none is made."""
-    made = coupled.iterated(fmus, Fraction("1.06"), "foh", power=coupled.POWER)
-    outcome, _ = coupled.simulate(made, tmp_path)
-    booked = outcome.details.meters["two.F -> one.F"]
-    assert abs(booked.held) > 1.0
-    assert abs(booked.generated) < 1e-8
 
 
 SCENE = """
@@ -186,8 +138,7 @@ def test_a_run_and_a_plan_say_who_takes_what(fmus, tmp_path, capsys):
     assert "  set one derivatives True\n" in told
 
 
-def test_a_run_says_where_an_fmu_cannot(tmp_path):
-    constant = {n: native(tmp_path, n, FLAGS[1:]) for n in ("one", "two")}
+def test_a_run_says_where_an_fmu_cannot(constant, tmp_path):
     found = simulate(str(scene(constant)), tmp_path / "out", ["substeps.two=2"]).results.run
     assert found["within_a_step"] == {
         "two.F -> one.F": "constant, the hold at the middle (half-step lead)",

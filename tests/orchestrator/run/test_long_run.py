@@ -2,7 +2,6 @@
 
 import pytest
 
-from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays
@@ -32,9 +31,3 @@ def test_a_run_of_1e5_s_has_rows(tmp_path, options):
 def test_ages_of_a_run_are_those_of_its_plan(tmp_path):
     experiment = simulate("closed-loop-direct", tmp_path, ["duration=0.6"])
     assert experiment.outcome.details.delays == delays(Plan(experiment.system))
-
-
-def test_rates_that_are_drawn_before_the_run_have_a_bound(tmp_path):
-    rate = "graphics.rate={ min = 20, max = 60, seed = 2 }"
-    with pytest.raises(SceneFault, match=r"graphics\.rate: up to .* would be drawn"):
-        simulate("closed-loop", tmp_path, [LONG, rate])

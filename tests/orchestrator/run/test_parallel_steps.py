@@ -2,9 +2,17 @@
 
 import pytest
 
-from tests.orchestrator.foreign_fmus import c_fmu, python_fmu, run
+from tests.orchestrator.foreign_fmus import (
+    ISOLATED,
+    c_fmu,
+    fault,
+    fmu_table,
+    python_fmu,
+    ran,
+    run,
+    wire_table,
+)
 
-FMU = '[[fmu]]\nname = "{0}"\npath = "{1}.fmu"\nisolate = {2}\n'
 MEET = """import pathlib, time as clock
         folder = pathlib.Path({folder!r})
         (folder / f"{own}{{self.steps}}").touch()
@@ -20,31 +28,30 @@ def test_steps_of_an_instant_run_at_the_same_time(tmp_path, coupling):
     """Each waits in its step for the other to be in the same step."""
     for name, own, other in (("First", "a", "b"), ("Second", "b", "a")):
         python_fmu(tmp_path, name, MEET.format(folder=str(tmp_path), own=own, other=other))
-    both = FMU.format("one", "First", "true") + FMU.format("two", "Second", "true")
-    wire = '[[connection]]\nfrom = "one.y"\nto = "two.u"\n'
-    experiment, found = run(tmp_path, f'coupling = "{coupling}"\n' + both + wire)
-    assert experiment.outcome.fault is None
+    both = fmu_table("one", "First", ISOLATED) + fmu_table("two", "Second", ISOLATED)
+    text = f'coupling = "{coupling}"\n' + both + wire_table("one.y", "two.u")
+    found = ran(tmp_path, text)
     assert found.haptics["one.y"].tolist() == found.haptics["time"].tolist()
 
 
-@pytest.mark.parametrize("isolate", ["false", "true"])
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_of_two_that_fail_the_first_of_the_plan_is_told(tmp_path, isolate):
     python_fmu(tmp_path, "Late", "__import__('time').sleep(0.05 * (time > 0.1)); return time < 0.1")
     python_fmu(tmp_path, "Early", "return time < 0.1")
     for first, second in (("Late", "Early"), ("Early", "Late")):
-        both = FMU.format("one", first, isolate) + FMU.format("two", second, isolate)
+        both = fmu_table("one", first, isolate) + fmu_table("two", second, isolate)
         experiment, found = run(tmp_path, both)
         said = "one: fmi2DoStep returned discard at t = 0.109375 s"
         assert str(experiment.outcome.fault) == said
         assert found.haptics["time"][-1] == 0.109375
 
 
-@pytest.mark.parametrize("isolate", ["false", "true"])
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_outputs_that_cannot_be_read_are_a_fault_when_they_are_due(tmp_path, isolate):
     c_fmu(tmp_path)
     python_fmu(tmp_path, "Goes")
-    slow = FMU.format("one", "faults", isolate) + "start.mode = 8\nrate = 8\n"
-    experiment, found = run(tmp_path, slow + FMU.format("two", "Goes", isolate))
+    slow = fmu_table("one", "faults", f"{isolate}start.mode = 8\nrate = 8\n")
+    experiment, found = run(tmp_path, slow + fmu_table("two", "Goes", isolate))
     said = "one: fmi2GetReal returned error at t = 0.375 s"
     assert str(experiment.outcome.fault) == said
     assert found.tables["8hz"]["one.y"].tolist() == [0, 1, 2]
@@ -58,8 +65,7 @@ def test_one_that_dies_leaves_the_others_a_clean_end(tmp_path):
     ended = tmp_path / "ended"
     said = f"__import__('atexit').register(open, {str(ended)!r}, 'w') if self.steps == 1 else None"
     python_fmu(tmp_path, "Other", f"{said}; __import__('time').sleep(0.05)")
-    text = FMU.format("one", "faults", "true") + "start.mode = 5\n"
-    experiment, _ = run(tmp_path, text + FMU.format("two", "Other", "true"))
-    message = "one: its process ended by SIGABRT at t = 0.046875 s"
-    assert str(experiment.outcome.fault) == message
+    text = fmu_table("one", "faults", ISOLATED + "start.mode = 5\n")
+    said = fault(tmp_path, text + fmu_table("two", "Other", ISOLATED))
+    assert said == "one: its process ended by SIGABRT at t = 0.046875 s"
     assert ended.exists()  # by a process that was not killed

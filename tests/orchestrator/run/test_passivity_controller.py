@@ -49,11 +49,8 @@ def test_a_wall_beyond_its_limit_generates_at_most_the_handles_kinetic_energy(ha
     draw = np.random.default_rng(seed)
     K = 5200.0 * 10 ** draw.uniform(0.05, 1.2)
     assert wall_limits.stable(MASS, 5.0, T) < K
-    options: dict[str, Any] = {
-        "fmu.wall.settings.stiffness": K,
-        "linkage.joint.rail.damping": damping,
-        "linkage.start.rail": -draw.uniform(0.001, 0.02),
-    }
+    options = {"fmu.wall.settings.stiffness": K, "linkage.joint.rail.damping": damping}
+    options["linkage.start.rail"] = -draw.uniform(0.001, 0.02)
     wrench = [draw.uniform(0.5, 8.0), 0.0, 0.0]
     options |= {"hand": ARM} if hand == "arm" else {"hand.wrench": wrench}
     run, work = pressed(options)
@@ -151,50 +148,43 @@ def test_a_free_handle_forgets_what_was_absorbed_and_keeps_a_deficit():
     assert left == 1.0
 
 
-@pytest.mark.parametrize(("key", "value"), [("limit", 2.0), ("limit", 0.0), ("noise", 0.0)])
-def test_what_cannot_be_damped_is_refused(key, value):
-    with pytest.raises(hl.InputFault, match=f"passivity.*{key}"):
-        hl.scene("closed-loop", {f"controller.passivity.{key}": value})
-
-
 def warned(scene: str, options: dict[str, Any], why: str) -> list[str]:
     """The warnings of a short run that contain `why`."""
     run = run_once(scene, {"duration": 0.1} | options)
     return [line for line in run.run["warnings"] if line.startswith("warning") and why in line]
 
 
-@pytest.mark.parametrize("end", ["wall.F", "wall.x"])
-@pytest.mark.parametrize("link", [T, {"loss": 0.2}])
-def test_a_run_warns_where_force_or_pose_of_a_guarded_wall_is_late(end, link):
-    options = {"fmu.wall.settings.passivity": MASS}
-    assert not warned("virtual-wall", options, "passivity controller")
-    (line,) = warned("virtual-wall", options | {f"delays.'{end}'": link}, "passivity controller")
-    assert end in line
-    assert not warned("virtual-wall", {f"delays.'{end}'": link}, "passivity controller")
+LATE = "passivity controller"
 
 
 @pytest.mark.parametrize(
-    ("late", "connection"),
+    ("scene", "guarded", "late", "connection"),
     [
-        ({"coupling": "jacobi"}, "controller.F_motor -> haptic_device.F_motor"),
-        ({"delays.controller.x_D": 0.002}, "haptic_device.x -> controller.x_D"),
+        ("closed-loop", "controller.passivity", {"coupling": "jacobi"},
+         "controller.F_motor -> haptic_device.F_motor"),
+        ("closed-loop", "controller.passivity", {"delays.controller.x_D": 0.002},
+         "haptic_device.x -> controller.x_D"),
+        *(("virtual-wall", "fmu.wall.settings.passivity", {f"delays.'{end}'": link}, end)
+          for end in ("wall.F", "wall.x") for link in (T, {"loss": 0.2})),
     ],
-)
-def test_so_it_does_of_a_guarded_controller(late, connection):
-    guarded = {"controller.passivity": True}
-    assert not warned("closed-loop", guarded, "passivity controller")
-    (line,) = warned("closed-loop", guarded | late, "passivity controller")
+)  # fmt: skip
+def test_a_run_warns_where_force_or_pose_of_what_is_guarded_is_late(
+    scene, guarded, late, connection
+):
+    on = {guarded: True if scene == "closed-loop" else MASS}
+    assert not warned(scene, on, LATE)
+    (line,) = warned(scene, on | late, LATE)
     assert connection in line
+    assert not warned(scene, late, LATE)
 
 
 def test_of_a_further_users_controller_it_warns_by_its_own_settings():
-    late, why = {"coupling": "jacobi"}, "passivity controller"
+    late, both = {"coupling": "jacobi"}, {"coupling": "jacobi", "controller.passivity": True}
     left = "warning: controller_left.F_motor -> haptic_device_left.F_motor"
-    (line,) = warned("two-users", late | {"controllers.left.passivity": True}, why)
+    (line,) = warned("two-users", late | {"controllers.left.passivity": True}, LATE)
     assert line.startswith(left)
-    both = late | {"controller.passivity": True}
-    assert len(warned("two-users", both, why)) == 2
-    (line,) = warned("two-users", both | {"controllers.left.passivity": False}, why)
+    assert len(warned("two-users", both, LATE)) == 2
+    (line,) = warned("two-users", both | {"controllers.left.passivity": False}, LATE)
     assert not line.startswith(left)
 
 

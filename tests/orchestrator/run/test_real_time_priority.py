@@ -46,21 +46,22 @@ def test_a_higher_priority_stays(monkeypatch):
     assert set_to == []
 
 
-def test_a_core_that_cannot_be_had_is_a_reason_and_no_error(monkeypatch, tmp_path):
-    (tmp_path / "isolated").write_text("1000\n")
+@pytest.fixture
+def isolated(monkeypatch, tmp_path):
+    """Says which cores are isolated."""
     monkeypatch.setattr(real_time_priority, "_ISOLATED", tmp_path / "isolated")
-    before = os.sched_getaffinity(0)
-    with real_time_priority.raised() as got:
-        assert os.sched_getaffinity(0) == before
-    assert got["core"].startswith("shared: 1000 is isolated, and cannot be had")
+    return (tmp_path / "isolated").write_text
 
 
-def test_the_first_isolated_core_is_taken(monkeypatch, tmp_path):
+def test_the_first_isolated_core_is_taken_if_it_can_be_had(isolated):
     before = os.sched_getaffinity(0)
     core = min(before)
-    (tmp_path / "isolated").write_text(f"{core}-7\n")
-    monkeypatch.setattr(real_time_priority, "_ISOLATED", tmp_path / "isolated")
-    with real_time_priority.raised() as got:
-        assert os.sched_getaffinity(0) == {core}
-    assert got["core"] == f"{core}, isolated"
-    assert os.sched_getaffinity(0) == before
+    for cores, own, told in (
+        ("1000", before, "shared: 1000 is isolated, and cannot be had"),
+        (f"{core}-7", {core}, f"{core}, isolated"),
+    ):
+        isolated(f"{cores}\n")
+        with real_time_priority.raised() as got:
+            assert os.sched_getaffinity(0) == own
+        assert got["core"].startswith(told)
+        assert os.sched_getaffinity(0) == before

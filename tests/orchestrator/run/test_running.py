@@ -62,9 +62,8 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path):
     _, found = run(tmp_path, 'faults.nan = "hold"\n' + fmu_table("one", "Lost"))
     held = found.run["held_outputs"]["one"]
     assert held > 0
-    assert list(summary.lines(found)) == [
-        f'one: {held} outputs were not finite and held (faults.nan = "hold")'
-    ]
+    told = f'one: {held} outputs were not finite and held (faults.nan = "hold")'
+    assert list(summary.lines(found)) == [told]
     changed = found.run | {
         "links": {"a.y -> b.u": {"sent": 9, "lost": 2, "overtaken": 1}},
         "iterations": {"unconverged": 2, "steps": 5},
@@ -98,12 +97,8 @@ def test_a_signal_of_another_rate_is_told_where_it_is():
 
 
 def test_a_reader_that_has_enough_is_no_fault():
-    with subprocess.Popen(
-        [*COMMAND, "run", "closed-loop", "--explain"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    ) as told:  # fmt: skip
-        assert told.stdout is not None
-        assert told.stderr is not None
+    command, pipe = [*COMMAND, "run", "closed-loop", "--explain"], subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe) as told:
         assert told.stdout.readline().startswith(b"Time is counted in ticks")
         told.stdout.close()
         assert told.stderr.read() == b""

@@ -10,48 +10,39 @@ import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.faults import SceneFault
+from tests.orchestrator.foreign_fmus import fmu_table, wire_table
 
 RATE = 7.3
 """Of the angle, rad/s; the other coordinate is sin(3 t)."""
-SCENE = """title = "A slow motion, seen by a fast controller"
-duration = 2.0
-haptics.rate = 512
-holds = { "slow.x" = "foh", "slow.v" = "slope" }
-[[fmu]]
-name = "slow"
-path = "slow.fmu"
-rate = 32
-[[fmu]]
-name = "fast"
-path = "fast.fmu"
-[[connection]]
-from = "slow.x"
-to = "fast.x"
-[[connection]]
-from = "slow.v"
-to = "fast.v"
-"""
+SCENE = (
+    'title = "A slow motion, seen by a fast controller"\nduration = 2.0\nhaptics.rate = 512\n'
+    'holds = { "slow.x" = "foh", "slow.v" = "slope" }\n'
+    + fmu_table("slow", "slow", "rate = 32\n")
+    + fmu_table("fast", "fast")
+    + wire_table("slow.x", "fast.x")
+    + wire_table("slow.v", "fast.v")
+)
+POSE, TWIST = ("m", "rad"), ("m/s", "rad/s")
 
 
 def slow() -> Component:
     """A pose whose angle turns round and is wrapped, and a velocity that is not used."""
-    pose, twist = ("m", "rad"), ("m/s", "rad/s")
-    block = Block(
-        outputs=[
-            Variable("x", (2,), pose, kind="angle"),
-            Variable("v", (2,), twist, derivative_of="x"),
-        ]
-    )
+    outputs = [
+        Variable("x", (2,), POSE, kind="angle"),
+        Variable("v", (2,), TWIST, derivative_of="x"),
+    ]
+    block = Block(outputs=outputs)
     angle, wrong = RATE * block.t, ca.SX([99.0, 99.0])
-    output = {"x": ca.vertcat(ca.sin(3 * block.t), ca.atan2(ca.sin(angle), ca.cos(angle)))}
-    output["v"] = wrong
+    pose = ca.vertcat(ca.sin(3 * block.t), ca.atan2(ca.sin(angle), ca.cos(angle)))
+    output = {"x": pose, "v": wrong}
     return block.component("slow", "moves", "continuous", initial={}, step={}, output=output)
 
 
 def fast() -> Component:
-    inputs = [Variable("x", (2,), ("m", "rad")), Variable("v", (2,), ("m/s", "rad/s"))]
-    outputs = [Variable("pose", (2,), ("m", "rad")), Variable("rate", (2,), ("m/s", "rad/s"))]
-    block = Block(inputs=inputs, outputs=outputs)
+    inputs = [Variable("x", (2,), POSE), Variable("v", (2,), TWIST)]
+    block = Block(
+        inputs=inputs, outputs=[Variable("pose", (2,), POSE), Variable("rate", (2,), TWIST)]
+    )
     output = {"pose": block.u["x"], "rate": block.u["v"]}
     return block.component("fast", "sees it", "sampled", initial={}, step={}, output=output)
 

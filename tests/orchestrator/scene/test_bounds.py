@@ -8,16 +8,10 @@ from contextlib import suppress
 import pytest
 
 from hapticlink.analysis.sweep import grid
-from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.scene import overrides, read_and_check
+from tests.orchestrator.scene.test_refused_scenes import refused
 from tests.orchestrator.scene.test_scene import GOOD, findings
-
-
-def refused(scene: object, *options: str) -> str:
-    with pytest.raises(InputFault) as fault:
-        open_scene.load(str(scene), options)
-    return str(fault.value)
 
 
 @pytest.mark.parametrize(
@@ -37,46 +31,8 @@ def test_what_is_too_deep_is_told_before_it_is_parsed(text):
         read_and_check.read(text)
 
 
-def test_a_key_of_too_many_names_is_no_option():
-    assert "a key of 301 names" in refused("four-bar", "a." * 300 + "a=1")
-    assert len(refused("four-bar", "a=" + "[" * 60_000)) < 1000
-    assert "write it flatter" in refused("four-bar", "linkage.start.x=" + "[" * 31 + "]" * 31)
-
-
-def test_dots_without_an_equals_sign_take_no_time():
-    assert "write key=value" in refused("four-bar", " . " * 40_000)
+def test_dots_around_names_are_no_names():
     assert overrides.parse(' a . "b.c" = 1')[0] == ("a", "b.c")
-
-
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        ("linkage.gravity=[0.0, 1" + "0" * 400 + "]", "a whole number of more than 64 bits"),
-        ("duration=1" + "0" * 5000, "should be a valid number"),
-        ("duration=2020-01-01", "2020-01-01 should be a number"),
-        ("duration=\udcff", r"'\udcff' is no Unicode text"),
-        ("\udcff=1", "is no Unicode text"),
-        ("linkage.body.².mass=1", "no entry '²'"),
-        ("linkage.body." + "9" * 5000 + ".mass=1", "no entry '999"),
-    ],
-)
-def test_values_that_no_scene_can_hold(option, message):
-    said = refused("four-bar", option)
-    assert message in said
-    assert len(said) < 1000
-
-
-@pytest.mark.parametrize(
-    "value",
-    ["1e308", "'1e99999999'", "'1e-99999999'", "'1e+09999'", "nan", "'1/0'", "1e400", "0"],
-)
-@pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
-def test_rates_and_times_out_of_any_range(key, value):
-    assert f"--set {key}={value}: {key}: " in refused("closed-loop", f"{key}={value}")
-
-
-def test_a_rate_whose_period_outlasts_the_run():
-    assert "less than a haptic period" in refused("closed-loop", "haptics.rate=5e-324")
 
 
 def test_names_that_no_file_can_have():
@@ -205,20 +161,3 @@ def test_bodies_that_hold_one_another_are_told_once():
     text = _chain(5).replace("parent = 'b0'", "parent = 'b4'")
     found = findings(text)
     assert [k for k, (_, m) in found.items() if "circle" in m] == ["linkage.body[1] (b1)"]
-
-
-def test_a_spring_on_a_body_that_is_not_there():
-    spring = "[[linkage.spring]]\nbodies = ['bra', 'ground']\nat = [[0.0, 0.0], [0.0, 0.0]]\n"
-    found = findings(GOOD + spring)
-    message = "no body 'bra'; did you mean 'bar'?"
-    assert found["linkage.spring[0].bodies[0]"] == (29, message)
-
-
-@pytest.mark.parametrize(
-    "corners",
-    ["[[0, 0], [1, 0], [1, 0], [0, 1]]", "[[0, 0]]", "[]", "[[0, 0], [0, 0], [0, 0]]"],
-)
-def test_polygons_that_are_none(corners):
-    for key in ("contacts.polygon.0.corners", "contacts.enclosure"):
-        scene = "obstacles" if "polygon" in key else "enclosure"
-        assert "contacts" in refused(scene, f"{key}={corners}")

@@ -59,57 +59,6 @@ def test_names_that_are_no_key_of_toml_go_by_their_dots():
     assert overrides.parse(slow) == (("a" * 60 + " b",), 3)
 
 
-def test_connections_that_are_not_there(tmp_path):
-    for option in ('holds."controller.P_d"=lead', "delays.controller.P_d=0.1"):
-        with pytest.raises(SceneFault) as refused:
-            simulate(str(_file(tmp_path, CLOSED)), tmp_path / "out", [option])
-        assert "is no connection of this scene; did you mean 'controller.P_c'?" in str(
-            refused.value
-        )
-    with pytest.raises(SceneFault, match=r"there are hand\.F -> haptic_device\.F_hand, "):
-        simulate(str(_file(tmp_path, CLOSED)), tmp_path / "out", ["holds.zzz=lead"])
-
-
-# --- messages of shapes -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        ("hand.mass=0.5", "hand.mass: 0.5 should be three numbers (kg, kg, kg.m2)"),
-        ("hand.mass=[1,2,3,4]", "[1, 2, 3, 4] should be three numbers (kg, kg, kg.m2)"),
-        ("hand.target=1", "hand.target: 1 should be a list of rows of four numbers"),
-        ("hand.type=sprin", "hand.type: no type 'sprin'; did you mean 'spring'?"),
-        ("hand.type=x", "hand.type: no type 'x'; there are constant, profile, arm, spring"),
-        ("hand.type=spring", "hand.mass: `mass` belongs to type 'arm', not 'spring'"),
-        ("hand.wrench=[1,2,3]", "hand.wrench: `wrench` belongs to type 'constant', not 'arm'"),
-        ("haptic.rate=1", "haptic: unknown key; did you mean 'haptics'?"),
-        ("haptics.rate=nan", "haptics.rate: nan is out of range: give a finite number > 0 and"),
-        ("duration=inf", "duration: inf is out of range: give a finite number > 0 and"),
-        (
-            "controller.teleoperation.stiffness=100",
-            "controller.teleoperation.stiffness: 100 should be three numbers (N/m, N/m, N.m/rad)",
-        ),
-        ("get_after_set=m", "get_after_set: 'm' should be a list of texts"),
-        (
-            "delays.a.b={ min = 0.1, max = 0.2, los = 0.05, seed = 3 }",
-            "delays.a.b.los: unknown key; did you mean 'loss'?",
-        ),
-        ('delays."a.b"={ los = 0.05 }', "delays.a.b.los: unknown key; did you mean 'loss'?"),
-        (
-            "linkage.joint.pivot.drive={type='pd',effort=1,table=[[0,0]],stiffness=1,damping=1}",
-            "drive.effort: `effort` belongs to type 'constant', not 'pd'",
-        ),
-    ],
-)  # fmt: skip
-def test_a_shape_is_told_in_words_of_the_scene(option, message):
-    arm = GOOD[: GOOD.index("wrench")] + 'type = "arm"\nmass = [1.0, 1.0, 0.002]\n'
-    found = told(arm + "target = [[0.0, 0.0, 0.0, 0.0]]\n", option)
-    assert message in found
-    others = found.count("\n") - 1
-    assert others == (option == "hand.type=spring")  # and its stiffness, which is missing
-
-
 def test_nan_as_a_start_value(tmp_path):
     text = '[[fmu]]\nname = "p"\npath = "p.fmu"\nstart.mass = nan\n'
     assert "line 4: fmu[0] (p).start.mass: nan is out of range: give a finite number" in told(text)
@@ -227,11 +176,6 @@ def test_a_hold_that_a_connection_asks_for_is_told_there(tmp_path):
         assert "docs/passivity.md" in said
 
 
-def test_a_default_hold_that_fits_nowhere_is_told_once_with_a_scene_where_it_does(tmp_path):
-    with pytest.raises(SceneFault, match=r": 1 fault\n.*closed-loop-direct"):
-        simulate("closed-loop", tmp_path, ["hold=pspm"])
-
-
 # --- what would do nothing --------------------------------------------------------------------
 
 
@@ -244,11 +188,6 @@ def test_an_ssp_whose_structure_is_to_change(tmp_path):
     assert open_scene.load(path, ["haptics.rate=64", "duration=0.5"]).duration == 0.5
     assert names.is_fixed(("graphics", "sync"))
     assert not names.is_fixed(("graphics", "rate"))
-
-
-def test_iterated_where_no_plants_of_a_rate_are_connected(tmp_path):
-    with pytest.raises(SceneFault, match=r"'iterated' repeats the steps of connected plants"):
-        simulate("pendulum", tmp_path, ["coupling=iterated"])
 
 
 def test_native_where_no_block_is_ours():

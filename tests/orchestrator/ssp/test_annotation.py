@@ -1,7 +1,6 @@
 """The annotation of an SSP has the shape that is written here, and names no files."""
 
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
@@ -12,7 +11,7 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.orchestrator.foreign_fmus import edited, edited_entries, python_fmu
 from tests.orchestrator.ssp.test_ssp import FOREIGN, foreign
 
 RUN = {"duration": 0.2, "haptics": {"rate": 50}}
@@ -75,15 +74,9 @@ def test_a_file_outside_is_named_by_the_user_alone(tmp_path):
 @pytest.mark.parametrize("step", ["0", "x", "NaN", "1e999", "-1", "1e-99999999", ""])
 def test_a_step_size_that_is_none_is_asked_for(tmp_path, step):
     path = Path(foreign(tmp_path))
-    with zipfile.ZipFile(path) as archive:
-        names = archive.namelist()
-        entries = {name: archive.read(name) for name in names}
     element = f'<DefaultExperiment stepSize="{step}"/><ModelVariables>'
     fmu = edited(tmp_path / "Takes.fmu", lambda t: t.replace("<ModelVariables>", element))
-    entries["resources/Takes.fmu"] = fmu.read_bytes()
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in entries.items():
-            archive.writestr(name, content)
+    edited_entries(path, lambda entries: entries | {"resources/Takes.fmu": fmu.read_bytes()})
     with pytest.raises(InputFault, match=r"--set haptics\.rate=|haptics\.rate: .* should be"):
         open_scene.load(str(path), ["duration=0.1"])
     assert open_scene.load(str(path), ["duration=0.1", "haptics.rate=50"])

@@ -15,9 +15,11 @@ from tests.orchestrator.fmi.test_archives import SSD
 from tests.orchestrator.foreign_fmus import (
     PAIR,
     c_fmu3,
+    fmu_table,
     python_fmu,
-    python_fmu_of,
     scene,
+    slave,
+    wire_table,
     with_units,
 )
 from tests.shared_fixtures import sets, status
@@ -171,32 +173,14 @@ def test_with_the_cache_off_no_folder_stays(tmp_path):
     assert not list((tmp_path / "temporary").glob("hapticlink*"))
 
 
-FIXED = """
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
-
-class Takes(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.count, self.on, self.y = 0, False, 0.0
-        for variable in (Integer("count", causality=Fmi2Causality.parameter,
-                                 variability=Fmi2Variability.fixed),
-                         Boolean("on", causality=Fmi2Causality.parameter,
-                                 variability=Fmi2Variability.fixed),
-                         Real("y", causality=Fmi2Causality.output)):
-            self.register_variable(variable)
-
-    def do_step(self, time, size):
-        self.y = self.count + 100.0 * self.on
-        return True
-"""
-
-
 def test_whole_and_boolean_parameters_start_as_in_the_scene(tmp_path):
     """Rounded, and true from 0.5 on: -1.8 is -2, and 0.3 is false."""
     python_fmu(tmp_path, "Gives", "pass")
-    python_fmu_of(tmp_path, FIXED, tmp_path.name)
+    variables = ("parameter", {"count": 0, "on": False}), ("output", {"y": 0.0})
+    body = "values['y'] = values['count'] + 100.0 * values['on']"
+    slave(tmp_path, "Takes", *variables, body=body)
     text = PAIR.replace("takes.u", "takes.count") + "offset = -1.8\n"
-    text += '[[connection]]\nfrom = "gives.y"\nto = "takes.on"\noffset = 0.3\n'
+    text += wire_table("gives.y", "takes.on", "offset = 0.3\n")
     source = str(scene(tmp_path, text))
     path = export(source, tmp_path)
     for each in (source, str(path)):
@@ -204,12 +188,8 @@ def test_whole_and_boolean_parameters_start_as_in_the_scene(tmp_path):
         assert made.results.haptics["takes.y"][-1] == -2.0
 
 
-SIZES = """
-[[fmu]]
-name = "a"
-path = "types.fmu"
-start = { size = 3, array = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], blob = "00ff" }
-"""
+STARTS = 'start = { size = 3, array = [[1, 2, 3], [4, 5, 6], [7, 8, 9]], blob = "00ff" }\n'
+SIZES = fmu_table("a", "types", STARTS)
 
 
 def test_sizes_of_arrays_and_binary_starts_come_back(tmp_path):

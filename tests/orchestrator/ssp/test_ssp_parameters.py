@@ -48,9 +48,8 @@ def starts(
 
 
 def test_bindings_of_a_system_reach_its_parts_and_go_before_theirs(tmp_path):
-    found = starts(
-        tmp_path, box=bindings(binding(values(("p.u", "4"))), binding(values(("p.u", "5"))))
-    )
+    twice = bindings(binding(values(("p.u", "4"))), binding(values(("p.u", "5"))))
+    found = starts(tmp_path, box=twice)
     assert found["box_p"] == {"gain": 7.0, "u": 5.0}
     found = starts(
         tmp_path,

@@ -2,7 +2,6 @@
 SSP; nothing is inferred from a port's name."""
 
 import re
-import uuid
 import zipfile
 from pathlib import Path
 
@@ -10,14 +9,16 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.components.blocks import BLOCKS as BUILDERS
 from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.foreign_fmus import (
     fmu_table,
     python_fmu,
-    python_fmu_of,
+    ran,
     run,
     scene,
+    slave,
     wire_table,
     with_units,
 )
@@ -26,58 +27,29 @@ from tests.shared_fixtures import sets, status
 
 # --- FMUs of others -----------------------------------------------------------------------
 
-FOREIGN = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class {name}(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.u, self.y = [0.0] * 4, [0.955, -0.296, 0.296, 0.955]
-        for i, entry in enumerate(("1,1", "1,2", "2,1", "2,2")):
-            self.add("u[%s]" % entry, Fmi2Causality.input, self.u, i)
-            self.add("{matrix}[%s]" % entry, Fmi2Causality.output, self.y, i)
-        for name in ("x", "v", "F_hand"):
-            kind = Fmi2Causality.input if name == "F_hand" else Fmi2Causality.output
-            self.add(name, kind, [0.0], 0)
-
-    def add(self, name, causality, values, i):
-        self.register_variable(Real(name, causality=causality, getter=lambda: values[i],
-                                    setter=lambda v: values.__setitem__(i, v)))
-
-    def do_step(self, time, size):
-        if "{matrix}" == "seen":
-            self.y[:] = self.u
-        return True
-"""
+ENTRIES = ("1,1", "1,2", "2,1", "2,2")
 ROTATION = np.array([0.955, -0.296, 0.296, 0.955])
 
 
 def rotating(folder: Path, matrix: str) -> str:
     """A rotation matrix on a port `matrix` at 16 Hz, held at first order by a fast FMU."""
+    inputs = {f"u[{e}]": 0.0 for e in ENTRIES} | {"F_hand": 0.0}
     for name, port in (("Slow", matrix), ("Fast", "seen")):
-        python_fmu_of(folder, FOREIGN.format(name=name, matrix=port), uuid.uuid4().hex)
-    return f"""
-hold = "foh"
-[[fmu]]
-name = "slow"
-path = "Slow.fmu"
-rate = 16
-[[fmu]]
-name = "fast"
-path = "Fast.fmu"
-[[connection]]
-from = "slow.{matrix}"
-to = "fast.u"
-"""
+        entries = {f"{port}[{e}]": x for e, x in zip(ENTRIES, ROTATION.tolist(), strict=True)}
+        body = f"values.update({{f'seen[{{e}}]': values[f'u[{{e}}]'] for e in {ENTRIES}}})"
+        outputs = entries | {"x": 0.0, "v": 0.0}
+        body = body if port == "seen" else ""
+        slave(folder, name, ("input", inputs), ("output", outputs), body=body)
+    slow, fast = fmu_table("slow", "Slow", "rate = 16\n"), fmu_table("fast", "Fast")
+    return f'hold = "foh"\n{slow}{fast}{wire_table(f"slow.{matrix}", "fast.u")}'
 
 
 @pytest.mark.parametrize("matrix", ["M", "P_c", "Lambda_inv", "D", "contacts"])
 def test_a_foreign_matrix_passes_unchanged_whatever_its_name(tmp_path, matrix):
-    experiment, found = run(tmp_path, rotating(tmp_path, matrix))
+    found = ran(tmp_path, rotating(tmp_path, matrix))
     assert found.run["holds"] == {f"slow.{matrix} -> fast.u": "foh"}
     assert found.run["held_as"] == {}
-    assert experiment.outcome.fault is None
-    seen = np.stack([found.haptics[f"fast.seen[{e}]"] for e in ("1,1", "1,2", "2,1", "2,2")], 1)
+    seen = np.stack([found.haptics[f"fast.seen[{e}]"] for e in ENTRIES], 1)
     np.testing.assert_array_equal(seen[1:], np.broadcast_to(ROTATION, seen[1:].shape))
 
 
@@ -96,25 +68,11 @@ def test_a_scene_says_what_a_foreign_matrix_is(tmp_path):
     ],
 )
 def test_nothing_is_guessed_from_the_name_of_a_foreign_port(tmp_path, more, why):
-    wire = '[[connection]]\nfrom = "slow.x"\nto = "fast.F_hand"\n'
-    text = rotating(tmp_path, "M") + wire + more
+    text = rotating(tmp_path, "M") + wire_table("slow.x", "fast.F_hand") + more
     with pytest.raises(SceneFault, match=why):
         system_of(scene(tmp_path, text))
 
 
-NAMESAKE = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class {name}(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        for name, value in {outputs}.items():
-            self.register_variable(Real(name, causality=Fmi2Causality.output,
-                                        getter=lambda value=value: value))
-
-    def do_step(self, time, size):
-        return True
-"""
 POSES = {f"{name}[{i}]": -1.0 for name in ("x", "x_true", "F", "F_drift") for i in (1, 2, 3)}
 SCALARS = {"x": 1.0, "F": 1.0, "F_env": 1.0, "q": 1.0, "n_constraints": 1e5, "branch_ok": 0.0,
            "x_true": 1.0, "workspace_margin": -1.0, "closure_error": 1.0}  # fmt: skip
@@ -124,11 +82,8 @@ SCALARS = {"x": 1.0, "F": 1.0, "F_env": 1.0, "q": 1.0, "n_constraints": 1e5, "br
 @pytest.mark.parametrize("more", ["", 'stop_when = "haptic_device.workspace_margin < 0"\n'])
 def test_an_fmu_is_no_block_for_its_name(tmp_path, outputs, more):
     """Neither what its outputs are, nor that it has diverged or left a workspace."""
-    python_fmu_of(tmp_path, NAMESAKE.format(name="Any", outputs=outputs), uuid.uuid4().hex)
-    names = (
-        "virtual_mechanism", "haptic_device", "virtual_environment", "hand", "controller", "other"
-    )  # fmt: skip
-    fmus = "".join(f'[[fmu]]\nname = "{name}"\npath = "Any.fmu"\n' for name in names)
+    slave(tmp_path, "Any", ("output", outputs))
+    fmus = "".join(fmu_table(name, "Any") for name in (*BUILDERS, "other"))
     made = hl.run(scene(tmp_path, more + fmus), out=tmp_path / "out")
     assert made.fault is None
     assert made.figures() == {}
@@ -142,12 +97,9 @@ def test_what_an_fmu_puts_in_counts_whatever_its_name(tmp_path, name):
     does."""
     for fmu, body in (("Gives", "self.y = 3.0 + time"), ("Takes", "self.y = 4.0 * time")):
         with_units(python_fmu(tmp_path, fmu, body), y="N" if fmu == "Gives" else "m", u="N")
-    wire = f'[[connection]]\nfrom = "{name}.y"\nto = "takes.u"\n'
-    power = '[[power]]\neffort = "takes.u"\ndisplacement = "takes.y"\n'
-    fmus = f'[[fmu]]\nname = "{name}"\npath = "Gives.fmu"\nrate = 16\n'
-    fmus += '[[fmu]]\nname = "takes"\npath = "Takes.fmu"\n'
-    wire += "hold = 'foh'\n"
-    _, found = run(tmp_path, fmus + wire + power)
+    text = fmu_table(name, "Gives", "rate = 16\n") + fmu_table("takes", "Takes")
+    text += wire_table(f"{name}.y", "takes.u", "hold = 'foh'\n")
+    found = ran(tmp_path, text + '[[power]]\neffort = "takes.u"\ndisplacement = "takes.y"\n')
     (energy,) = found.run["energies"].values()
     assert 1e-6 < energy["generated"] < energy["ideal"]
     assert found.run["unstable"] == ""
@@ -208,10 +160,10 @@ def twice(folder: Path, start: str = "") -> Path:
     for side in ("left", "right"):
         for name, block in BLOCKS.items():
             rate = "rate = 30\n" if name == "mechanism" else ""
-            text += f'[[fmu]]\nname = "{side}_{name}"\npath = "{block}.fmu"\n{rate}'
+            text += fmu_table(f"{side}_{name}", block, rate)
             text += start if (side, name) == ("right", "control") else ""
         for source, target in WIRES:
-            text += f'[[connection]]\nfrom = "{side}_{source}"\nto = "{side}_{target}"\n'
+            text += wire_table(f"{side}_{source}", f"{side}_{target}")
     return scene(folder, text, rate=512)
 
 
@@ -262,8 +214,8 @@ def test_the_derivative_is_the_blocks_own_too(tmp_path):
 def test_a_spring_of_gains_that_do_not_do_is_refused(tmp_path, more, why):
     path = twice(tmp_path, more)
     if not more:  # gains that come over a connection are not known before the run
-        wire = '[[connection]]\nfrom = "left_mechanism.x"\nto = "right_control.K_pc"\n'
-        path.write_text(path.read_text() + wire + "convert = false\n")
+        wire = wire_table("left_mechanism.x", "right_control.K_pc", "convert = false\n")
+        path.write_text(path.read_text() + wire)
     with pytest.raises(SceneFault, match=why):
         system_of(path, *HOLDS)
 
@@ -297,14 +249,3 @@ def test_none_is_a_kind_too(tmp_path):
     made = system_of("closed-loop", "hold=foh", option)
     kinds = {c.source_port: c.kind for c in made.connections if c.source == "virtual_environment"}
     assert kinds == {"Lambda_inv": None, "P_c": "projector"}
-
-
-@pytest.mark.parametrize(
-    ("kind", "why"),
-    [("projector", "x has 3 entries, and a projector matrix is square"),
-     ("rotation", "'projector', 'semidefinite', 'angle', 'table' or 'none'")],
-)  # fmt: skip
-def test_a_kind_that_cannot_be_is_refused_at_its_key(tmp_path, kind, why):
-    with pytest.raises(SceneFault, match=why) as refused:
-        system_of("closed-loop", f'kinds."virtual_mechanism.x"="{kind}"')
-    assert "--set" in str(refused.value)

@@ -1,7 +1,5 @@
 """Further users: their blocks and connections, and what a scene may ask of them."""
 
-import pytest
-
 import hapticlink as hl
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -43,17 +41,3 @@ def test_encoders_are_those_of_every_device(tmp_path):
         observed = f"haptic_device{of}.F_hand_observed -> virtual_mechanism.{at}F_hand"
         assert observed in booked
         assert f"controller{of}.F_drift -> virtual_mechanism.{at}F_drift" in booked
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"devices.right": {}}, "no point 'right'; there are left"),
-        ({"controllers.left": {}, "devices": {}}, "add [devices.left]"),
-        ({"devices.left.base_y_a": 1.0}, "is not below base_y_b"),
-    ],
-)
-def test_a_scene_that_does_not_fit(options, said):
-    with pytest.raises(hl.InputFault) as caught:
-        hl.scene("two-users", options)
-    assert said in str(caught.value)

@@ -21,7 +21,7 @@ from hapticlink.orchestrator.system.assign_holds import Rules, assign
 from hapticlink.orchestrator.system.latency import Link
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.plan.test_plan import timelines
-from tests.orchestrator.timelines import CAUSAL
+from tests.orchestrator.timelines import CAUSAL, fixed
 
 Make = Callable[[Timeline, str], System]
 LATE = "graphics.stamp -> controller.g"
@@ -59,13 +59,9 @@ def test_no_input_is_stamped_later_than_its_step_less_the_latency(
 
 @pytest.mark.parametrize("coupling", CAUSAL)
 def test_what_the_plan_says_is_what_the_fmus_see(stamped, tmp_path, coupling):
-    from tests.orchestrator.timelines import fixed
-
     timeline = fixed(Fraction(512), Fraction(60), 256)
-    delays = {
-        LATE: Latency(min=0.01, max=0.05, loss=0.3, seed=4),
-        "device.stamp": Latency(min=0.003),
-    }
+    drawn = Latency(min=0.01, max=0.05, loss=0.3, seed=4)
+    delays = {LATE: drawn, "device.stamp": Latency(min=0.003)}
     system = late(stamped(timeline, coupling), delays)
     outcome = run(Plan(system), RunFolder(tmp_path))
     table = read_table(tmp_path / "haptics.csv")
@@ -83,8 +79,6 @@ def test_what_the_plan_says_is_what_the_fmus_see(stamped, tmp_path, coupling):
 def test_extrapolated_stamps_are_the_time_itself(stamped, tmp_path, rate):
     """A stamp is a straight line: from exact ticks, first order gives it back at any rate, and
     with any latency."""
-    from tests.orchestrator.timelines import fixed
-
     timeline = fixed(Fraction(512), Fraction(rate), 256)
     for delays in ({}, {LATE: Latency(min=0.001, max=0.04, loss=0.2, seed=1)}):
         run(Plan(late(stamped(timeline, "gauss-seidel"), delays, "foh")), RunFolder(tmp_path))
@@ -109,25 +103,19 @@ def test_loss_takes_its_share_and_a_seed_repeats():
 
 
 def test_a_scene_with_delays(tmp_path):
+    """A late derivative goes with its sample."""
     options = [
         "duration=0.2",
         "delays.haptic_device.x=0.004",
         "delays.controller.F_motor={min=0.001, max=0.003, loss=0.1, seed=7}",
+        "holds.virtual_mechanism.x=foh-derivative",
+        "delays.virtual_mechanism.x={min=0.001, max=0.02, loss=0.3, seed=7}",
     ]
-    run = simulate("closed-loop", tmp_path, options).results.run
+    run = simulate("closed-loop-direct", tmp_path, options).results.run
     assert run["latencies"]["haptic_device.x -> controller.x_D"]["min"] == 0.004
     assert run["delays"]["haptic_device.x -> controller.x_D"]["max"] == 3 / 512
     assert run["seeds"]["controller.F_motor -> haptic_device.F_motor"] == 7
     assert run["links"]["controller.F_motor -> haptic_device.F_motor"]["sent"] == 103
-
-
-def test_a_late_derivative_goes_with_its_sample_and_is_counted(tmp_path):
     name = "virtual_mechanism.x -> controller.x_S"
-    options = [
-        "duration=0.2",
-        "holds.virtual_mechanism.x=foh-derivative",
-        "delays.virtual_mechanism.x={min=0.001, max=0.02, loss=0.3, seed=7}",
-    ]
-    found = simulate("closed-loop-direct", tmp_path, options).results.run
-    assert found["holds"][name] == "foh-derivative"
-    assert found["links"][name]["sent"] > found["links"][name]["lost"] > 0
+    assert run["holds"][name] == "foh-derivative"
+    assert run["links"][name]["sent"] > run["links"][name]["lost"] > 0

@@ -5,48 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pythonfmu.builder import FmuBuilder
 
 import hapticlink as hl
 from hapticlink.commands.options import Changes
 from hapticlink.orchestrator.base.faults import SceneFault
+from tests.orchestrator.foreign_fmus import entries, slave
 from tests.shared_fixtures import status
 
 SHORT = {"duration": 0.2, "graphics.rate": 40}
-SPRING = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class Spring(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.values = {{}}
-        for name, causality in ({ports}):
-            for i in range(1, {size} + 1):
-                entry = f"{{name}}[{{i}}]"
-                self.values[entry] = 0.0
-                self.register_variable(Real(
-                    entry, causality=causality,
-                    getter=lambda e=entry: self.get(e),
-                    setter=lambda v, e=entry: self.values.update({{e: v}})))
-
-    def get(self, entry):
-        i = entry[entry.index("["):]
-        return 50.0 * (self.values["x_S" + i] - self.values["x_D" + i])
-
-    def do_step(self, time, size):
-        return True
-"""
-INPUT, OUTPUT = "Fmi2Causality.input", "Fmi2Causality.output"
-PORTS = {"x_S": INPUT, "x_D": INPUT, "own": INPUT, "F_motor": OUTPUT}
 
 
 def spring(folder: Path, size: int = 3, output: str = "F_motor") -> Path:
     """A controller of a spring alone, with an input that the scene does not know."""
-    names = {output if name == "F_motor" else name: given for name, given in PORTS.items()}
-    ports = ", ".join(f'("{name}", {causality})' for name, causality in names.items())
-    script = folder / "spring.py"
-    script.write_text(SPRING.format(ports=ports, size=size))
-    return Path(FmuBuilder.build_FMU(script, dest=folder))
+    inputs = entries("x_S", size) | entries("x_D", size) | entries("own", size)
+    body = f"""for i in range(1, {size} + 1):
+            stretch = values[f"x_S[{{i}}]"] - values[f"x_D[{{i}}]"]
+            values[f"{output}[{{i}}]"] = 50.0 * stretch"""
+    variables = ("input", inputs), ("output", entries(output, size))
+    return slave(folder, "Spring", *variables, body=body)
 
 
 @pytest.fixture(scope="module")
@@ -110,27 +86,9 @@ def test_an_fmu_that_fits_nothing_is_refused(tmp_path, block, capsys):
     assert given[block] in told
 
 
-PULL = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class Pull(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        for name in {names}:
-            value = {{"0": -0.5, "2": -0.0025}}.get(name.strip("()")[-1], 0.0)
-            self.register_variable(Real(
-                name, causality=Fmi2Causality.output, getter=lambda value=value: value))
-
-    def do_step(self, time, size):
-        return True
-"""
-"""The constant hand of closed-loop."""
-
-
 def pull(folder: Path, *names: str) -> Path:
-    script = folder / "pull.py"
-    script.write_text(PULL.format(names=names))
-    return Path(FmuBuilder.build_FMU(script, dest=folder))
+    """The constant hand of closed-loop."""
+    return slave(folder, "Pull", ("output", dict(zip(names, (-0.5, 0.0, -0.0025), strict=True))))
 
 
 @pytest.mark.parametrize(

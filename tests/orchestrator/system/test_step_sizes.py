@@ -6,7 +6,6 @@ import pytest
 import hapticlink as hl
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
@@ -46,9 +45,3 @@ def test_friction_and_stabilization_take_the_step_of_the_run(rate):
     found = run["virtual_mechanism.q"][-1]
     np.testing.assert_array_equal(found, own.state["q"])
     assert (found != other.state["q"]).any()
-
-
-def test_friction_too_fast_for_the_steps_of_a_run_is_refused():
-    stiff = {"linkage.joint.0.friction_speed": 1e-6, "duration": 0.01}
-    with pytest.raises(SceneFault, match=r"`friction_speed` or .* too fast for steps of 0\.00"):
-        hl.run("pendulum", stiff)

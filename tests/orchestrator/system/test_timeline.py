@@ -1,18 +1,17 @@
 """Rates of every FMU: exact ticks, shared clocks, stamps on real FMUs, SSP, faults."""
 
-import json
 import math
 import re
 from collections.abc import Callable
 from fractions import Fraction
-from itertools import pairwise
+from itertools import combinations, pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.faults import SceneFault
 from hapticlink.orchestrator.base.ticks import Timeline, exact
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
@@ -23,7 +22,7 @@ from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks, timeline
-from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
+from tests.orchestrator.foreign_fmus import edited, fmu_table, python_fmu, scene, wire_table
 from tests.orchestrator.timelines import CAUSAL, LOOP, scene_of, scenes
 from tests.shared_fixtures import status
 
@@ -60,21 +59,15 @@ def test_fmus_share_a_clock_where_they_step_together(scene):
         if not isinstance(rate, VariableRate | tuple):
             period, rate = 1 / exact(rate), exact(rate)
         pace[fmu.name] = rate, exact(scene.phases.get(fmu.name, str(period))) if period else None
-    for a in LOOP:
-        for b in LOOP:
-            assert (of[a] == of[b]) == (pace[a] == pace[b])
+    for a, b in combinations(LOOP, 2):
+        assert (of[a] == of[b]) == (pace[a] == pace[b])
     assert all(re.fullmatch(r"[\w.+-]+", clock.name) for clock in time.clocks)
 
 
 @pytest.mark.parametrize("coupling", CAUSAL)
 def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(stamped, tmp_path, coupling):
-    rates = {
-        "device": "haptics",
-        "controller": "haptics",
-        "hand": VariableRate(min=10, max=60, seed=5),
-        "mechanism": "1000/3",
-        "graphics": 30,
-    }
+    rates = dict.fromkeys(("device", "controller"), "haptics") | {"mechanism": "1000/3"}
+    rates |= {"hand": VariableRate(min=10, max=60, seed=5), "graphics": 30}
     shares = {"controller": Fraction(1, 4), "mechanism": Fraction(2, 3), "graphics": Fraction(1, 7)}
     time = timeline(scene_of(Fraction(512), 200, rates, shares))
     system = stamped(time, coupling)
@@ -93,14 +86,18 @@ def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(stamped, tmp_
         np.testing.assert_array_equal(tables[clock.name]["time"], at)
 
 
+def pair(folder: Path, gives: str, takes: str) -> Path:
+    """A scene of two FMUs with these rates: the one puts out its time, which the other takes."""
+    python_fmu(folder, "Gives")
+    python_fmu(folder, "Takes", "self.y = self.u")
+    text = fmu_table("gives", "Gives", f"rate = {gives}\n")
+    text += fmu_table("takes", "Takes", f"rate = {takes}\n")
+    return scene(folder, text + wire_table("gives.y", "takes.u"))
+
+
 def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path):
-    python_fmu(tmp_path, "Gives")
-    python_fmu(tmp_path, "Takes", "self.y = self.u")
     (tmp_path / "stamps.csv").write_text("time\n7.00\n7.10\n7.26\n7.50")
-    gives = '"Gives.fmu"\nrate = { trace = "stamps.csv" }\n'
-    takes = '"Takes.fmu"\nrate = { min = 8, max = 32, seed = 3 }\n'
-    text = PAIR.replace('"Gives.fmu"\n', gives).replace('"Takes.fmu"\n', takes)
-    path = scene(tmp_path, text)
+    path = pair(tmp_path, '{ trace = "stamps.csv" }', "{ min = 8, max = 32, seed = 3 }")
     ended = simulate(str(path), tmp_path / "out")
     assert ended.outcome.fault is None
     found = ended.results
@@ -111,7 +108,7 @@ def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path):
     assert set(np.diff(taken) * 64) <= set(range(2, 9))
     assert found.run["seeds"]["fmu.takes.rate"] == 3
     assert found.run["scene"]["fmu"][0]["rate"] == [0.1, 0.26, 0.5]
-    # Each step of `takes` has had the newest frame of `gives`, which puts out its time.
+    # Each step of `takes` has had the newest frame of `gives`.
     seen = found.tables["8to32hz_seed3"]["takes.y"][1:]
     newest = given[np.searchsorted(given, taken[:-1], side="right") - 1]
     np.testing.assert_array_equal(seen, newest)
@@ -120,18 +117,12 @@ def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path):
 
 
 def test_variable_rates_of_fmus_survive_an_ssp(tmp_path):
-    python_fmu(tmp_path, "Gives")
-    python_fmu(tmp_path, "Takes", "self.y = self.u")
-    gives = '"Gives.fmu"\nrate = { min = 8, max = 32, seed = 3 }\n'
-    takes = '"Takes.fmu"\nrate = [0.125, 0.3, 0.5]\n'
-    text = PAIR.replace('"Gives.fmu"\n', gives).replace('"Takes.fmu"\n', takes)
-    path = scene(tmp_path, text)
-    assert status("export", str(path), "--out", str(tmp_path)) == 0
-    simulate(str(path), tmp_path / "a")
+    path = pair(tmp_path, "{ min = 8, max = 32, seed = 3 }", "[0.125, 0.3, 0.5]")
+    assert status("export", path, "--out", tmp_path) == 0
+    found = simulate(str(path), tmp_path / "a").results
     simulate(str(tmp_path / "scene.ssp"), tmp_path / "b")
-    tables = json.loads((tmp_path / "a" / "run.json").read_text())["rates"]
-    assert set(tables) == {"haptics", "8to32hz_seed3", "times_of_takes"}
-    for table in tables:
+    assert set(found.tables) == {"haptics", "8to32hz_seed3", "times_of_takes"}
+    for table in found.tables:
         a, b = ((tmp_path / run / f"{table}.csv").read_bytes() for run in "ab")
         assert a == b
 
@@ -145,35 +136,16 @@ def test_variable_rates_of_fmus_survive_an_ssp(tmp_path):
         ("'often'", 'should be "haptics" or "graphics", a number .Hz., a fraction'),
         ("'graphics'", "add .graphics."),
         ("{ trace = 'none.csv' }", "cannot be read as a trace"),
+        ("{ min = 60, max = 61 }", "is a whole haptic tick"),
+        ("{ min = 8, max = 32 }", "gives takes steps of one size only"),
+        ("'haptics'\n[phases]\ngives = 0.01", "gives takes steps of one size only"),
     ],
 )
-def test_rates_of_an_fmu_that_make_no_sense_are_told(tmp_path, rate, why):
-    python_fmu(tmp_path, "Gives")
-    text = f'[[fmu]]\nname = "gives"\npath = "Gives.fmu"\nrate = {rate}\n'
-    with pytest.raises(InputFault, match=why):
-        open_scene.load(str(scene(tmp_path, text)))
-
-
-def test_rates_without_a_whole_tick_are_told_where_they_stand(tmp_path):
-    python_fmu(tmp_path, "Gives")
-    text = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\nrate = { min = 60, max = 61 }\n'
-    with pytest.raises(SceneFault, match="is a whole haptic tick") as refused:
-        simulate(str(scene(tmp_path, text)), tmp_path / "out")
-    assert refused.value.findings[0].key == "fmu[0] (gives).rate"
-
-
-@pytest.mark.parametrize(
-    ("line", "where"),
-    [
-        ("phases.gives = 0.01", "phases.gives"),
-        ("rate = { min = 8, max = 32 }", "fmu[0] (gives).rate"),
-    ],
-)
-def test_an_fmu_of_one_step_size_is_refused_where_steps_differ(tmp_path, line, where):
+def test_rates_of_an_fmu_that_make_no_sense_are_told_where_they_stand(tmp_path, rate, why):
     flag = 'canHandleVariableCommunicationStepSize="true"'
     edited(python_fmu(tmp_path, "Gives"), lambda text: text.replace(flag, ""))
-    head = '[[fmu]]\nname = "gives"\npath = "Gives.fmu"\n'
-    text = f"{line}\n{head}" if "phases" in line else head + line
-    with pytest.raises(SceneFault, match="gives takes steps of one size only") as refused:
-        simulate(str(scene(tmp_path, text)), tmp_path / "out")
-    assert refused.value.findings[0].key == where
+    path = scene(tmp_path, fmu_table("gives", "Gives", f"rate = {rate}\n"))
+    with pytest.raises(SceneFault, match=why) as refused:
+        simulate(str(path), tmp_path / "out")
+    where = refused.value.findings[0].key
+    assert where == "phases.gives" if "phases" in rate else where.startswith("fmu[0] (gives).rate")

@@ -1,0 +1,200 @@
+"""What a scene, or an option for it, is refused for, in its own words and at its place: one row
+(options, message) each. Faults of a system, of its FMUs and connections, are in
+system/test_refused_systems.py; several faults of one file, with their lines, in test_scene.py."""
+
+import pytest
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.scene import read_and_check
+from tests.orchestrator.scene.test_scene import GOOD
+
+ARM = GOOD[: GOOD.index("wrench")] + (
+    'type = "arm"\nmass = [1.0, 1.0, 0.002]\ntarget = [[0.0, 0.0, 0.0, 0.0]]\n'
+)
+LIMITS = "linkage.joint.pivot.limits={stiffness=9.0, lower=1.0"
+DRIVE = "linkage.joint.pivot.drive={type='pd',effort=1,table=[[0,0]],stiffness=1,damping=1}"
+FOUR = "[[0,0],[1,0],[0.1,0.1],[0,1]]"
+OUT = "is out of range: give a"
+THREE = "should be three numbers"
+REFUSED = {
+    "the scene of test_scene.py": [
+        ("duration=0.001", "0.001 s is less than a haptic period, 1/(512 Hz)"),
+        ('power=[{effort="a.F", displacement="a.x", sign=0.5}]', "0.5 is no sign: write 1 or -1"),
+        ("directions.hysteresis=10", "10.0 times rank_tolerance = 0.1 is 1"),
+        ("device.base_y_a=0.3", "0.3 m is not below base_y_b = 0.2 m"),
+        ("device.distal_length=0.005", "leaves an arm nothing between its two stops"),
+        ("device.sensing=encoders", "write `sensing` outside of [device]"),
+        ("sensing=encoder", "--set sensing=encoder: sensing: 'encoder' should be 'ideal'"),
+        ("stop_when=hand.F[1] < nan", "write a signal against a number"),
+        ("stop_when='x = 3'", "stop_when: 'x = 3': write a signal"),
+        ("linkage.family=n-four-bar; linkage.n=1001", ">= 1 and <= 1000"),
+        ("linkage.body.0.mass=-1", "--set linkage.body.0.mass=-1: linkage.body[0] (bar).mass"),
+        ("linkage.body.bar.mass=inf", "linkage.body[0] (bar).mass: inf is out of range: give"),
+        ("linkage.body.bar.mass=-1.0", "give a number >= 0 (kg)"),
+        ("linkage.joint.pivot.parent=bar", "linkage.body[0] (bar): its joints run in a circle"),
+        ("linkage.operational_point.body=rod", "no body 'rod'; there are bar"),
+        ("linkage.start.pvot=0.5", "linkage.start.pvot: no joint 'pvot'; did you mean 'pivot'"),
+        ("graphics.rate={ min = 60, max = 10 }", "swap them"),
+        ("graphics.rate=[0.5, 0.2]", "must rise"),
+        ("controller.topology=3", "controller.topology: 3 should be a table or true or false"),
+        ("controller.topology.stif=3", "controller.topology.stif: unknown"),
+        ("duration.x=1", "--set duration.x=1: duration: {'x': 1} should be"),
+        ("novalue", "--set novalue"),
+        ("=3", "--set =3"),
+        ("linkage.body.bax.mass=1", "--set linkage.body.bax.mass=1"),
+        *((f"hand={value}", "hand") for value in ("3", "'x'", "[1.0]")),
+    ],
+    "an arm": [
+        ("hand.mass=0.5", f"hand.mass: 0.5 {THREE} (kg, kg, kg.m2)"),
+        ("hand.mass=[1,2,3,4]", f"[1, 2, 3, 4] {THREE} (kg, kg, kg.m2)"),
+        ("hand.target=1", "hand.target: 1 should be a list of rows of four numbers"),
+        ("hand.type=sprin", "hand.type: no type 'sprin'; did you mean 'spring'?"),
+        ("hand.type=x", "hand.type: no type 'x'; there are constant, profile, arm, spring"),
+        ("hand.type=spring", "hand.mass: `mass` belongs to type 'arm', not 'spring'"),
+        ("hand.wrench=[1,2,3]", "hand.wrench: `wrench` belongs to type 'constant', not 'arm'"),
+        ("haptic.rate=1", "haptic: unknown key; did you mean 'haptics'?"),
+        ("haptics.rate=nan", f"haptics.rate: nan {OUT} finite number > 0 and"),
+        ("duration=inf", f"duration: inf {OUT} finite number > 0 and"),
+        ("controller.teleoperation.stiffness=100",
+         f"controller.teleoperation.stiffness: 100 {THREE} (N/m, N/m, N.m/rad)"),
+        ("get_after_set=m", "get_after_set: 'm' should be a list of texts"),
+        ("delays.a.b={ min = 0.1, max = 0.2, los = 0.05, seed = 3 }",
+         "delays.a.b.los: unknown key; did you mean 'loss'?"),
+        ('delays."a.b"={ los = 0.05 }', "delays.a.b.los: unknown key; did you mean 'loss'?"),
+        (DRIVE, "drive.effort: `effort` belongs to type 'constant', not 'pd'"),
+    ],
+    "closed-loop": [
+        ("device.handle_mass=-1", f"device.handle_mass: -1 {OUT} number > 0 (kg)"),
+        ("device.rotor_inertia=-1e-3", f"device.rotor_inertia: -0.001 {OUT} number >= 0 (kg.m2)"),
+        ("device.encoder_resolution=-1", f"device.encoder_resolution: -1 {OUT} number > 0 (rad)"),
+        ("device.observer.omega_n=-5", f"device.observer.omega_n: -5 {OUT} number > 0 (rad/s)"),
+        ("device.reach_limit=5", f"device.reach_limit: 5 {OUT} number > 0.5 and < 1"),
+        ("directions.rank_tolerance=7", f"directions.rank_tolerance: 7 {OUT} number > 0 and < 1"),
+        ("graphics.stiffness=[-1,-1,-1]", f"graphics.stiffness[2]: -1 {OUT} number >= 0 (N.m/rad)"),
+        ("controller.damping=[-1,-1,-1]", f"controller.damping[0]: -1 {OUT} number >= 0 (N.s/m)"),
+        ("controller.passivity.limit=2.0", "passivity.limit"),
+        ("controller.passivity.limit=0.0", "passivity.limit"),
+        ("controller.passivity.noise=0.0", "passivity.noise"),
+        ("controller.contact=true", "there is nothing to touch: add [contacts]"),
+        ("haptics.rate=5e-324", "less than a haptic period"),
+        ("graphics.phase=0.05", "graphics.phase: 0.05 s: the first step ends within a period"),
+        ("graphics.phase=0", f"graphics.phase: 0 {OUT} number > 0"),
+        ("graphics.phase=0.01; graphics.rate={min=10, max=60}", "needs a fixed rate"),
+        ("graphics.phase='now'", "graphics.phase: 'now' should be a number (s)"),
+        ("graphics.rate={trace='none.csv'}", "cannot be read as a trace"),
+        ("phases.virtual_mechanism=0", f"phases.virtual_mechanism: 0 {OUT} number > 0"),
+        ("phases.controller=0.002", "phases.controller: 0.002 s: the first step ends within a per"),
+        ("phases.virtual_mechansm=0.001",
+         "phases.virtual_mechansm: no FMU 'virtual_mechansm'; did you mean 'virtual_mechanism'?"),
+        ("phases.controller='soon'", "phases.controller: 'soon' should be a number (s)"),
+        ("phases.virtual_environment=0.01; graphics.rate={ min = 10, max = 60 }",
+         "phases.virtual_environment: a phase needs a fixed rate"),
+        ("delays.hand.F=-1.0", "-1.0 is out of range: give a number >= 0 and <= 100000 (s)"),
+        ("delays.hand.F={loss=1.5}", "1.5 is out of range: give a number >= 0 and <= 1"),
+        ("downsampling=zoh", "there are latest, mean"),
+        ("iteration.most=0", "iteration.most"),
+        ("iteration.tolerance=-1.0", "iteration.tolerance"),
+        ("step_control={ tolerance = 1.0 }", "with a higher rate or `substeps`"),
+        ("record.signals=some", '"all", "connected" or "none" or a list'),
+    ],
+    "four-bar": [
+        (f"{'a.' * 300}a=1", "a key of 301 names"),
+        (f"a={'[' * 60_000}", "a"),
+        (f"linkage.start.x={'[' * 31}{']' * 31}", "write it flatter"),
+        (" . " * 40_000, "write key=value"),
+        (f"linkage.gravity=[0.0, 1{'0' * 400}]", "a whole number of more than 64 bits"),
+        (f"duration=1{'0' * 5000}", "should be a valid number"),
+        ("duration=2020-01-01", "2020-01-01 should be a number"),
+        ("duration=\udcff", r"'\udcff' is no Unicode text"),
+        ("\udcff=1", "is no Unicode text"),
+        ("linkage.body.².mass=1", "no entry '²'"),
+        (f"linkage.body.{'9' * 5000}.mass=1", "no entry '999"),
+    ],
+    "enclosure": [
+        ("contacts.enclosure=[[0.0, 0.0], [1.0, 0.0]]", "2 corners"),
+        (f"contacts.enclosure={FOUR}", "not convex at"),
+        ("linkage.body.link1.radius=0.0", "give a number > 0 (m)"),
+        ("linkage.body.link1.capsule=[[0.0, 0.0], [0.0, 0.0]]", "two different"),
+        ("contacts.stiffness=-1.0", "give a number >= 0 (N/m)"),
+        ("contacts.detection=hapics", "'graphics' or 'haptics'"),
+        ("contacts={friction=0.3, stiffness=0.0}", "cannot stick"),
+        ("contacts.friction=-0.3", "give a number >= 0"),
+        *((f"contacts.enclosure={corners}", "contacts") for corners in (
+            "[[0, 0], [1, 0], [1, 0], [0, 1]]", "[[0, 0]]", "[]", "[[0, 0], [0, 0], [0, 0]]")),
+    ],
+    "obstacles": [
+        ("contacts.disc.pin.name=block", "'block' is taken"),
+        ("contacts.disc.pin.radius=0.0", "give a number > 0 (m)"),
+        *((f"contacts.polygon.0.corners={corners}", "contacts") for corners in (
+            "[[0, 0], [1, 0], [1, 0], [0, 1]]", "[[0, 0]]", "[]", "[[0, 0], [0, 0], [0, 0]]")),
+    ],
+    "push-disc": [
+        ("linkage.body.disc.name=block", "'block' is taken"),
+        ("contacts={bodies='none'}", "there is nothing to touch"),
+        (f"linkage.body.block.corners={FOUR}", "not convex at"),
+        ("linkage.body.block.capsule=[[0,0],[1,0]]", "leave out one of them"),
+        ("linkage.body.block.center=[0.01, 0.0]", "give its `inertia` too"),
+        ("contacts={detection='graphics'}; graphics.sync=operational",
+         "nothing pulls the copy of 'block' along"),
+    ],
+    "pendulum": [
+        ("linkage.joint.pivot.limits={stiffness=9.0}", "give `lower`, `upper` or both"),
+        (f"{LIMITS}, upper=-1.0}}", "-1.0 is not above `lower` = 1.0"),
+        (f"{LIMITS}, restitution=0.5, damping=0.1}}", "`damping` or `restitution`, not both"),
+        (f"{LIMITS}, restitution=0.0}}", "give a number >= 0.01"),
+    ],
+    "single-body": [
+        ("linkage.joint.float.limits={stiffness=9.0, lower=1.0}",
+         "a free joint has three coordinates"),
+    ],
+    "two-hands": [
+        ("hands.right={wrench=[0.0, 0.0, 0.0]}", "no point 'right'; there are left"),
+        ("linkage.point.left.body=link9", "no body 'link9'"),
+    ],
+    "two-users": [
+        ("devices.right={}", "no point 'right'; there are left"),
+        ("controllers.left={}; devices={}", "add [devices.left]"),
+        ("devices.left.base_y_a=1.0", "is not below base_y_b"),
+    ],
+    "local-model": [
+        ("mechanism.stabilization=projection", "take 'baumgarte'"),
+        ("mechanism_at=graphics", "runs at the graphics rate itself"),
+    ],
+}  # fmt: skip
+SEVERAL = (
+    "graphics.rate=[0.5, 0.2]", "hand.type=spring", "graphics.stiffness=[-1,-1,-1]",
+    "controller.damping=[-1,-1,-1]", "contacts={friction=0.3, stiffness=0.0}",
+    "contacts.enclosure=[]", "linkage.body.disc.name=block",
+)  # fmt: skip
+"""These make further faults."""
+TEXTS = {"the scene of test_scene.py": GOOD, "an arm": ARM}
+
+
+def refused(scene: object, *options: str) -> str:
+    """What is said of a scene: one of TEXTS, or by its name or path."""
+    text = TEXTS.get(str(scene))
+    with pytest.raises(InputFault) as fault:
+        read_and_check.read(text, options) if text else open_scene.load(str(scene), options)
+    assert fault.value.exit_status == 2
+    return str(fault.value)
+
+
+@pytest.mark.parametrize(
+    ("scene", "options", "message"),
+    [(scene, *row) for scene, rows in REFUSED.items() for row in rows],
+    ids=lambda value: str(value)[:40],
+)
+def test_what_is_refused(scene, options, message):
+    said = refused(scene, *options.split("; "))
+    assert message in said
+    assert (" faults\n" in said) == (options in SEVERAL)
+    assert len(said) < 1000
+
+
+@pytest.mark.parametrize(
+    "value", ["1e308", "'1e99999999'", "'1e-99999999'", "'1e+09999'", "nan", "'1/0'", "1e400", "0"]
+)
+@pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
+def test_rates_and_times_out_of_any_range(key, value):
+    assert f"--set {key}={value}: {key}: " in refused("closed-loop", f"{key}={value}")
