@@ -32,16 +32,8 @@ POWER = oscillator.POWER
 def stiff_exact(
     times: NDArray[np.float64], k_1: float, k_2: float, k_c: float, c_c: float
 ) -> NDArray[np.float64]:
-    """Rows x1, x2."""
-    a = np.array(
-        [
-            [0.0, 1.0, 0.0, 0.0],
-            [-k_1 - k_c, -c_c, k_c, c_c],
-            [0.0, 0.0, 0.0, 1.0],
-            [k_c, c_c, -k_2 - k_c, -c_c],
-        ]
-    )
-    start = np.array([1.0, 0.0, 1.0, 0.0])
+    """Rows x1, x2, of both masses at rest at 1 m in the beginning."""
+    a, start = oscillator.matrix(k_1, k_2, 0.0, k_c, c_c), np.array([1.0, 0.0, 1.0, 0.0])
     return np.array([(expm(a * t) @ start)[[0, 2]] for t in times])
 
 
@@ -52,13 +44,11 @@ def gain(name: str, factor: float, offset: float, timing: str = "continuous") ->
         states=[Variable("z")],
         outputs=[Variable("y"), Variable("z")],
     )
+    u, w, z = block.u["u"], block.u["w"], block.x["z"]
+    output = {"y": factor * u + offset, "z": z}
+    initial = {"z": ca.SX(0.0)}
     return block.component(
-        name,
-        "feed-through",
-        timing,
-        initial={"z": ca.SX(0.0)},
-        step={"z": block.u["w"]},
-        output={"y": factor * block.u["u"] + offset, "z": block.x["z"]},
+        name, "feed-through", timing, initial=initial, step={"z": w}, output=output
     )
 
 
@@ -92,13 +82,8 @@ def system(
     holds = dict.fromkeys(dict(rows), hold) if isinstance(hold, str) else hold or {}
     rules = Rules(holds=holds, between_plants=between, power=power, springs=springs)
     connections, _ = connected(units, rows, timeline, rules)
-    return System(
-        units,
-        connections,
-        timeline,
-        Coupling(coupling, substeps=dict.fromkeys(fmus, substeps), **others),
-        energy=EnergyPorts(power, springs),
-    )
+    how = Coupling(coupling, substeps=dict.fromkeys(fmus, substeps), **others)
+    return System(units, connections, timeline, how, energy=EnergyPorts(power, springs))
 
 
 def masses(
@@ -111,18 +96,9 @@ def masses(
     substeps: int = 1,
 ) -> System:
     """The two-mass oscillator."""
-    return system(
-        fmus,
-        ROWS,
-        coupling,
-        period,
-        steps * period,
-        hold=hold,
-        substeps=substeps,
-        get_after_set=get_after_set,
-        power=POWER,
-        springs=oscillator.SPRINGS,
-    )
+    energy = {"power": POWER, "springs": oscillator.SPRINGS}
+    how = {"hold": hold, "substeps": substeps, "get_after_set": get_after_set}
+    return system(fmus, ROWS, coupling, period, steps * period, **how, **energy)
 
 
 NEWTON = Iteration(method="newton", tolerance=1e-10)

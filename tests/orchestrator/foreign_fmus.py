@@ -34,17 +34,23 @@ class {name}(Fmi2Slave):
         self.steps += 1
         {body}
         return True
+
+    def terminate(self):
+        {end}
+        super().terminate()
 """
 
 
 def python_fmu(
-    folder: Path, name: str, body: str = "self.y = time + size", **options: bool
+    folder: Path, name: str, body: str = "self.y = time + size", end: str = "", **options: bool
 ) -> Path:
-    """An FMI 2.0 FMU: inputs u and on, outputs y and steps, parameter gain.
+    """An FMI 2.0 FMU: inputs u and on, outputs y and steps, parameter gain. `end` is run when it
+    terminates.
 
     Its module has a name of its own, so that no FMU of another test is in its way.
     """
-    return python_fmu_of(folder, SLAVE.format(name=name, body=body), uuid.uuid4().hex, **options)
+    text = SLAVE.format(name=name, body=body, end=end)
+    return python_fmu_of(folder, text, uuid.uuid4().hex, **options)
 
 
 GENERAL = """

@@ -15,14 +15,16 @@ K, C, K_C, C_C = 100.0, 1.0, 100.0, 1.0
 START = np.array([0.0, 1.0, 1.0, 0.0])
 """x1, v1, x2, v2 at WARM."""
 WARM = 0.06
-A = np.array(
-    [
-        [0.0, 1.0, 0.0, 0.0],
-        [-K - K_C, -C - C_C, K_C, C_C],
-        [0.0, 0.0, 0.0, 1.0],
-        [K_C, C_C, -K - K_C, -C - C_C],
-    ]
-)
+
+
+def matrix(k_1: float, k_2: float, c: float, k_c: float, c_c: float) -> NDArray[np.float64]:
+    """Of (x1, v1, x2, v2): masses of 1 kg on k_1 and k_2 and c, joined by k_c and c_c."""
+    one = [-k_1 - k_c, -c - c_c, k_c, c_c]
+    two = [k_c, c_c, -k_2 - k_c, -c - c_c]
+    return np.array([[0.0, 1.0, 0.0, 0.0], one, [0.0, 0.0, 0.0, 1.0], two])
+
+
+A = matrix(K, K, C, K_C, C_C)
 
 
 def exact(times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -34,10 +36,7 @@ ROWS = [("two.F", "one.F"), ("one.x", "two.x1"), ("one.v", "two.v1")]
 POWER = (PowerPort(effort="one.F", displacement="one.x"),)
 SPRINGS = (
     SetSpring(
-        set_position="two.x1",
-        position="two.x",
-        stiffness=(K_C,),
-        damping=(C_C,),
-        set_velocity="two.v1",
+        set_position="two.x1", position="two.x", set_velocity="two.v1",
+        stiffness=(K_C,), damping=(C_C,),
     ),
-)
+)  # fmt: skip

@@ -215,15 +215,22 @@ def test_an_fmu_acts_on_our_mechanism(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("source", "target", "value", "expected"),
-    [("mm", "m", 1500.0, 1.5), ("degC", "K", 20.0, 293.15), ("K", "degC", 273.15, 0.0),
-     ("deg", "rad", 180.0, math.pi), ("m", "m", 2.0, 2.0)],
-)  # fmt: skip
-def test_units_convert(tmp_path, source, target, value, expected):
+    ("source", "target", "value", "how", "expected"),
+    [
+        ("mm", "m", 1500.0, "", 1.5),
+        ("degC", "K", 20.0, "", 293.15),
+        ("K", "degC", 273.15, "", 0.0),
+        ("deg", "rad", 180.0, "", math.pi),
+        ("m", "m", 2.0, "", 2.0),
+        ("mm", "m", 1500.0, "factor = -2.0\noffset = 10.0\n", 7.0),  # after the units
+        ("mm", "m", 1500.0, "convert = false\n", 1500.0),
+    ],
+)
+def test_units_convert(tmp_path, source, target, value, how, expected):
     with_units(python_fmu(tmp_path, "Gives", f"self.y = {value}"), y=source)
     with_units(python_fmu(tmp_path, "Takes", "self.y = self.u"), u=target)
-    found = ran(tmp_path, PAIR)
-    np.testing.assert_allclose(found.haptics["takes.y"][-1], expected, rtol=1e-15, atol=1e-12)
+    found = ran(tmp_path, PAIR + how).haptics["takes.y"][-1]
+    assert found == pytest.approx(expected, rel=1e-15, abs=1e-12)
 
 
 def test_a_difference_of_temperatures_has_no_offset():
@@ -232,13 +239,6 @@ def test_a_difference_of_temperatures_has_no_offset():
     assert conversion(degree, kelvin) == Linear(1.0, 273.15)
     assert conversion(degree, kelvin, relative=True) == SAME
     assert Linear(2.0, 1.0).after(Linear(3.0, 5.0)) == Linear(6.0, 11.0)
-
-
-def test_factor_and_offset_come_after_the_units(tmp_path):
-    with_units(python_fmu(tmp_path, "Gives", "self.y = 1500.0"), y="mm")
-    with_units(python_fmu(tmp_path, "Takes", "self.y = self.u"), u="m")
-    for how, value in (("factor = -2.0\noffset = 10.0\n", 7.0), ("convert = false\n", 1500.0)):
-        assert ran(tmp_path, PAIR + how).haptics["takes.y"][-1] == value
 
 
 def findings(folder: Path, text: str) -> dict[str, tuple[int | None, str]]:
@@ -282,14 +282,16 @@ def test_faults_of_tables_have_their_place(tmp_path, old, new, key, line, messag
     assert message in found[key][1]
 
 
-def test_units_that_do_not_convert_are_refused_with_both(tmp_path):
+@pytest.mark.parametrize(
+    ("unit", "why"),
+    [("rad", "y is in mm, u in rad: m is not rad"), ("furlong", "furlong has no BaseUnit")],
+)
+def test_units_that_do_not_convert_are_refused_with_both(tmp_path, unit, why):
     with_units(python_fmu(tmp_path, "Gives"), y="mm")
-    with_units(python_fmu(tmp_path, "Takes"), u="rad")
+    with_units(python_fmu(tmp_path, "Takes"), u=unit)
     line, message = findings(tmp_path, PAIR)["connection[0]"]
     assert line == 11
-    assert "y is in mm, u in rad: m is not rad" in message
-    with_units(python_fmu(tmp_path, "Takes"), u="furlong")
-    assert "furlong has no BaseUnit" in findings(tmp_path, PAIR)["connection[0]"][1]
+    assert why in message
 
 
 def test_paths_are_relative_to_the_scene_file_and_options_reach_in(tmp_path):

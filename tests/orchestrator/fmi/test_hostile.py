@@ -15,6 +15,7 @@ from hapticlink.orchestrator.results import tables
 from tests.orchestrator.foreign_fmus import ISOLATED, RUN, process
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 from tests.orchestrator.hostile_slave import hostile_slave
+from tests.orchestrator.run.test_interrupt import waited_for
 
 pytest.importorskip("resource")  # the FMU needs POSIX
 
@@ -142,11 +143,16 @@ def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path):
     hostile_fmu(tmp_path)
     out = tmp_path / "out"
     process(hostile_scene(tmp_path, "end_null_9"), out)
-    until = time.monotonic() + 30
-    while (end := tables.load(out).run["end"])["reason"] == "running" and time.monotonic() < until:
-        time.sleep(0.05)
-    assert end == {"reason": "fault", "time": 0.5}
+    waited_for(lambda: tables.load(out).run["end"]["reason"] != "running")
+    assert tables.load(out).run["end"] == {"reason": "fault", "time": 0.5}
     assert tables.load(out).haptics["time"][-1] == 0.5
+
+
+def mapped(pid: int) -> list[str]:
+    """What the processes that a process has started have in memory."""
+    tasks = Path(f"/proc/{pid}/task").iterdir()
+    children = [child for task in tasks for child in (task / "children").read_text().split()]
+    return [Path(f"/proc/{child}/maps").read_text() for child in children]
 
 
 def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path):
@@ -156,12 +162,13 @@ def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path):
     assert set(run["isolated"]) == {"good_none_0", "source"}
     scene = hostile_scene(tmp_path, "make_sleep_0")
     command = [*RUN, str(scene), "--out", str(tmp_path / "o")]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        time.sleep(4.0)
-        assert process.poll() is None
-        process.terminate()
-        _, said = process.communicate(timeout=20)
-    assert process.returncode == 1
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tool:
+        waited_for(lambda: any("hostile" in maps for maps in mapped(tool.pid)))
+        time.sleep(0.2)  # it is at its instance by now
+        assert tool.poll() is None
+        tool.terminate()
+        _, said = tool.communicate(timeout=20)
+    assert tool.returncode == 1
     assert "interrupted" in said
 
 

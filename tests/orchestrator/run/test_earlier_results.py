@@ -18,6 +18,10 @@ from tests.shared_fixtures import status
 ONE = fmu_table("one", "faults")
 
 
+def files(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
 def flipped(folder: Path) -> None:
     """A byte in the middle of the binary, which no directory of the archive knows."""
     path = c_fmu(folder)
@@ -52,11 +56,11 @@ def test_what_fails_before_its_first_row_takes_nothing(tmp_path, make, exit_stat
     c_fmu(tmp_path)
     path, out = scene(tmp_path, ONE), tmp_path / "out"
     assert status("run", path, "--no-figures", "--out", out) == 0
-    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    before = files(out)
     make(tmp_path)
     assert status("run", path, "--no-figures", "--out", out) == exit_status
     assert said in capsys.readouterr().err
-    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+    assert files(out) == before
 
 
 def test_without_an_earlier_row_the_fault_stands_in_run_json(tmp_path):
@@ -98,16 +102,13 @@ def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path):
     c_fmu(tmp_path)
     path, out = scene(tmp_path, ONE), tmp_path / "out"
     simulate(str(path), out)
-    before = {p.name: p.read_bytes() for p in out.iterdir()}
-    code = (
-        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2**14, 2**14))\n"
-        "from hapticlink.orchestrator.experiment import simulate\n"
-        f"print(simulate({str(path)!r}, {str(out)!r}).outcome.fault)"
-    )
-    command = [sys.executable, "-c", code]
+    before = files(out)
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2**14, 2**14))\n"
+    code = limit + "import sys; from hapticlink.__main__ import main; main()"
+    command = [sys.executable, "-c", code, "run", path, "--no-figures", "--out", out]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert ended.stdout == f"{out}: File too large\n"
-    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+    assert f"{out}: File too large\n" in ended.stderr
+    assert files(out) == before
 
 
 def test_links_are_replaced_not_followed(bar, tmp_path):

@@ -3,12 +3,12 @@ no process and no folder stays behind."""
 
 import math
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,8 @@ from tests.orchestrator.foreign_fmus import (
     slave,
     wire_table,
 )
+from tests.orchestrator.results.records import tables_of
+from tests.orchestrator.run.test_interrupt import waited_for
 from tests.plugins import hapticlink, server
 
 resource = pytest.importorskip("resource")  # these are the signals and limits of POSIX
@@ -65,10 +67,7 @@ def _nothing_left_behind(own_temporary_folder):
     before = folders(), children(), list(sys.path), os.getcwd()
     yield
     assert folders() <= before[0]
-    patience = time.monotonic() + 5.0  # one that has been killed is still to be reaped
-    while not children() <= before[1] and time.monotonic() < patience:
-        time.sleep(0.05)
-    assert children() <= before[1]
+    waited_for(lambda: children() <= before[1], 5.0)  # one that was killed is still to be reaped
     assert os.getcwd() == before[3]
     assert not [p for p in sys.path if "hapticlink-" in p]
 
@@ -179,8 +178,7 @@ def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(tmp_path, body,
     else:
         python_fmu(tmp_path, "Dies", body)
     ended = tmp_path / "ended"
-    said = f"\n    def terminate(self):\n        open({str(ended)!r}, 'w').close()\n"
-    python_fmu_of(tmp_path, SLAVE.format(name="Other", body="pass") + said, tmp_path.name)
+    python_fmu(tmp_path, "Other", end=f"open({str(ended)!r}, 'w').close()")
     text = fmu_table("one", "Dies", ISOLATED + start) + OTHER
     experiment, found = run(tmp_path, text, "faults.timeout=2")
     message = str(experiment.outcome.fault)
@@ -200,14 +198,14 @@ def test_isolated_runs_give_the_same_bytes(tmp_path):
         ended = simulate(str(scene(tmp_path, text)), tmp_path / out, options)
         assert ended.outcome.fault is None
         assert (out == "a") == (ended.outcome.details.isolated == {})
-        for table in ("haptics.csv", "24hz.csv"):
-            assert (tmp_path / out / table).read_bytes() == (tmp_path / "a" / table).read_bytes()
+        assert len(tables_of(tmp_path / out)) == 2
+        assert tables_of(tmp_path / out) == tables_of(tmp_path / "a")
 
 
 def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path):
     for name, value in (("first", 1.0), ("second", 2.0)):
         (tmp_path / name).mkdir()
-        slave = SLAVE.format(name="Same", body=f"self.y = {value}")
+        slave = SLAVE.format(name="Same", body=f"self.y = {value}", end="")
         python_fmu_of(tmp_path / name, slave, "same")
     text = fmu_table("one", "first/Same") + fmu_table("two", "second/Same")
     found = ran(tmp_path, text)
@@ -237,15 +235,10 @@ def test_threads_that_an_fmu_leaves_running_keep_no_process(tmp_path, command):
     arguments += ["--vary", "duration=0.1,0.2", "--jobs", "2"] if command == "sweep" else []
     command_line = [*COMMAND, *arguments]
     ended = subprocess.run(command_line, capture_output=True, timeout=60, text=True, check=False)
-    begun = "scene: sweep\n" if command == "sweep" else ""
-    assert (ended.returncode, ended.stderr) == (0, begun)
+    begun = r"scene: sweep(, up to \d+ s before)?\n" if command == "sweep" else ""
+    assert ended.returncode == 0
+    assert re.fullmatch(begun, ended.stderr)
     assert ended.stdout.startswith("scene: ")
-
-
-TERMINATE = """
-    def terminate(self):
-        {}
-"""
 
 
 @pytest.mark.parametrize(
@@ -255,8 +248,7 @@ TERMINATE = """
 def test_an_exception_in_terminate_is_told_after_the_last_row(tmp_path, body, isolate):
     """Two of them: after a fatal error an FMU is not even freed, and the next is terminated. In a
     process of its own, as it once ended by SIGSEGV, with nothing on stderr."""
-    slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format(body)
-    python_fmu_of(tmp_path, slave, tmp_path.name)
+    python_fmu(tmp_path, "Bad", end=body)
     one = fmu_table("one", "Bad", isolate)
     path, out = scene(tmp_path, one + one.replace("one", "two")), tmp_path / "out"
     (ended,) = hapticlink(tmp_path, f"hapticlink run {path} --no-figures --out {out}")
@@ -268,8 +260,7 @@ def test_an_exception_in_terminate_is_told_after_the_last_row(tmp_path, body, is
 
 
 def test_a_process_that_dies_in_terminate_is_told(tmp_path):
-    slave = SLAVE.format(name="Bad", body="pass") + TERMINATE.format("__import__('os')._exit(3)")
-    python_fmu_of(tmp_path, slave, tmp_path.name)
+    python_fmu(tmp_path, "Bad", end="__import__('os')._exit(3)")
     experiment, found = run(tmp_path, fmu_table("one", "Bad", ISOLATED))
     said = str(experiment.outcome.fault)
     assert said == "one: its process ended with exit status 3 at t = 0.5 s"
@@ -327,9 +318,7 @@ def test_a_signal_keeps_results_and_exits_with_1(tmp_path, number, isolate):
     path = scene(tmp_path, fmu_table("one", "Slow", isolate), duration=100)
     out = tmp_path / "out"
     with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.PIPE) as running:
-        deadline = time.monotonic() + 60
-        while not started.exists() and time.monotonic() < deadline:
-            time.sleep(0.02)
+        waited_for(started.exists)
         running.send_signal(number)
         _, said = running.communicate(timeout=60)
     assert running.returncode == 1

@@ -52,10 +52,10 @@ def order(bar: Path, kind: str, rates: list[int], options: dict) -> float:
 
 
 @pytest.mark.parametrize("kind", ["spring", "arm"])
-def test_a_hand_as_a_plant_is_coupled_to_order_two(bar, kind):
-    assert order(bar, kind, [200, 400, 800], PLANT) == pytest.approx(2, abs=0.03)
-
-
-@pytest.mark.parametrize("kind", ["spring", "arm"])
-def test_a_sampled_hand_is_coupled_to_order_one(bar, kind):
-    assert order(bar, kind, [800, 1600, 3200], {}) == pytest.approx(1, abs=0.05)
+@pytest.mark.parametrize(
+    ("options", "coarsest", "expected", "within"), [(PLANT, 200, 2, 0.03), ({}, 800, 1, 0.05)]
+)
+def test_order_of_the_coupling_of_a_hand(bar, kind, options, coarsest, expected, within):
+    """As a plant, and sampled."""
+    rates = [coarsest, 2 * coarsest, 4 * coarsest]
+    assert order(bar, kind, rates, options) == pytest.approx(expected, abs=within)

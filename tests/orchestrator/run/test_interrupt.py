@@ -26,8 +26,11 @@ def crash_monitor_of_runs():
     """Runs start their watchdog."""
 
 
-def waited_for(come: Callable[[], object]) -> None:
-    until = time.monotonic() + 60
+PATIENT = "[faults]\ntimeout = 1000.0\n"
+
+
+def waited_for(come: Callable[[], object], seconds: float = 60.0) -> None:
+    until = time.monotonic() + seconds
     while not come() and time.monotonic() < until:
         time.sleep(0.01)
     assert come()
@@ -41,22 +44,23 @@ def _nothing_left_behind(own_temporary_folder):
     assert [signal.getsignal(s) for s in interrupt.SIGNALS] == handlers
 
 
+INTERRUPTED = """
+import os, signal, hapticlink.orchestrator.open_scene as s
+load = s.load
+def interrupted(*a):
+    s.load = load
+    os.kill(os.getpid(), signal.SIGINT)
+    return load(*a)
+s.load = interrupted
+from hapticlink.__main__ import main
+main()
+"""
+
+
 def test_a_signal_before_the_run_says_so(bar, tmp_path):
     """While the scene is read; it is held, so that no import loses it."""
-    code = (
-        "import hapticlink.orchestrator.open_scene as s, os, signal\n"
-        "load = s.load\n"
-        "def interrupted(*a):\n"
-        "    s.load = load\n"
-        "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "    return load(*a)\n"
-        "s.load = interrupted\n"
-        "from hapticlink.__main__ import main\n"
-        "import sys\n"
-        f"sys.argv = ['hapticlink', 'run', {str(bar)!r}, '--out', {str(tmp_path / 'out')!r}]\n"
-        "main()"
-    )
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    command = [sys.executable, "-c", INTERRUPTED, "run", str(bar), "--out", str(tmp_path / "out")]
+    ended = subprocess.run(command, capture_output=True, check=False)
     assert (ended.returncode, ended.stderr) == (1, b"hapticlink: interrupted before the run\n")
     assert not (tmp_path / "out").exists()
 
@@ -75,10 +79,8 @@ def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path):
     """As in a terminal, the signal goes to the whole group, and the worker is at its imports."""
     python_fmu(tmp_path, "Slow", "__import__('time').sleep(0.01)")
     path = scene(tmp_path, fmu_table("one", "Slow", ISOLATED), duration=100)
-    with subprocess.Popen(
-        [*RUN, path, "--out", tmp_path / "out"],
-        stderr=subprocess.PIPE, start_new_session=True,
-    ) as running:  # fmt: skip
+    command = [*RUN, path, "--out", tmp_path / "out"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, start_new_session=True) as running:
         waited_for(lambda: workers(running.pid))
         time.sleep(0.1)  # the caller waits for it by now
         os.killpg(running.pid, signal.SIGINT)
@@ -88,13 +90,6 @@ def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path):
     assert tables.load(tmp_path / "out").run["end"]["reason"] == "interrupted"
 
 
-HANGS = {
-    "isolated": ("while True: pass", ISOLATED),
-    "Python": ("while True: pass", ""),
-    "native": ("", ""),
-}
-
-
 def rows_of(folder: Path) -> int:
     """The number of rows of a run that goes on."""
     table = folder / "haptics.rows"
@@ -102,19 +97,18 @@ def rows_of(folder: Path) -> int:
 
 
 @pytest.mark.parametrize(
-    ("kind", "number"),
-    [("isolated", signal.SIGTERM), ("Python", signal.SIGINT), ("native", signal.SIGTERM)],
+    ("name", "more", "number"),
+    [
+        ("Hangs", ISOLATED, signal.SIGTERM),
+        ("Hangs", "", signal.SIGINT),
+        ("faults", "start.mode = 6\n", signal.SIGTERM),
+    ],
 )
-def test_a_second_signal_ends_an_fmu_that_hangs(tmp_path, kind, number):
-    body, isolate = HANGS[kind]
-    if kind == "native":
-        c_fmu(tmp_path)
-        text = fmu_table("one", "faults", "start.mode = 6\n")
-    else:
-        python_fmu(tmp_path, "Hangs", f"if self.steps == 4:\n            {body}")
-        text = fmu_table("one", "Hangs", isolate)
-    out = tmp_path / "out"
-    path = scene(tmp_path, text + "[faults]\ntimeout = 1000.0\n", duration=100)
+def test_a_second_signal_ends_an_fmu_that_hangs(tmp_path, name, more, number):
+    c_fmu(tmp_path)
+    python_fmu(tmp_path, "Hangs", "while self.steps == 4: pass")
+    out, text = tmp_path / "out", fmu_table("one", name, more) + PATIENT
+    path = scene(tmp_path, text, duration=100)
     with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.PIPE) as running:
         waited_for(lambda: rows_of(out) == 4)
         for _ in range(2):
@@ -133,7 +127,7 @@ def test_a_second_signal_ends_an_fmu_that_hangs(tmp_path, kind, number):
 def test_python_gets_the_second_signal_when_processes_have_ended(tmp_path):
     """What a run in Python makes of Ctrl-C is its own; the FMU that hangs does not keep it."""
     python_fmu(tmp_path, "Hangs", "if self.steps == 4: __import__('time').sleep(1000)")
-    path = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED) + "[faults]\ntimeout = 1000.0\n")
+    path = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED) + PATIENT)
 
     def signals():
         waited_for(lambda: rows_of(tmp_path / "out") == 4)

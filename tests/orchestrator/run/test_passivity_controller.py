@@ -32,7 +32,7 @@ ARM = {
 TWO_SIDED = {"impedance": False, "teleoperation": False, "topology": False}
 
 
-def pressed(options: dict[str, Any], guard: float | None = MASS) -> tuple[hl.Results, np.ndarray]:
+def pressed(options: dict[str, Any], guard: float | None = MASS) -> tuple[hl.Run, np.ndarray]:
     """A run of a wall, and the work (J) of its force on the handle at each sample."""
     own = {"duration": 4.0} | ({"fmu.wall.settings.passivity": guard} if guard else {})
     run = run_once("virtual-wall", own | options)

@@ -10,24 +10,21 @@ import pytest
 import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
+from tests.orchestrator.foreign_fmus import fmu_table, wire_table
 
 T, QUANTUM = 1e-3, 2 * math.pi * 0.010 / 1024
 
-SCENE = """
-title = "A hand pushes on a wall"
+SCENE = (
+    """title = "A hand pushes on a wall"
 duration = 1.5
 haptics.rate = 1000
 hold = "zoh"
 mechanism = {{ integrator = "semi-implicit-euler", substeps = 40 }}
 
 [linkage]
-operational_point = {{ body = "handle" }}
-start = {{ rail = 0.029 }}
-
-[[linkage.body]]
-name = "handle"
-mass = 0.04
-inertia = 1.0
+operational_point.body = "handle"
+start.rail = 0.029
+body = [{{ name = "handle", mass = 0.04, inertia = 1.0 }}]
 
 [[linkage.joint]]
 name = "rail"
@@ -44,28 +41,13 @@ name = "wall"
 block = "virtual_wall"
 rate = {rate}
 settings = {{ stiffness = {stiffness}, position = 0.030, quantum = {quantum} }}
-
-[[fmu]]
-name = "passivity"
-path = "passivity_controller.fmu"
-start = {{ max_damping = {damping} }}
-
-[[connection]]
-from = "virtual_mechanism.rail.position"
-to = "wall.x"
-
-[[connection]]
-from = "virtual_mechanism.rail.position"
-to = "passivity.x"
-
-[[connection]]
-from = "wall.F"
-to = "passivity.F"
-
-[[connection]]
-from = "passivity.f"
-to = "virtual_mechanism.rail.effort"
 """
+    + fmu_table("passivity", "passivity_controller", "start.max_damping = {damping}\n")
+    + wire_table("virtual_mechanism.rail.position", "wall.x")
+    + wire_table("virtual_mechanism.rail.position", "passivity.x")
+    + wire_table("wall.F", "passivity.F")
+    + wire_table("passivity.f", "virtual_mechanism.rail.effort")
+)
 
 
 def passivity_controller() -> Component:

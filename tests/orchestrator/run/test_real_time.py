@@ -23,6 +23,7 @@ from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.visualization.figures.real_time_figure import exceedance
 from hapticlink.visualization.figures.run_figures import figures
 from tests.orchestrator.foreign_fmus import ISOLATED, fmu_table, python_fmu, scene
+from tests.orchestrator.results.records import tables_of
 from tests.orchestrator.wall_clock import MS, WallClock
 from tests.shared_fixtures import needs_compiled_loop
 
@@ -36,7 +37,7 @@ def made(folder: Path, clock: WallClock | None, *options: str, scene: str = "clo
     """The run.json and the tables of a run, in real time if there is a clock."""
     run = simulate(scene, folder, options, real_time=clock and clock.run()).run
     assert run["fault"] is None
-    return run, {path.name: path.read_bytes() for path in folder.glob("*.csv")}
+    return run, tables_of(folder)
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,20 @@
-"""Result folder and messages of a run, and its reaction to signals."""
+"""Result folder and messages of a run, what counts as its time, and runs of any length, whose first
+rows come at once: nothing walks through them before."""
 
 import json
 import subprocess
+import time
 from dataclasses import replace
 
 import pytest
 
 from hapticlink.analysis.findings import summary
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.foreign_fmus import COMMAND, fmu_table, python_fmu, run, scene
+from tests.orchestrator.foreign_fmus import COMMAND, fault, fmu_table, python_fmu, run, scene
 from tests.shared_fixtures import run_once, status
 
 SHORT = ("--set", "duration=0.2")
@@ -103,3 +109,58 @@ def test_a_reader_that_has_enough_is_no_fault():
         told.stdout.close()
         assert told.stderr.read() == b""
     assert told.returncode == 0
+
+
+ONE = fmu_table("one", "One")
+
+
+def test_what_the_fmu_said_is_in_the_fault(tmp_path):
+    error = "__import__('pythonfmu').enums.Fmi2Status.error"
+    python_fmu(tmp_path, "One", f"self.log('the belt slipped', {error}); return False")
+    assert "the belt slipped" in fault(tmp_path, ONE)
+
+
+def test_loading_and_unloading_are_no_part_of_the_runs_time(tmp_path, monkeypatch):
+    python_fmu(tmp_path, "One")
+    pauses = []
+
+    def paused(method):
+        def call(instance):
+            time.sleep(0.3)
+            pauses.append(method.__name__)
+            return method(instance)
+
+        return call
+
+    for name in ("_load", "close"):
+        monkeypatch.setattr(InProcess, name, paused(getattr(InProcess, name)))
+    outcome = run(tmp_path, ONE)[0].outcome
+    assert pauses == ["_load", "close"]
+    assert outcome.wall_time < 0.3
+
+
+LONG = "duration=1e5"  # the longest that a scene takes
+SOON = "stop_when='virtual_mechanism.energy > 1e-5'"
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        [],
+        ["graphics.align=tick", "graphics.rate=29.97"],
+        ["graphics.phase=0.01", "phases.virtual_mechanism=0.0005"],
+        ["delays.hand.F={ min = 0.001, max = 0.004, seed = 1 }"],
+    ],
+    ids=["exact", "aligned", "phases", "drawn latencies"],
+)
+def test_a_run_of_1e5_s_has_rows(tmp_path, options):
+    experiment = simulate("closed-loop", tmp_path, [LONG, SOON, *options])
+    outcome = experiment.outcome
+    assert (outcome.fault, outcome.reason) == (None, "stop_when")
+    assert 0 < outcome.end_time < 1
+    assert experiment.results.run["delays"]["haptic_device.x -> controller.x_D"]["max"] == 0.0
+
+
+def test_ages_of_a_run_are_those_of_its_plan(tmp_path):
+    experiment = simulate("closed-loop-direct", tmp_path, ["duration=0.6"])
+    assert experiment.outcome.details.delays == delays(Plan(experiment.system))

@@ -6,7 +6,6 @@ from scipy.linalg import expm
 
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.foreign_fmus import PAIR, edited, python_fmu, scene
-from tests.shared_fixtures import status
 
 GAIN = PAIR.replace("takes.u", "takes.gain")
 
@@ -30,19 +29,6 @@ def test_a_fixed_parameter_is_set_once(fmus):
     edited(fmus / "Takes.fmu", lambda text: text.replace('"tunable"', '"fixed"'))
     results = simulate(str(scene(fmus, GAIN)), fmus / "out").results
     np.testing.assert_array_equal(results.haptics["takes.y"], 0.0)
-
-
-def test_a_gain_held_across_rates_goes_with_an_ssp(fmus):
-    text = GAIN.replace('"Gives.fmu"\n', '"Gives.fmu"\nrate = 16\n')
-    path = scene(fmus, text + 'hold = "foh"\nfactor = 2.0\noffset = 1.0\n')
-    first = simulate(str(path), fmus / "a").results
-    assert status("export", path, "--out", fmus) == 0
-    again = simulate(str(fmus / "scene.ssp"), fmus / "b").results
-    assert first.run["holds"] == again.run["holds"] == {"gives.y -> takes.gain": "foh"}
-    # The line through the samples of t - 1/16 and t, at the middle of each step of 1/64 s.
-    last = first.haptics["time"][-1]
-    assert first.haptics["takes.y"][-1] == pytest.approx(1 + 2 * (100 + 400 * (last - 0.5 / 64)))
-    np.testing.assert_array_equal(again.haptics["takes.y"], first.haptics["takes.y"])
 
 
 MASS = """

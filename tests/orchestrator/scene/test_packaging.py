@@ -3,7 +3,6 @@
 import json
 import zipfile
 from importlib.metadata import PackageNotFoundError
-from pathlib import Path
 
 import pytest
 
@@ -12,11 +11,13 @@ from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.system.fmu_files import fmu_files
+from hapticlink.orchestrator.system.timeline import timeline
+from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import sets, status
 
 SHORT = ("duration=0.2", "graphics.rate=60")
 NATIVE = (*SHORT, "packaging=native")
-TABLES = ("haptics.csv", "graphics.csv")
 
 
 @pytest.fixture(scope="module")
@@ -27,17 +28,10 @@ def native(tmp_path_factory):
     return folder
 
 
-def same(one: Path, two: Path) -> bool:
-    return all((one / name).read_bytes() == (two / name).read_bytes() for name in TABLES)
-
-
-def test_a_run_gives_the_same_bytes(native, tmp_path):
+def test_a_run_gives_the_same_bytes_and_says_what_ran(native, tmp_path):
     assert simulate("closed-loop", tmp_path, SHORT).outcome.fault is None
     assert (native / "haptics.csv").read_text().count("\n") > 100
-    assert same(native, tmp_path)
-
-
-def test_run_json_says_it(native, tmp_path):
+    assert tables_of(native) == tables_of(tmp_path)
     told = json.loads((native / "run.json").read_text())
     assert told["scene"]["packaging"] == "native"
     assert told["versions"]["ziglang"] == compiler.compiler_version()
@@ -54,7 +48,7 @@ def test_an_exported_scene_runs_again(native, tmp_path):
         binaries = [n for n in archive.namelist() if n.startswith("binaries/")]
     assert [n.split("/")[1] for n in binaries] == [host_platform()]
     assert status("run", path, "--no-figures", "--out", tmp_path / "again") == 0
-    assert same(native, tmp_path / "again")
+    assert tables_of(native) == tables_of(tmp_path / "again")
 
 
 def test_all_platforms_are_for_what_is_compiled(tmp_path, capsys):
@@ -62,17 +56,22 @@ def test_all_platforms_are_for_what_is_compiled(tmp_path, capsys):
     assert "--set packaging=native" in capsys.readouterr().err
 
 
-def test_all_platforms_are_asked_for(tmp_path, monkeypatch):
-    """Compiled by a stand-in: tests/fmus/test_native_fmu.py compiles."""
-    monkeypatch.setenv("HAPTICLINK_CACHE", "off")
-    asked = []
+@pytest.fixture
+def asked(monkeypatch):
+    """The platforms compiled for, by a stand-in: tests/fmus/test_native_fmu.py compiles."""
+    platforms = []
 
     def compiled(source, library, platform):
-        asked.append(platform)
+        platforms.append(platform)
         library.write_bytes(platform.encode())
         return library
 
     monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
+    return platforms
+
+
+def test_all_platforms_are_asked_for(tmp_path, monkeypatch, asked):
+    monkeypatch.setenv("HAPTICLINK_CACHE", "off")
     options = ("--set", "packaging=native", "--all-platforms", "--out", tmp_path)
     assert status("build", "five-bar", *options) == 0
     assert asked == ["linux64", "win64", "darwin64"] * 2  # of the hand and the mechanism
@@ -93,23 +92,13 @@ def test_two_hands_are_two_fmus(tmp_path, monkeypatch, packaging):
     assert len({(tmp_path / name).read_bytes() for name in built}) == len(built)
 
 
-def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(tmp_path, monkeypatch):
-    from hapticlink.orchestrator.system.fmu_files import fmu_files
-    from hapticlink.orchestrator.system.timeline import timeline
-
+def test_a_cached_fmu_is_one_of_its_platforms_and_compiler(tmp_path, monkeypatch, asked):
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
-
-    def compiled(source, library, platform):
-        library.write_bytes(platform.encode())
-        return library
-
-    monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
     scene = open_scene.load("pendulum", ("packaging=native",))
 
     def built(*platforms):
-        return fmu_files(scene, blocks(scene), timeline(scene), tmp_path, platforms)[
-            "virtual_mechanism"
-        ]
+        files = fmu_files(scene, blocks(scene), timeline(scene), tmp_path, platforms)
+        return files["virtual_mechanism"]
 
     assert built("linux64") == built("linux64")
     paths = {built("linux64"), built("win64"), built("linux64", "win64")}

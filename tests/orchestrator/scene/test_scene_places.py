@@ -1,12 +1,15 @@
 """Keys of a scene in every notation of TOML, and the line at which their faults are reported."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
@@ -148,7 +151,12 @@ def test_what_replaces_an_array_of_the_base_stands_in_the_file_itself(tmp_path):
 
 @pytest.mark.parametrize(
     ("trace", "message"),
-    [(None, "cannot be read"), ("t\n0.1\n0.2\n0.1\n", "line 4: 0.1 s is not after")],
+    [
+        (None, "cannot be read"),
+        ("t\n0.1\n0.2\n0.1\n", "line 4: 0.1 s is not after 0.2 s"),
+        ("time\n0.1\nsoon", "line 3: 'soon' is no time"),
+        ("0.1", "1 time stamps"),
+    ],
 )
 def test_a_bad_trace_is_told_beside_other_faults(tmp_path, trace, message):
     if trace:
@@ -207,3 +215,35 @@ def test_a_changed_copy_still_knows_where_it_was_written(tmp_path, options, plac
     assert (found.key, found.line, found.option) == ("hold", *place)
     assert changed.tables()["hold"] == "pspm"
     assert "origin" not in changed.tables()
+
+
+def test_a_dropped_key_of_the_base_is_not_inherited(tmp_path):
+    base, top = tmp_path / "base.toml", tmp_path / "top.toml"
+    base.write_text('extends = "five-bar"\nholds = { "a.b" = "foh" }\nmechanism.substeps = 3\n')
+    top.write_text(
+        'extends = "base.toml"\ndrop = ["mechanism", "linkage.start.elbow1", "holds.\\"a.b\\""]\n'
+        "[linkage.start]\nelbow1 = -1.5\n"
+    )
+    found = hl.scene(top)
+    assert found.holds == {}
+    assert found.mechanism.substeps == 1
+    assert found.linkage.start["elbow1"] == -1.5
+    assert found.linkage.start["shoulder1"] == pytest.approx(np.pi / 4)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ('extends = "five-bar"\ndrop = ["linkag"]', "did you mean 'linkage'"),
+        ('extends = "five-bar"\ndrop = ["linkage.start.elbw1"]', "did you mean 'elbow1'"),
+        ('extends = "five-bar"\ndrop = ["title.x"]', "title is no table in the base scene"),
+        ('extends = "five-bar"\ndrop = ["a b"]', "'a b' is no dotted key"),
+        ('extends = "five-bar"\ndrop = 5', "5: write a list of dotted keys"),
+        ('title = "t"\ndrop = ["linkage"]', "there is no base scene"),
+    ],
+)
+def test_what_cannot_be_dropped_is_refused_with_its_line(lines, message, tmp_path):
+    path = tmp_path / "top.toml"
+    path.write_text(lines + "\n")
+    with pytest.raises(hl.InputFault, match=r"line 2: drop: .*" + re.escape(message)):
+        hl.scene(path)

@@ -11,6 +11,7 @@ import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.results.tables import Results
 from tests.orchestrator.fmi.test_archives import SSD
 from tests.orchestrator.foreign_fmus import (
     PAIR,
@@ -22,6 +23,8 @@ from tests.orchestrator.foreign_fmus import (
     wire_table,
     with_units,
 )
+from tests.orchestrator.results.records import tables_of
+from tests.orchestrator.system.test_timeline import pair
 from tests.shared_fixtures import sets, status
 
 
@@ -30,30 +33,33 @@ def export(source: str, folder: Path, *options: str) -> Path:
     return folder / f"{Path(source).stem}.ssp"
 
 
+def come_back(source: str, folder: Path, *options: str) -> Results:
+    """The results of a scene from its SSP, which are those of the scene to the bit."""
+    ours = simulate(source, folder / "a", options)
+    theirs = simulate(str(export(source, folder / "ssp", *options)), folder / "b")
+    assert ours.outcome.fault is theirs.outcome.fault is None
+    assert tables_of(folder / "a") == tables_of(folder / "b")
+    return theirs.results
+
+
+TICKS = "graphics.align=tick"
+
+
 @pytest.mark.parametrize(
-    ("name", "options"),
+    ("name", "options", "tables"),
     [
-        ("closed-loop", ()),
-        ("closed-loop", ("graphics.rate={ min = 20, max = 60, seed = 3 }", "hold=foh")),
-        (
-            "closed-loop",
-            ("coupling=jacobi", "graphics.align=tick", "holds.virtual_environment.P_c=delayed"),
-        ),
-        ("closed-loop-direct", ("hold=pspm", "holds.virtual_mechanism.F_drift=passive")),
-        ("two-hands", ()),
-        ("local-model", ()),
+        ("closed-loop", (), 2),
+        ("closed-loop", ("graphics.rate={ min = 20, max = 60, seed = 3 }", "hold=foh"), 2),
+        ("closed-loop", ("coupling=jacobi", TICKS, "holds.virtual_environment.P_c=delayed"), 2),
+        ("closed-loop", ("graphics.phase=0.01", "phases.virtual_mechanism='1/1024'",
+                         "phases.controller=0.0005"), 4),
+        ("closed-loop-direct", ("hold=pspm", "holds.virtual_mechanism.F_drift=passive"), 2),
+        ("two-hands", (), 1),
+        ("local-model", (), 2),
     ],
-)
-def test_a_shipped_scene_comes_back_to_the_bit(tmp_path, name, options):
-    options = ("duration=0.2", *options)
-    path = export(name, tmp_path, *options)
-    simulate(name, tmp_path / "a", options)
-    again = simulate(str(path), tmp_path / "b")
-    assert again.outcome.fault is None
-    tables = [path.name for path in (tmp_path / "a").glob("*.csv")]
-    assert "haptics.csv" in tables
-    for table in tables:
-        assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
+)  # fmt: skip
+def test_a_shipped_scene_comes_back_to_the_bit(tmp_path, name, options, tables):
+    assert len(come_back(name, tmp_path, "duration=0.2", *options).tables) == tables
 
 
 def test_others_read_it_and_the_same_scene_gives_the_same_bytes(tmp_path):
@@ -77,13 +83,28 @@ def test_starts_factors_units_and_own_rates_come_back(tmp_path):
     text = PAIR + "factor = -0.1\noffset = 0.3\nhold = 'foh'\n"
     text = text.replace('"Gives.fmu"\n', '"Gives.fmu"\nrate = "100/3"\nstart.gain = 0.1\n')
     text = text.replace('"Takes.fmu"\n', '"Takes.fmu"\nstart.on = true\ntiming = "sampled"\n')
-    path = scene(tmp_path, text)
-    simulate(str(path), tmp_path / "a")
-    again = simulate(str(export(str(path), tmp_path / "ssp")), tmp_path / "b")
-    assert again.outcome.fault is None
-    for table in ("haptics.csv", "100_3hz.csv"):
-        assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()
-    assert abs(again.results.haptics["takes.y"][-1]) > 0.1
+    found = come_back(str(scene(tmp_path, text)), tmp_path)
+    assert set(found.tables) == {"haptics", "100_3hz"}
+    assert abs(found.haptics["takes.y"][-1]) > 0.1
+
+
+def test_variable_rates_of_fmus_come_back(tmp_path):
+    path = pair(tmp_path, "{ min = 8, max = 32, seed = 3 }", "[0.125, 0.3, 0.5]")
+    found = come_back(str(path), tmp_path)
+    assert set(found.tables) == {"haptics", "8to32hz_seed3", "times_of_takes"}
+
+
+def test_a_gain_that_is_held_comes_back(tmp_path):
+    python_fmu(tmp_path, "Gives", "self.y = 100.0 + 400.0 * (time + size)")
+    python_fmu(tmp_path, "Takes", "self.y = self.gain")
+    text = fmu_table("gives", "Gives", "rate = 16\n") + fmu_table("takes", "Takes")
+    how = 'hold = "foh"\nfactor = 2.0\noffset = 1.0\n'
+    text += wire_table("gives.y", "takes.gain", how)
+    found = come_back(str(scene(tmp_path, text)), tmp_path)
+    assert found.run["holds"] == {"gives.y -> takes.gain": "foh"}
+    # The line through the samples of t - 1/16 and t, at the middle of each step of 1/64 s.
+    last = found.haptics["time"][-1]
+    assert found.haptics["takes.y"][-1] == pytest.approx(1 + 2 * (100 + 400 * (last - 0.5 / 64)))
 
 
 LINE = '<ssd:Connection startElement="a b" startConnector="y" endElement="c" endConnector="u"{}>'

@@ -22,6 +22,7 @@ from tests.orchestrator.foreign_fmus import (
     wire_table,
     with_units,
 )
+from tests.orchestrator.results.records import tables_of
 from tests.orchestrator.systems import system_of
 from tests.shared_fixtures import sets, status
 
@@ -61,14 +62,14 @@ def test_a_scene_says_what_a_foreign_matrix_is(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("more", "why"),
+    ("hold", "why"),
     [
-        ('[holds]\n"slow.x" = "foh-derivative"', "does not put out the derivative of x"),
-        ('[holds]\n"slow.x" = "passive"', "it is not a declared power connection"),
+        ("foh-derivative", "does not put out the derivative of x"),
+        ("passive", "it is not a declared power connection"),
     ],
 )
-def test_nothing_is_guessed_from_the_name_of_a_foreign_port(tmp_path, more, why):
-    text = rotating(tmp_path, "M") + wire_table("slow.x", "fast.F_hand") + more
+def test_nothing_is_guessed_from_the_name_of_a_foreign_port(tmp_path, hold, why):
+    text = rotating(tmp_path, "M") + wire_table("slow.x", "fast.F_hand", f'hold = "{hold}"\n')
     with pytest.raises(SceneFault, match=why):
         system_of(scene(tmp_path, text))
 
@@ -234,9 +235,11 @@ def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path):
     own = simulate("closed-loop-direct", tmp_path / "own", options)
     again = simulate(str(renamed), tmp_path / "renamed")
     assert again.outcome.fault is None
-    for table in ("haptics.csv", "graphics.csv"):
-        _, rows = (tmp_path / "own" / table).read_text().split("\n", 1)
-        assert (tmp_path / "renamed" / table).read_text().split("\n", 1)[1] == rows
+    rows = [
+        {name: table.split(b"\n", 1)[1] for name, table in tables_of(tmp_path / run).items()}
+        for run in ("own", "renamed")
+    ]
+    assert rows[0] == rows[1]
     for key in ("holds", "held_as", "energies"):
         expected, found = (experiment.results.run[key] for experiment in (own, again))
         assert {re.sub(r"\bmy_", "", name): value for name, value in found.items()} == expected

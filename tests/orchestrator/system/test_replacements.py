@@ -9,7 +9,9 @@ import pytest
 import hapticlink as hl
 from hapticlink.commands.options import Changes
 from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.scene import overrides
 from tests.orchestrator.foreign_fmus import entries, slave
+from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import status
 
 SHORT = {"duration": 0.2, "graphics.rate": 40}
@@ -43,8 +45,7 @@ def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path, own_files, own
     swapped = hl.run("closed-loop", swap, out=tmp_path, figures=False)
     assert swapped.run["replaced"] == {block: {"lost": [], "unfed": [], "mapped": {}}}
     assert swapped.run["connections"] == own_run.run["connections"]
-    for table in ("haptics.csv", "graphics.csv"):
-        assert (own_run.folder / table).read_bytes() == (tmp_path / table).read_bytes()
+    assert tables_of(own_run.folder) == tables_of(tmp_path)
 
 
 def test_by_one_option_and_what_does_not_meet_is_listed(tmp_path, capsys):
@@ -133,46 +134,33 @@ def test_a_map_that_does_not_fit_is_refused(tmp_path, given, said, capsys):
     assert said in " ".join(capsys.readouterr().err.split())
 
 
-def test_a_scene_has_the_map_too(tmp_path):
+def test_a_scene_has_map_and_connections_too(tmp_path):
     file = pull(tmp_path, "pull0", "pull1", "pull2")
     swap = {"replaces": "hand", "path": str(file), "map": {"F": ["pull0", "pull1", "pull2"]}}
     assert hl.run("closed-loop", {**SHORT, "fmu.+": swap})["hand.F"][0, 0] == -0.5
-
-
-def test_an_fmu_of_other_names_fits_by_a_connection_of_the_scene(tmp_path):
     swap = {"replaces": "hand", "path": str(spring(tmp_path, output="z"))}
     wire = {"from": "hand.z", "to": "haptic_device.F_hand"}
     made = hl.run("closed-loop", {**SHORT, "fmu.+": swap, "connection.+": wire})
     assert "hand.z -> haptic_device.F_hand" in made.run["connections"]
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ({"replaces": "controler"}, "no block 'controler'; did you mean 'controller'"),
-        ({"replaces": "controller", "name": "mine"}, "'mine': it has that of controller"),
-        ({"replaces": "hand_left"}, "no block 'hand_left'"),
-    ],
-)
-def test_what_replaces_no_block_is_refused(tmp_path, table, message):
-    given = {**table, "path": str(spring(tmp_path))}
-    with pytest.raises(SceneFault, match=message):
-        hl.scene("closed-loop", {"fmu.+": given})
-
-
-def test_faults_of_a_swap_are_told_as_it_was_typed():
-    with pytest.raises(SceneFault) as raised:
+def test_what_replaces_no_block_is_refused(tmp_path):
+    path = str(spring(tmp_path))
+    one = {"replaces": "controller", "path": path}
+    for tables, message in (
+        ([{**one, "replaces": "controler"}], "no block 'controler'; did you mean 'controller'"),
+        ([{**one, "name": "mine"}], "'mine': it has that of controller"),
+        ([{**one, "replaces": "hand_left"}], "no block 'hand_left'"),
+        ([one, one], "'controller' is taken"),
+    ):
+        options = [text for table in tables for text in overrides.written({"fmu.+": table})]
+        with pytest.raises(SceneFault, match=message):
+            hl.scene("closed-loop", options)
+    with pytest.raises(SceneFault) as raised:  # as it was typed
         hl.scene("closed-loop", Changes(swap=["controler=/missing.fmu"]).options)
     said = "--swap controler=/missing.fmu: fmu[0]"
     assert f"{said}.path: there is no file" in str(raised.value)
     assert f"{said}.replaces: no block 'controler'" in str(raised.value)
-
-
-def test_two_in_one_place_are_refused(tmp_path):
-    file = str(spring(tmp_path))
-    one = f'fmu.+={{ replaces = "controller", path = "{file}" }}'
-    with pytest.raises(SceneFault, match="'controller' is taken"):
-        hl.scene("closed-loop", [one, one])
 
 
 def test_info_does_not_run_another_s_mechanism(tmp_path, capsys):

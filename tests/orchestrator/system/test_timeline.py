@@ -23,15 +23,15 @@ from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks, timeline
 from tests.orchestrator.foreign_fmus import edited, fmu_table, python_fmu, scene, wire_table
-from tests.orchestrator.timelines import CAUSAL, LOOP, scene_of, scenes
-from tests.shared_fixtures import status
+from tests.orchestrator.timelines import CAUSAL, LOOP, fixed, scene_of, scenes, varying
 
 Make = Callable[[Timeline, str], System]
 
 
 @given(scenes())
 def test_every_fmu_steps_at_the_times_that_its_rate_and_phase_say(scene):
-    time = timeline(scene)
+    """Those that step together share a clock."""
+    time, pace = timeline(scene), {}
     haptic = 1 / exact(scene.haptics.rate)
     for fmu in scene.fmu:
         at = [start * time.base for start in time.clock(time.of[fmu.name]).starts]
@@ -47,36 +47,38 @@ def test_every_fmu_steps_at_the_times_that_its_rate_and_phase_say(scene):
             period = haptic if fmu.rate == "haptics" else 1 / exact(fmu.rate)
             first = exact(scene.phases.get(fmu.name, str(period)))
             assert at[1:] == [first + k * period for k in range(len(at) - 1)]
-
-
-@given(scenes())
-def test_fmus_share_a_clock_where_they_step_together(scene):
-    of, time = clocks(scene).of, timeline(scene)
-    pace = {}
-    for fmu in scene.fmu:
-        period = None
-        rate = scene.haptics.rate if fmu.rate == "haptics" else fmu.rate
-        if not isinstance(rate, VariableRate | tuple):
-            period, rate = 1 / exact(rate), exact(rate)
-        pace[fmu.name] = rate, exact(scene.phases.get(fmu.name, str(period))) if period else None
+            pace[fmu.name] = period, first
+        pace.setdefault(fmu.name, fmu.rate)
+    of = clocks(scene).of
     for a, b in combinations(LOOP, 2):
         assert (of[a] == of[b]) == (pace[a] == pace[b])
     assert all(re.fullmatch(r"[\w.+-]+", clock.name) for clock in time.clocks)
 
 
+RATES = dict.fromkeys(("device", "controller"), "haptics") | {
+    "mechanism": "1000/3", "hand": VariableRate(min=10, max=60, seed=5), "graphics": 30,
+}  # fmt: skip
+SHARES = {"controller": Fraction(1, 4), "mechanism": Fraction(2, 3), "graphics": Fraction(1, 7)}
+TIMELINES = {
+    "60": fixed(Fraction(512), Fraction(60), 256),
+    "24 on ticks": fixed(Fraction(512), Fraction(24), 256, "tick"),
+    "variable": varying(Fraction(512), Fraction(10), Fraction(60), 7, 256),
+    "five clocks": timeline(scene_of(Fraction(512), 200, RATES, SHARES)),
+}
+
+
 @pytest.mark.parametrize("coupling", CAUSAL)
-def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(stamped, tmp_path, coupling):
-    rates = dict.fromkeys(("device", "controller"), "haptics") | {"mechanism": "1000/3"}
-    rates |= {"hand": VariableRate(min=10, max=60, seed=5), "graphics": 30}
-    shares = {"controller": Fraction(1, 4), "mechanism": Fraction(2, 3), "graphics": Fraction(1, 7)}
-    time = timeline(scene_of(Fraction(512), 200, rates, shares))
+@pytest.mark.parametrize("name", TIMELINES)
+def test_what_the_plan_says_is_what_the_fmus_see(stamped, tmp_path, name, coupling):
+    """What it may say is in plan/test_plan.py."""
+    time = TIMELINES[name]
     system = stamped(time, coupling)
     assert run(Plan(system), RunFolder(tmp_path)).fault is None
     tables = {c.name: read_table(tmp_path / f"{c.name}.csv") for c in time.clocks}
-    assert len(tables) == 5
+    assert len(tables) == (5 if name == "five clocks" else 2)
     said = list(uses(Plan(system)))
     for c in system.connections:
-        seen = tables[time.of[c.target]][f"{c.target}.seen_{c.target_port}"]
+        seen = tables[system.fmu[c.target].clock][f"{c.target}.seen_{c.target_port}"]
         stamps = [time.seconds(use.stamp) for use in said if use.connection == c.name]
         if not system.fmu[c.target].sampled:  # a row holds what the step that ends there has read
             stamps = [0.0, *stamps]
@@ -84,6 +86,7 @@ def test_what_the_plan_says_of_several_clocks_is_what_the_fmus_see(stamped, tmp_
     for clock in time.clocks:
         at = [time.seconds(start) for start in clock.starts if start <= time.end]
         np.testing.assert_array_equal(tables[clock.name]["time"], at)
+    np.testing.assert_array_equal(tables["haptics"]["device.stamp"], tables["haptics"]["time"])
 
 
 def pair(folder: Path, gives: str, takes: str) -> Path:
@@ -114,17 +117,6 @@ def test_rates_of_an_fmu_are_what_graphics_takes(tmp_path):
     np.testing.assert_array_equal(seen, newest)
     by_list = simulate(str(path), tmp_path / "again", ["fmu.gives.rate=[0.1, 0.26, 0.5]"])
     assert by_list.results.tables.keys() == found.tables.keys()
-
-
-def test_variable_rates_of_fmus_survive_an_ssp(tmp_path):
-    path = pair(tmp_path, "{ min = 8, max = 32, seed = 3 }", "[0.125, 0.3, 0.5]")
-    assert status("export", path, "--out", tmp_path) == 0
-    found = simulate(str(path), tmp_path / "a").results
-    simulate(str(tmp_path / "scene.ssp"), tmp_path / "b")
-    assert set(found.tables) == {"haptics", "8to32hz_seed3", "times_of_takes"}
-    for table in found.tables:
-        a, b = ((tmp_path / run / f"{table}.csv").read_bytes() for run in "ab")
-        assert a == b
 
 
 @pytest.mark.parametrize(
