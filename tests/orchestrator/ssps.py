@@ -3,7 +3,7 @@
 import zipfile
 from pathlib import Path
 
-from tests.orchestrator.foreign_fmus import python_fmu, with_units
+from tests.orchestrator.foreign_fmus import edited_entries, python_fmu, with_units
 
 HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <ssd:SystemStructureDescription version="1.0" name="nested"
@@ -115,6 +115,29 @@ def ssp(folder: Path, root: str, tail: str = TAIL, **entries: str | bytes) -> st
 
 
 ON = bindings(binding(values(("on", "true"))))
+GIVES = connectors(y="output mm") + bindings(binding(about='source="resources/a.ssv"'))
+FOREIGN = system(
+    "top",
+    "",
+    component("a b", "Gives", GIVES) + component("c", "Takes", connectors(u="input") + ON),
+    line("a b.y", "c.u", "2.0 1.0"),
+)
+UNTIMED = "</ssd:SystemStructureDescription>"
+
+
+def foreign(folder: Path, old: str = "", new: str = "") -> str:
+    """An SSP without times: `a b` gives 500 mm, `c` takes twice that in m, plus 1. Of its
+    description, `new` stands for `old`."""
+    path = ssp(folder, FOREIGN, UNTIMED, a_ssv=values(("gain", "0.5")))
+    name = "SystemStructure.ssd"
+
+    def change(all_: dict[str, bytes]) -> dict[str, bytes]:
+        assert old.encode() in all_[name]
+        return all_ | {name: all_[name].replace(old.encode(), new.encode()) if old else all_[name]}
+
+    return str(edited_entries(Path(path), change))
+
+
 TABLE = (
     '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
     "</ssc:BooleanMappingTransformation>"

@@ -41,11 +41,6 @@ def varying(haptics: Fraction, low: Fraction, high: Fraction, seed: int, steps: 
     )
 
 
-def single(rate: int, steps: int) -> Timeline:
-    base = Fraction(1, rate)
-    return Timeline(base, steps, (Clock("haptics", periodic(base, base, steps)),))
-
-
 LOOP = ("device", "controller", "hand", "mechanism", "graphics")
 """The FMUs of the loop of stamps (conftest)."""
 

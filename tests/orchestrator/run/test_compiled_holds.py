@@ -4,14 +4,13 @@ agree to rounding, since Python takes the eigenvectors of LAPACK."""
 import ctypes
 import subprocess
 import sys
+from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
@@ -43,44 +42,47 @@ def seconds(ticks: float) -> float:
     return ticks * NUMERATOR / DENOMINATOR
 
 
-def loop_over(values: NDArray[np.float64]) -> Any:
-    """The structure of a loop without operations."""
-    return structures.Loop(values=values.ctypes.data, numerator=NUMERATOR, denominator=DENOMINATOR)
+def delayed(hold: Hold) -> Late:
+    latency = Latency(min=0.001, max=0.02, loss=0.2, seed=5)
+    return Late(hold, Link(latency, Fraction(NUMERATOR, DENOMINATOR)))
 
 
-class Pair:
-    """A hold in Python and the same in C."""
+class Twins:
+    """The hold that `make` gives, of so many entries in samples of a width, and the same in C."""
 
-    def __init__(self, name: str, wrapped: str, generator: np.random.Generator) -> None:
-        self.signals = Signals()
-        self.position = list(range(2 * SIZE, 3 * SIZE))
-        self.velocity = list(range(3 * SIZE, 4 * SIZE))
-        moves = bool(generator.integers(2))  # whether the target has its velocity as an output
-        self.python, own = (self._made(name, wrapped, moves) for _ in range(2))
-        self._loop = loop_over(self.signals.values)
+    def __init__(
+        self, make: Callable[[], Hold], size: int, width: int = 0, signals: Signals | None = None
+    ) -> None:
+        self.python, own = make(), make()
+        self._values = signals.values if signals else np.zeros(size)
+        self._loop = structures.Loop(
+            values=self._values.ctypes.data, numerator=NUMERATOR, denominator=DENOMINATOR
+        )
         tank = getattr(parts(own).own, "tank", None)
-        shared = CompiledTank(tank) if tank else None
-        twice = HOLDS[name].needs in ("derivative", "integral")
-        self.width = SIZE * (1 + twice)
-        held, loop = np.zeros(SIZE), ctypes.addressof(self._loop)
-        places = range(self.width)
-        self.compiled = CompiledHold(load(), loop, own, places, held, shared)
+        shared, places = CompiledTank(tank) if tank else None, range(width or size)
+        loop = ctypes.addressof(self._loop)
+        self.compiled = CompiledHold(load(), loop, own, places, np.zeros(size), shared)
+        self.holds = self.python, self.compiled
 
-    def _made(self, name: str, wrapped: str, moves: bool) -> Hold:
-        reader = Reader(self.signals, self.position, np.ones(SIZE))
-        turns, sampled = np.array([0.0, 0.0, 2 * np.pi * (wrapped == "angle")]), wrapped == "late"
-        near = NearEnd(reader, turns, 0.02, seconds, reader if moves else None, sampled)
-        tank = EnergyTank(np.array([40.0, 3.0, 7.0]), np.full(SIZE, 0.5), near)
-        needed = (tank, 0) if HOLDS[name].needs == "spring" else None
-        scale = np.array([2.0, -1.0, 0.5])
-        x, v = (Reader(self.signals, at, scale) for at in (self.position, self.velocity))
-        context = HoldContext(SIZE, seconds, x, v if moves else None, needed)
-        if wrapped == "angle":
-            return Unwrapped(lambda: HOLDS[name](context), [0, 2], [2 * np.pi, 360.0])
-        if wrapped == "late":
-            latency = Latency(min=0.001, max=0.02, loss=0.2, seed=5)
-            return Late(HOLDS[name](context), Link(latency, Fraction(NUMERATOR, DENOMINATOR)))
-        return HOLDS[name](context)
+    def same(self, tick: int, ahead: float) -> bool:
+        """To the bit."""
+        expected = np.array(self.python.value(tick, ahead), copy=True)
+        return self.compiled.value(tick, ahead).tobytes() == expected.tobytes()
+
+
+def made(name: str, wrapped: str, moves: bool, signals: Signals) -> Hold:
+    """moves: whether the target has its velocity as an output."""
+    position, velocity = ([*range(i * SIZE, (i + 1) * SIZE)] for i in (2, 3))
+    reader = Reader(signals, position, np.ones(SIZE))
+    turns, sampled = np.array([0.0, 0.0, 2 * np.pi * (wrapped == "angle")]), wrapped == "late"
+    near = NearEnd(reader, turns, 0.02, seconds, reader if moves else None, sampled)
+    tank = EnergyTank(np.array([40.0, 3.0, 7.0]), np.full(SIZE, 0.5), near)
+    needed = (tank, 0) if HOLDS[name].needs == "spring" else None
+    x, v = (Reader(signals, at, np.array([2.0, -1.0, 0.5])) for at in (position, velocity))
+    context = HoldContext(SIZE, seconds, x, v if moves else None, needed)
+    if wrapped == "angle":
+        return Unwrapped(lambda: HOLDS[name](context), [0, 2], [2 * np.pi, 360.0])
+    return delayed(HOLDS[name](context)) if wrapped == "late" else HOLDS[name](context)
 
 
 def _counted(hold: Hold) -> list[float]:
@@ -96,23 +98,23 @@ def _counted(hold: Hold) -> list[float]:
 @given(st.integers(0, 2**32 - 1))
 def test_holds_in_c_are_those_in_python(name, wrapped, seed):
     generator = np.random.default_rng(seed)
-    pair = Pair(name, wrapped, generator)
-    holds = (pair.python, pair.compiled)
+    signals, moves = Signals(), bool(generator.integers(2))
+    width = SIZE * (1 + (HOLDS[name].needs in ("derivative", "integral")))
+    pair = Twins(lambda: made(name, wrapped, moves, signals), SIZE, width, signals)
     tick, stamp = 0, 0
     for step in range(60):
-        sample = generator.normal(size=pair.width) * 10.0 ** generator.integers(-3, 4)
-        pair.signals.values[2 * SIZE :] = generator.normal(size=2 * SIZE)
+        sample = generator.normal(size=width) * 10.0 ** generator.integers(-3, 4)
+        signals.values[2 * SIZE :] = generator.normal(size=2 * SIZE)
         if step == 0 or generator.random() < 0.7:
-            for hold in holds:
+            for hold in pair.holds:
                 hold.push(stamp, sample, tick)
         for ahead in (0.0, float(generator.integers(1, 40)) / 2):
-            expected = np.array(pair.python.value(tick, ahead), copy=True)
-            assert pair.compiled.value(tick, ahead).tobytes() == expected.tobytes()
+            assert pair.same(tick, ahead)
         tick += int(generator.integers(0, 30))
         stamp = int(generator.integers(stamp, tick + 1)) if generator.random() < 0.8 else stamp
     assert _counted(pair.compiled) == _counted(pair.python)
     if wrapped == "late":
-        ways = [hold.link for hold in (pair.python, pair.compiled)]
+        ways = [hold.link for hold in pair.holds]
         counts = [(way.sent, way.lost, way.overtaken) for way in ways]
         assert counts[0] == counts[1]
 
@@ -124,44 +126,34 @@ def test_a_long_path_is_added_up_in_the_same_order(name, size):
     for each sample, which comes 13 of them late; the force works against a motion at about 1 m/s,
     so that the friction is within its limits."""
     generator, signals = np.random.default_rng(1), Signals()
-
-    def made():
-        x, v = (Reader(signals, [*range(i, i + size)], np.ones(size)) for i in (SIZE, 2 * SIZE))
-        return HOLDS[name](HoldContext(size, seconds, x, v))
-
-    loop = loop_over(signals.values)
-    python, held = made(), np.zeros(size)
-    compiled = CompiledHold(load(), ctypes.addressof(loop), made(), range(size), held)
+    readers = (Reader(signals, [*range(i, i + size)], np.ones(size)) for i in (SIZE, 2 * SIZE))
+    context = HoldContext(size, seconds, *readers)
+    pair = Twins(lambda: HOLDS[name](context), size, signals=signals)
     for tick in range(400):
         speed = 1.0 + 0.1 * generator.normal(size=SIZE)
         signals.values[SIZE : 2 * SIZE] += speed * seconds(1)
         signals.values[2 * SIZE : 3 * SIZE] = speed
         if tick % 20 == 0:
             sample = -3.0 + np.cos(tick) + np.zeros(size)
-            for hold in (python, compiled):
+            for hold in pair.holds:
                 hold.push(max(tick - 13, 0), sample, tick)
-        expected = np.array(python.value(tick, 0.5), copy=True)
-        assert compiled.value(tick, 0.5).tobytes() == expected.tobytes()
+        assert pair.same(tick, 0.5)
 
 
 MATRICES = [*HOLDS.names(lambda kind: kind in KINDS and not kind.needs and not kind.gives_samples)]
 
 
-def both(
+def matrices(
     wrap: type[Projector | Semidefinite], name: str, rows: int, late: bool = False
-) -> tuple[Hold, Hold, Any]:
-    """A hold of matrices in Python and in C, and what the latter needs to live."""
-    size, latency = rows * rows, Latency(min=0.001, max=0.02, loss=0.2, seed=5)
+) -> Twins:
+    """Holds of matrices."""
+    size = rows * rows
 
-    def made() -> Hold:
+    def make() -> Hold:
         hold = wrap(lambda: HOLDS[name](HoldContext(size, seconds)), size)
-        return Late(hold, Link(latency, Fraction(NUMERATOR, DENOMINATOR))) if late else hold
+        return delayed(hold) if late else hold
 
-    values, held = np.zeros(size), np.zeros(size)
-    loop = loop_over(values)
-    python, own = made(), made()
-    compiled = CompiledHold(load(), ctypes.addressof(loop), own, range(size), held)
-    return python, compiled, (loop, values, held)
+    return Twins(make, size)
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -173,13 +165,12 @@ def test_holds_of_matrices_in_c_are_those_in_python(name, wrap, late, seed, rows
     """To the rounding errors of the matrix whose eigenvalues are taken. A projector has more of
     them the closer the smallest eigenvalue that it keeps is to the largest that it drops."""
     generator = np.random.default_rng(seed)
-    *holds, _living = both(wrap, name, rows, late)
-    python = parts(holds[0]).matrix
-    assert python
+    pair = matrices(wrap, name, rows, late)
+    python = parts(pair.python).matrix
     tick, rank = 0, rows
 
     def compare(tick, ahead):
-        expected, found = (np.array(hold.value(tick, ahead)) for hold in holds)
+        expected, found = (np.array(hold.value(tick, ahead)) for hold in pair.holds)
         atol = 1e-8
         if isinstance(python, Semidefinite):
             outer = np.outer(python._scale, python._scale).ravel()
@@ -194,7 +185,7 @@ def test_holds_of_matrices_in_c_are_those_in_python(name, wrap, late, seed, rows
         if wrap is Projector:
             basis = np.linalg.qr(root)[0]
             sample = basis @ basis.T
-        for hold in holds:
+        for hold in pair.holds:
             hold.push(tick, sample.ravel(), tick)
         for ahead in (0.0, float(generator.integers(1, 40)) / 2):
             compare(tick, ahead)
@@ -210,17 +201,19 @@ def test_a_matrix_without_negative_eigenvalues_stays_as_it_is(seed, n, power):
     basis = np.linalg.qr(generator.normal(size=(n, n)))[0]
     eigenvalues = generator.choice([0.0, 1.0, 1.0, 3.0, abs(generator.normal())], n) * 10.0**power
     matrix = (basis * eigenvalues @ basis.T).ravel()
-    _, compiled, _living = both(Semidefinite, "zoh", n)
-    compiled.push(0, matrix, 0)
-    assert np.abs(compiled.value(0) - matrix).max() <= 1e-13 * max(np.abs(matrix).max(), 1e-300)
+    pair = matrices(Semidefinite, "zoh", n)
+    pair.compiled.push(0, matrix, 0)
+    assert np.abs(pair.compiled.value(0) - matrix).max() <= 1e-13 * max(
+        np.abs(matrix).max(), 1e-300
+    )
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 6])
 def test_diagonal_projectors_stay_as_they_are(n):
-    _, compiled, _living = both(Projector, "lead", n)
+    pair = matrices(Projector, "lead", n)
     diagonal = np.diag(np.arange(n) % 2 == 0).astype(float).ravel()
-    compiled.push(0, diagonal, 0)
-    assert compiled.value(0).tobytes() == diagonal.tobytes()
+    pair.compiled.push(0, diagonal, 0)
+    assert pair.compiled.value(0).tobytes() == diagonal.tobytes()
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
@@ -228,11 +221,11 @@ def test_diagonal_projectors_stay_as_they_are(n):
 def test_what_is_no_projector_has_a_rank_within_its_rows(name):
     """Of traces that are negative, or beyond the largest integer of C, or overflow."""
     generator, rows = np.random.default_rng(4), 3
-    *holds, _living = both(Projector, name, rows)
+    pair = matrices(Projector, name, rows)
     for tick, scale in enumerate([1.0, 1e20, -1e20, 1e308, -1e308, 5e-324, 0.0, 7.0]):
         sample = scale * np.where(np.eye(rows) > 0, 1.0, generator.uniform(-1, 1, (rows, rows)))
         ranks = []
-        for hold in holds:
+        for hold in pair.holds:
             hold.push(9 * tick, sample.ravel(), 9 * tick)
             value = hold.value(9 * tick)
             ranks.append(round(value[:: rows + 1].sum()) if np.isfinite(value).all() else None)

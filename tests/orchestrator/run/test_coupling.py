@@ -111,7 +111,7 @@ def test_what_was_iterated_is_counted(fmus, tmp_path):
 
 
 def test_it_reads_the_future_and_says_so(fmus):
-    plan = Plan(iterated(fmus, UNTIL, "foh"))
+    plan = Plan(system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh"))
     assert all(use.stamp == use.tick + 1 for use in uses(plan))
 
 

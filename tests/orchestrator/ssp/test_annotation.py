@@ -12,7 +12,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.foreign_fmus import edited, edited_entries, python_fmu
-from tests.orchestrator.ssp.test_ssp import FOREIGN, foreign
+from tests.orchestrator.ssps import foreign
 
 RUN = {"duration": 0.2, "haptics": {"rate": 50}}
 
@@ -23,7 +23,7 @@ def annotated(folder: Path, content: Any) -> str:
         '<ssd:Annotations><ssc:Annotation type="hapticlink.run"><h:Scene '
         f'xmlns:h="urn:hapticlink:run">{escape(text)}</h:Scene></ssc:Annotation></ssd:Annotations>'
     )
-    return foreign(folder, FOREIGN.replace("</ssd:System>", f"</ssd:System>{annotation}"))
+    return foreign(folder, "</ssd:System>", f"</ssd:System>{annotation}")
 
 
 def test_an_annotation_says_rates(tmp_path):
@@ -84,6 +84,6 @@ def test_a_step_size_that_is_none_is_asked_for(tmp_path, step):
 
 @pytest.mark.parametrize("name", ["martian", "idna", "shift_jis", "utf-7", "hex"])
 def test_encodings_that_are_none(tmp_path, name):
-    path = foreign(tmp_path, FOREIGN.replace('encoding="UTF-8"', f'encoding="{name}"'))
+    path = foreign(tmp_path, 'encoding="UTF-8"', f'encoding="{name}"')
     with pytest.raises(InputFault, match="is not well-formed XML"):
         open_scene.load(path)

@@ -12,7 +12,6 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.faults import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
-from tests.orchestrator.fmi.test_archives import SSD
 from tests.orchestrator.foreign_fmus import (
     PAIR,
     c_fmu3,
@@ -24,6 +23,7 @@ from tests.orchestrator.foreign_fmus import (
     with_units,
 )
 from tests.orchestrator.results.records import tables_of
+from tests.orchestrator.ssps import foreign
 from tests.orchestrator.system.test_timeline import pair
 from tests.shared_fixtures import sets, status
 
@@ -107,36 +107,6 @@ def test_a_gain_that_is_held_comes_back(tmp_path):
     assert found.haptics["takes.y"][-1] == pytest.approx(1 + 2 * (100 + 400 * (last - 0.5 / 64)))
 
 
-LINE = '<ssd:Connection startElement="a b" startConnector="y" endElement="c" endConnector="u"{}>'
-FOREIGN = SSD.replace(
-    '<ssd:Component name="a" source="resources/a.fmu"/>\n</ssd:Elements>',
-    """<ssd:Component name="a b" source="resources/Gives.fmu"><ssd:Connectors>
-<ssd:Connector name="y" kind="output"><ssc:Real unit="mm"/></ssd:Connector></ssd:Connectors>
-<ssd:ParameterBindings><ssd:ParameterBinding source="resources/a.ssv"/></ssd:ParameterBindings>
-</ssd:Component>
-<ssd:Component name="c" source="resources/Takes.fmu"><ssd:Connectors>
-<ssd:Connector name="u" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors></ssd:Component>
-</ssd:Elements><ssd:Connections>"""
-    + LINE.format("")
-    + '<ssc:LinearTransformation factor="2.0" offset="1.0"/></ssd:Connection></ssd:Connections>',
-)
-SSV = """<ssv:ParameterSet version="1.0" name="p"
- xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"><ssv:Parameters>
-<ssv:Parameter name="gain"><ssv:Real value="0.5"/></ssv:Parameter></ssv:Parameters>
-</ssv:ParameterSet>"""
-
-
-def foreign(folder: Path, text: str = FOREIGN) -> str:
-    with_units(python_fmu(folder, "Gives", "self.y = 1000.0 * self.gain"), y="mm")
-    with_units(python_fmu(folder, "Takes", "self.y = self.u"), u="m")
-    with zipfile.ZipFile(folder / "their.ssp", "w") as archive:
-        archive.writestr("SystemStructure.ssd", text)
-        archive.writestr("resources/a.ssv", SSV)
-        for name in ("Gives.fmu", "Takes.fmu"):
-            archive.write(folder / name, f"resources/{name}")
-    return str(folder / "their.ssp")
-
-
 def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path):
     options = ["haptics.rate=50", "duration=0.2", "fmu.c.rate=25"]
     ended = simulate(foreign(tmp_path), tmp_path / "out", options)
@@ -148,10 +118,8 @@ def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path):
 
 def test_version_2_in_the_namespaces_of_1_is_read(tmp_path):
     """As OMSimulator writes it."""
-    head, version, rest = FOREIGN.rpartition('version="1.0"')
-    text = f'{head}version="2.0"{rest}'
-    assert version
-    ended = simulate(foreign(tmp_path, text), tmp_path / "out", ["haptics.rate=50", "duration=0.2"])
+    path = foreign(tmp_path, 'version="1.0" name', 'version="2.0" name')
+    ended = simulate(path, tmp_path / "out", ["haptics.rate=50", "duration=0.2"])
     np.testing.assert_allclose(ended.results.haptics["c.y"][-1], 2.0, rtol=1e-15)
 
 
@@ -175,7 +143,7 @@ def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path):
 )  # fmt: skip
 def test_what_cannot_be_read_is_refused(tmp_path, old, new, message):
     with pytest.raises(InputFault, match=message):
-        open_scene.load(foreign(tmp_path, FOREIGN.replace(old, new)))
+        open_scene.load(foreign(tmp_path, old, new))
 
 
 def test_with_the_cache_off_no_folder_stays(tmp_path):

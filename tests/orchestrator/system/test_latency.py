@@ -1,6 +1,5 @@
 """Latency and loss: no sample is used before it has arrived, and seeds are reproducible."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
@@ -9,7 +8,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.stamps import uses
@@ -23,7 +21,6 @@ from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.plan.test_plan import timelines
 from tests.orchestrator.timelines import CAUSAL, fixed
 
-Make = Callable[[Timeline, str], System]
 LATE = "graphics.stamp -> controller.g"
 
 

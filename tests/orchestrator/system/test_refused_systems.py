@@ -56,8 +56,8 @@ REFUSED = {
     ],
     "pendulum": [
         ("coupling=iterated", "'iterated' repeats the steps of connected plants"),
-        ("linkage.joint.0.friction_speed=1e-6; duration=0.01", "too fast for steps of 0.00"),
-        ("linkage.joint.0.friction_speed=1e-6; duration=0.01", "`friction_speed` or "),
+        ("linkage.joint.0.friction_speed=1e-6; duration=0.01", "virtual_mechanism: the "
+         "`friction_speed` or `friction_deflection` of a joint is too fast for steps of 0.00"),
     ],
 }  # fmt: skip
 
@@ -71,4 +71,5 @@ def test_what_is_refused(tmp_path, scene, options, message):
     with pytest.raises(InputFault) as refused:
         simulate(scene, tmp_path / "out", options.split("; "))
     assert message in str(refused.value)
+    assert "--set" in str(refused.value) or message.startswith("virtual_mechanism: ")
     assert "2 faults" not in str(refused.value) or options in SEVERAL

@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Callable
 from fractions import Fraction
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 from hypothesis import given
 
 from hapticlink.orchestrator.base.faults import SceneFault
-from hapticlink.orchestrator.base.ticks import Timeline, exact
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.stamps import uses
@@ -20,12 +19,9 @@ from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.rates import VariableRate
-from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import clocks, timeline
 from tests.orchestrator.foreign_fmus import edited, fmu_table, python_fmu, scene, wire_table
 from tests.orchestrator.timelines import CAUSAL, LOOP, fixed, scene_of, scenes, varying
-
-Make = Callable[[Timeline, str], System]
 
 
 @given(scenes())
