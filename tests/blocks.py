@@ -7,6 +7,8 @@ import numpy as np
 
 from hapticlink.components.blocks import virtual_environment as environment_block
 from hapticlink.components.blocks import virtual_mechanism as mechanism_block
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import Mechanism
 
 
 def once(build):
@@ -103,6 +105,14 @@ class Running:
             self.t += part
 
 
+def running(linkage, contacts=None, directions=None, *, step_s=1e-3, frame_s=None, **mechanism):
+    """The mechanism of a linkage; it detects its contacts itself, if these do not say otherwise."""
+    if contacts is not None:
+        contacts = Contacts(**({"detection": "haptics"} | contacts))
+    settings, places = Mechanism(**mechanism), {"step_s": step_s, "frame_s": frame_s}
+    return Running(virtual_mechanism(linkage, settings, directions, contacts, **places))
+
+
 def advance(block, t_end, rate=500):
     """`block` after steps at a rate (Hz) over t_end."""
     for _ in range(round(t_end * rate)):
@@ -114,6 +124,14 @@ def state_after(block, rate, t_end):
     """The coordinates and velocities after these steps."""
     state = advance(block, t_end, rate).state
     return np.concatenate([state["q"], state["qd"]])
+
+
+RATES = (500, 1000, 2000, 4000)
+
+
+def order(errors, rates=RATES):
+    """By how much log error falls with log rate: the observed order of a method."""
+    return -np.polyfit(np.log(rates), np.log(errors), 1)[0]
 
 
 def _on_own_memory(function):
