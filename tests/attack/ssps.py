@@ -8,18 +8,17 @@ from __future__ import annotations
 import json
 import random
 import re
-import tempfile
 import zipfile
 from collections.abc import Iterator
 from html import escape, unescape
 from io import BytesIO
-from pathlib import Path
 from xml.etree import ElementTree
 
 import hapticlink as hl
 from tests.attack import mutations
 from tests.attack.cases import Made, command
 from tests.attack.commands import Place
+from tests.attack.processes import own_folder
 
 SCENES = ("pendulum", "sampled-spring", "closed-loop")
 KINDS = ("bytes", "text", "elements", "annotation", "description")
@@ -114,13 +113,12 @@ def changed(kind: str, content: bytes, draw: random.Random) -> bytes:
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     draw = random.Random(seed)
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+    with own_folder() as folder:
         whole = [
-            hl.export(name, {"duration": 0.05}, out=Path(folder) / f"{name}.ssp").read_bytes()
+            hl.export(name, {"duration": 0.05}, out=folder / f"{name}.ssp").read_bytes()
             for name in SCENES
         ]
-        place = Place(Path(folder))
-        path = Path(folder) / "attack.ssp"
+        place, path = Place(folder), folder / "attack.ssp"
         for i in range(number):
             kind, which = KINDS[i % len(KINDS)], draw.randrange(len(SCENES))
             path.write_bytes(changed(kind, whole[which], draw))
