@@ -127,9 +127,6 @@ def _pulse(block: Block, inside: ca.SX, v: ca.SX) -> tuple[ca.SX, dict[str, ca.S
     strength = -p["pulse"] * ca.fmax(v, 0.0) / (samples * p[STEP_SIZE])
     force = ca.if_else(begun, strength, x["pulse_force"])
     left = ca.if_else(begun, samples, x["samples_left"])
-    states = {
-        "inside": inside,
-        "pulse_force": force,
-        "samples_left": ca.fmax(left - 1.0, 0.0),
-    }
+    after = ca.fmax(left - 1.0, 0.0)
+    states = {"inside": inside, "pulse_force": force, "samples_left": after}
     return ca.if_else(left > 0.0, force, 0.0), states

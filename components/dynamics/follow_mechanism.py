@@ -65,8 +65,7 @@ def step(block: Block, model: LinkageModel, copy: GraphicsCopy) -> tuple[ca.SX, 
 
 
 def _exact(block: Block, model: LinkageModel) -> tuple[ca.SX, ca.SX]:
-    n = model.q.numel()
-    reference = LinkageModel(model.linkage, block.p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
+    reference = LinkageModel.symbolic(model.linkage, block.p)
     project = projection(reference, TreeInertia(reference))
     closed, rate = project(block.u["q_ref"], block.u["qd_ref"], block.p.vector)
     return closed, rate
@@ -81,8 +80,8 @@ def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX,
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
         K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
-        held = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
-        solver = ClosedLoopSolver(TreeInertia(model, held), model.W, rows(model.linkage), MU)
+        added = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
+        solver = ClosedLoopSolver(TreeInertia(model, added), model.W, rows(model.linkage), MU)
         pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)
     momentum = D.apply(qd) + h * (pull - model.C_qd)
