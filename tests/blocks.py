@@ -50,12 +50,14 @@ class Running:
         return np.concatenate([np.zeros(0), *parts])
 
     def set(self, **inputs):
+        """Sets inputs, and returns the block."""
         offset = 0
         for v in self.component.inputs:
             if v.name in inputs:
                 self.u[offset : offset + v.size] = np.ravel(inputs.pop(v.name))
             offset += v.size
         assert not inputs, inputs
+        return self
 
     def _named(self, variables, flat):
         named, offset = {}, 0
@@ -70,12 +72,14 @@ class Running:
         return self._named(self.component.states, self.x)
 
     def put(self, **states):
+        """Replaces states, and returns the block."""
         offset = 0
         for v in self.component.states:
             if v.name in states:
                 self.x[offset : offset + v.size] = np.ravel(states.pop(v.name))
             offset += v.size
         assert not states, states
+        return self
 
     @property
     def y(self):
@@ -127,6 +131,12 @@ def state_after(block, rate, t_end):
 
 
 RATES = (500, 1000, 2000, 4000)
+
+
+def errors(start, exact, t_end, rates=RATES, of=slice(None)):
+    """The largest error of the coordinates and velocities `of` the block that `start` begins anew,
+    at t_end, with steps at each of the rates."""
+    return [np.abs((state_after(start(), rate, t_end) - exact)[of]).max() for rate in rates]
 
 
 def order(errors, rates=RATES):

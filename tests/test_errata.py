@@ -29,8 +29,7 @@ def model(q, qd=QD):
 @pytest.fixture(scope="module")
 def at():
     """The mechanism's outputs and its terms at a moving, assembled pose."""
-    block = running(five_bar(f=F_CM), directions=Directions())
-    block.put(qd=QD)
+    block = running(five_bar(f=F_CM), directions=Directions()).put(qd=QD)
     block.set(F_hand=F)
     q = block.state["q"]
     return block.y | model(q) | {"q": q}
@@ -151,8 +150,7 @@ def test_appendix_a_centres_of_mass(at):
     """r_cm,2 and r_cm,4 print (1 - f_i) where Jacobians and D have f_i."""
     printed = tuple(1 - f if i in (1, 3) else f for i, f in enumerate(F_CM))
     only_first(appendix_a.r_h(at["q"], L, F_CM), appendix_a.r_h(at["q"], L, printed), at["x"])
-    wrong = running(five_bar(f=printed))
-    wrong.put(q=at["q"], qd=QD)
+    wrong = running(five_bar(f=printed)).put(q=at["q"], qd=QD)
     wrong.set(F_hand=F)
     assert not close(wrong.y["qdd"], at["qdd"], 1e-3)
 
@@ -180,8 +178,7 @@ def test_appendix_a_w_has_two_rows(at):
 def test_without_w_stab_the_closure_drifts(kind):
     """(B.17) has no w_stab: with none the loop opens, with (B.15)'s it stays closed."""
     euler = {"integrator": "semi-implicit-euler", "stabilization": kind}
-    block = running(five_bar(), step_s=1 / 512, **euler)
-    block.set(F_hand=F)
+    block = running(five_bar(), step_s=1 / 512, **euler).set(F_hand=F)
     assert (advance(block, 3.0, 512).y["closure_error"] > 1e-3 * min(L)) == (kind == "none")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from hapticlink.components.specs.linkage import Loop
 from hapticlink.orchestrator import open_scene
-from tests.blocks import running
+from tests.blocks import advance, running
 from tests.reference.absolute_coordinates import Absolute
 
 H = 1 / 512
@@ -54,8 +54,7 @@ def test_motion_is_that_in_absolute_coordinates(name):
     found = undriven(name)
     block = running(found, step_s=H, integrator="dormand-prince-8")
     q0, qd0, begin = block.y["q"], block.y["qd"], float(block.y["energy"])
-    for _ in range(128):
-        block.step(H)
+    advance(block, 128 * H, 512)
     q, gained = Absolute(found, q0, qd0).joints(128 * H)
     assert abs(gained) < 1e-10
     assert np.abs(block.y["q"] - q0).max() > 0.05

@@ -48,8 +48,7 @@ def test_report_gains_are_stable_at_any_graphics_rate(rate, substeps):
 def followed(copy, rate):
     """(mechanism, its outputs when the frame began) after each frame of 3 s in which the copy
     follows the mechanism alone, which is then at the end of the frame."""
-    leader = running(five_bar())
-    leader.set(F_hand=WRENCH)
+    leader = running(five_bar()).set(F_hand=WRENCH)
     for k in range(1, 3 * rate + 1):
         began = leader.y
         signals = {f"{name}_ref": began[name] for name in ("x", "v", "q", "qd")}

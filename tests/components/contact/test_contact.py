@@ -172,8 +172,7 @@ def test_the_hand_feels_what_all_contacts_do_at_the_operational_point():
     along = link4(q, 1.0) - link4(q, 0.0)
     normal = np.array([-along[1], along[0]]) / np.linalg.norm(along)
     disc = Disc(center=tuple(link4(q, 0.4) - 0.0125 * normal), radius=0.01)
-    five = running(shaped(), {"disc": (disc,)})
-    five.put(q=q)
+    five = running(shaped(), {"disc": (disc,)}).put(q=q)
     force = 15000 * 0.0005 * normal
     assert five.y["contact_gap"] == pytest.approx(-0.0005, abs=1e-12)
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from hapticlink.components.blocks import mechanism_steps
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.contacts import Disc
-from tests.blocks import RATES, order, running, state_after
+from tests.blocks import RATES, errors, order, running, state_after
 from tests.components import appendix_a
 from tests.components.appendix_a import L
 from tests.components.contact import piecewise
@@ -33,15 +34,15 @@ def restitution(mass):
 def test_speed_after_a_damped_impact_has_the_order_of_the_method(method, worst):
     """A ball at 1 m/s on a damped wall, which it meets at any part of a step."""
     ball, exact = running(loose(POINT), FLOOR, integrator=method), restitution(MASS)
-    rates, errors = RATES[:2] if method == "dormand-prince-8" else RATES, []
+    rates, largest = RATES[:2] if method == "dormand-prince-8" else RATES, []
     for rate in rates:
         found = []
         for share in np.linspace(0, 1, 8)[:-1]:
             ball.put(q=(0.0, R + 0.02 + share / rate, 0.3), qd=(0.0, -1.0, 0.0))
             found.append(state_after(ball, rate, 0.1)[4] - exact)
-        errors.append(np.abs(found).max())
-    assert order(errors, rates) > METHODS[method].order - 0.3
-    assert errors[1] < worst
+        largest.append(np.abs(found).max())
+    assert order(largest, rates) > METHODS[method].order - 0.3
+    assert largest[1] < worst
 
 
 def bar(y, F):
@@ -84,9 +85,9 @@ def test_a_bar_that_lands_on_both_ends(tilt):
     """At once, and one after the other."""
     exact, events = landed(tilt)
     assert events == 4
-    errors = [np.abs(state_after(landing(tilt), rate, LANDED) - exact)[3:].max() for rate in RATES]
-    assert order(errors) > 3.5
-    assert errors[1] < 1e-4
+    found = errors(lambda: landing(tilt), exact, LANDED, of=slice(3, None))
+    assert order(found) > 3.5
+    assert found[1] < 1e-4
 
 
 def test_more_events_in_a_step_than_are_located():
@@ -94,8 +95,8 @@ def test_more_events_in_a_step_than_are_located():
     tilt = 4e-4 / LENGTH
     exact, _ = landed(tilt)
     for events, least, most in ((0, 1e-3, 0.1), (1, 2e-4, 0.1), (2, 0.0, 1e-4)):
-        bar = landing(tilt, events=events)
-        error = np.abs(state_after(bar, 1000, LANDED) - exact)[3:].max()
+        bar = partial(landing, tilt, events=events)
+        (error,) = errors(bar, exact, LANDED, [1000], slice(3, None))
         assert least < error < most, events
 
 
@@ -138,12 +139,8 @@ def test_a_linkage_with_a_loop_that_is_thrown_on_a_disc():
     assert events >= 2
     contacts = {"disc": (Disc(center=tuple(center), radius=0.01),)}
     contacts |= {"stiffness": SOFT, "damping": LOSSY}
-    errors = []
-    for rate in RATES:
-        five = running(linkage, contacts)
-        five.set(F_hand=wrench)
-        errors.append(np.abs(state_after(five, rate, t_end) - exact).max())
-    assert order(errors) > 3.5
+    found = errors(lambda: running(linkage, contacts).set(F_hand=wrench), exact, t_end)
+    assert order(found) > 3.5
 
 
 def test_a_scene_without_contacts_pays_nothing():

@@ -251,8 +251,7 @@ def test_a_linkage_with_a_loop_slides_and_sticks():
     """The five-bar under a wrench, and once it is gone."""
     linkage = five_bar()
     linkage = replace(linkage, joint=tuple(replace(j, friction=5e-3) for j in linkage.joint))
-    five = running(linkage)
-    five.set(F_hand=(-0.5, 0.3, 0.0))
+    five = running(linkage).set(F_hand=(-0.5, 0.3, 0.0))
     advance(five, 0.2, 2000)
     assert np.abs(five.state["qd"]).max() > 0.5
     five.set(F_hand=(0.0, 0.0, 0.0))

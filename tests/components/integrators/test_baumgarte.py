@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 from hapticlink.components.integrators import METHODS
-from tests.blocks import Running, running
+from tests.blocks import Running, advance, running
 from tests.mechanisms import WRENCH, five_bar
 
 RATE = 512
@@ -46,9 +46,7 @@ def closure_after(component, steps):
     block = Running(component)
     block.put(q=block.state["q"] + (1e-6, 0, 0, 0))
     with np.errstate(all="ignore"):
-        for _ in range(steps):
-            block.step(1 / RATE)
-        return block.y["closure_error"]
+        return advance(block, steps / RATE, RATE).y["closure_error"]
 
 
 @pytest.mark.parametrize("beta", [0.5, 1.0])

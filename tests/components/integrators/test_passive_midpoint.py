@@ -18,7 +18,7 @@ from hapticlink.components.specs.drives import ConstantDrive, ProfileDrive
 from hapticlink.components.specs.linkage import Body, Spring
 from hapticlink.orchestrator.open_scene import load
 from tests import blocks
-from tests.blocks import Running
+from tests.blocks import Running, advance
 from tests.mechanisms import five_bar, linkages, one_body, terms
 
 
@@ -99,8 +99,7 @@ def test_neither_do_contacts_limits_and_further_hands(scene):
 def test_a_drive_may_put_energy_in(drive):
     """A constant torque on an axle: its work, and no more."""
     block = running(one_body(Body(name="disc", mass=1.0, inertia=0.5), drive=drive))
-    for _ in range(20):
-        block.step(0.05)
+    advance(block, 1.0, 20)
     assert block.y["energy"] == pytest.approx(0.5 * 0.5 * 4.0**2, rel=1e-12)  # w = 2 t/.5, t = 1
 
 
@@ -176,9 +175,8 @@ def test_any_method_may_use_the_terms_of_a_mechanism_and_count(monkeypatch):
     monkeypatch.setitem(METHODS, "counting", Counting())
     linkage = replace(five_bar(), start_velocity={"shoulder1": 4.0, "shoulder2": -2.0})
     own, counting = running(linkage), running(linkage, integrator="counting")
-    for _ in range(20):
-        own.step(0.01)
-        counting.step(0.01)
+    for block in (own, counting):
+        advance(block, 0.2, 100)
     assert counting.y["steps"] == counting.state["steps"] == 20
     assert np.abs(own.state["qd"]).max() > 1
     np.testing.assert_array_equal(counting.x[:8], own.x[:8])
