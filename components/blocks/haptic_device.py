@@ -57,12 +57,10 @@ _TUNABLE = (
 )
 
 
+_POWER = Power("x_true")
 _INPUTS = [
-    Variable(name, (3,), WRENCH, description=text, power=Power("x_true"))
-    for name, text in (
-        ("F_motor", "desired wrench of the motors"),
-        ("F_hand", "wrench of the hand on the handle"),
-    )
+    Variable("F_motor", (3,), WRENCH, 0.0, "desired wrench of the motors", power=_POWER),
+    Variable("F_hand", (3,), WRENCH, 0.0, "wrench of the hand on the handle", power=_POWER),
 ]
 _OUTPUTS = [
     Variable("x", (3,), POSE, description="measured pose of the handle"),

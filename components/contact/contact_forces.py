@@ -50,18 +50,15 @@ def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
 
 def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
     """Parameters of the block that evaluates the contact forces."""
+    laws = (
+        ("k_contact", "N/m", contacts.stiffness, "stiffness of a contact"),
+        ("b_contact", "N.s/m", contacts.damping, "damping of a contact"),
+        ("mu_contact", "1", contacts.friction, "friction of a contact"),
+    )
     return [
         *detection_parameters(linkage, contacts, contacts.detection == "haptics"),
-        Variable("k_contact", (), "N/m", contacts.stiffness, "stiffness of a contact"),
-        Variable("b_contact", (), "N.s/m", contacts.damping, "damping of a contact"),
-        *_friction(contacts),
+        *(Variable(name, (), unit, v, text) for name, unit, v, text in laws if v is not None),
     ]
-
-
-def _friction(contacts: Contacts) -> list[Variable]:
-    if contacts.friction is None:
-        return []
-    return [Variable("mu_contact", (), "1", contacts.friction, "friction of a contact")]
 
 
 def lag(h: ca.SX) -> ca.SX:
