@@ -165,6 +165,11 @@ KINDS: dict[str, tuple[Callable[[Maker], bytes], bool]] = {
 checksum is right is code that anything may come of."""
 
 
+def entries(content: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
 def zipped(entries: Entries, further: Sequence[tuple[str | zipfile.ZipInfo, bytes]] = ()) -> bytes:
     """`further` come after the entries, under names that may be there already or be no names."""
     file = io.BytesIO()
@@ -183,13 +188,12 @@ def attack(number: int, seed: int) -> Iterator[cases.Made]:
         (folder / "cases").mkdir()
         place, outside = Place(folder / "cases"), folder / "outside"
         outside.mkdir()
-        with zipfile.ZipFile(build(sample_components.spring(), folder)) as archive:
-            entries = {n: archive.read(n) for n in archive.namelist()}
+        good = entries(build(sample_components.spring(), folder).read_bytes())
         scene = folder / "scene.toml"
         for i, case, draw in cases.seeded(number, seed):
             kind = [*KINDS][i % len(KINDS)]
             make, isolate = KINDS[kind]
-            maker = Maker(entries, outside, draw)
+            maker = Maker(good, outside, draw)
             (folder / "model.fmu").write_bytes(make(maker))
             scene.write_text(SCENE.format(isolate=str(isolate).lower()))
             there = _there(folder)

@@ -8,14 +8,13 @@ from __future__ import annotations
 import json
 import random
 import re
-import zipfile
 from collections.abc import Iterator
 from html import escape, unescape
-from io import BytesIO
 from xml.etree import ElementTree
 
 import hapticlink as hl
 from tests.attack import mutations
+from tests.attack.archives import entries, zipped
 from tests.attack.cases import Made, command
 from tests.attack.commands import Place
 from tests.attack.processes import own_folder
@@ -29,19 +28,6 @@ XML = (
     *("4294967297", "2147483649", "9" * 5000, "x" * 5000, "../../etc/passwd", "/etc/passwd"),
 )
 """Words that hurt where an attribute or some text stands."""
-
-
-def entries(content: bytes) -> dict[str, bytes]:
-    with zipfile.ZipFile(BytesIO(content)) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
-
-
-def packed(files: dict[str, bytes]) -> bytes:
-    made = BytesIO()
-    with zipfile.ZipFile(made, "w") as archive:
-        for name, content in files.items():
-            archive.writestr(name, content)
-    return made.getvalue()
 
 
 def elements(text: bytes, draw: random.Random) -> bytes:
@@ -105,10 +91,10 @@ def changed(kind: str, content: bytes, draw: random.Random) -> bytes:
         inside = entries(files[name])
         change = draw.choice((text, elements))
         inside[DESCRIPTION] = change(inside[DESCRIPTION], draw)
-        files[name] = packed(inside)
+        files[name] = zipped(inside)
     else:
         files[STRUCTURE] = CHANGES[kind](files[STRUCTURE], draw)
-    return packed(files)
+    return zipped(files)
 
 
 def attack(number: int, seed: int) -> Iterator[Made]:
