@@ -119,6 +119,11 @@ class Signals(Mapping[str, ca.SX]):
             self._by_name[v.name] = flat
             offset += v.size
 
+    @property
+    def starts(self) -> list[float]:
+        """The start values of all variables, in the order of `vector`."""
+        return [value for variable in self.variables for value in variable.starts]
+
     def define(self, name: str, value: ca.SX) -> None:
         """Gives a name to an expression of these symbols. Raises ValueError for one that is
         taken."""
@@ -253,12 +258,12 @@ class Block:
         again would take most of the time to build a large graph. Raises ValueError where names or
         shapes do not match the declared variables.
         """
-        x, u, p, t, h = self.x.vector, self.u.vector, self.p.vector, self.t, self.h
+        x, u, p, *_ = arguments = [self.x.vector, self.u.vector, self.p.vector, self.t, self.h]
         x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)
         is_memory = [v.name in memory for v in self.x.variables for _ in range(v.size)]
-        without_memory = ca.vertcat(*(x[i] if held else x1[i] for i, held in enumerate(is_memory)))
-        once, options = {"cse": not shared}, {"cse": True}
-        names = ["x", "u", "p", "t", "h"]
+        without_memory = ca.vertcat(*(x[i] if kept else x1[i] for i, kept in enumerate(is_memory)))
+        x0, y = pack(self.x.variables, initial), pack(self.outputs, output)
+        once, names = {"cse": not shared}, ["x", "u", "p", "t", "h"]
         return Component(
             name=name,
             description=description,
@@ -267,20 +272,11 @@ class Block:
             parameters=self.p.variables,
             states=self.x.variables,
             outputs=self.outputs,
-            initialize=ca.Function(
-                "initialize", [u, p], [pack(self.x.variables, initial)], ["u", "p"], ["x0"], once
-            ),
-            step=ca.Function("step", [x, u, p, t, h], [x1], names, ["x1"], once),
-            output=ca.Function(
-                "output",
-                [x, u, p, t],
-                [pack(self.outputs, output)],
-                ["x", "u", "p", "t"],
-                ["y"],
-                options,
-            ),
+            initialize=ca.Function("initialize", [u, p], [x0], ["u", "p"], ["x0"], once),
+            step=ca.Function("step", arguments, [x1], names, ["x1"], once),
+            output=ca.Function("output", arguments[:4], [y], names[:4], ["y"], {"cse": True}),
             substeps=substeps,
-            substep=ca.Function("substep", [x, u, p, t, h], [without_memory], names, ["x1"], once)
+            substep=ca.Function("substep", arguments, [without_memory], names, ["x1"], once)
             if substeps > 1 and memory
             else None,
             documentation=documentation,

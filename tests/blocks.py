@@ -7,6 +7,8 @@ import numpy as np
 
 from hapticlink.components.blocks import virtual_environment as environment_block
 from hapticlink.components.blocks import virtual_mechanism as mechanism_block
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.linkage import Mechanism
 
 
 def once(build):
@@ -48,12 +50,14 @@ class Running:
         return np.concatenate([np.zeros(0), *parts])
 
     def set(self, **inputs):
+        """Sets inputs, and returns the block."""
         offset = 0
         for v in self.component.inputs:
             if v.name in inputs:
                 self.u[offset : offset + v.size] = np.ravel(inputs.pop(v.name))
             offset += v.size
         assert not inputs, inputs
+        return self
 
     def _named(self, variables, flat):
         named, offset = {}, 0
@@ -68,12 +72,14 @@ class Running:
         return self._named(self.component.states, self.x)
 
     def put(self, **states):
+        """Replaces states, and returns the block."""
         offset = 0
         for v in self.component.states:
             if v.name in states:
                 self.x[offset : offset + v.size] = np.ravel(states.pop(v.name))
             offset += v.size
         assert not states, states
+        return self
 
     @property
     def y(self):
@@ -103,6 +109,14 @@ class Running:
             self.t += part
 
 
+def running(linkage, contacts=None, directions=None, *, step_s=1e-3, frame_s=None, **mechanism):
+    """The mechanism of a linkage; it detects its contacts itself, if these do not say otherwise."""
+    if contacts is not None:
+        contacts = Contacts(**({"detection": "haptics"} | contacts))
+    settings, places = Mechanism(**mechanism), {"step_s": step_s, "frame_s": frame_s}
+    return Running(virtual_mechanism(linkage, settings, directions, contacts, **places))
+
+
 def advance(block, t_end, rate=500):
     """`block` after steps at a rate (Hz) over t_end."""
     for _ in range(round(t_end * rate)):
@@ -114,6 +128,20 @@ def state_after(block, rate, t_end):
     """The coordinates and velocities after these steps."""
     state = advance(block, t_end, rate).state
     return np.concatenate([state["q"], state["qd"]])
+
+
+RATES = (500, 1000, 2000, 4000)
+
+
+def errors(start, exact, t_end, rates=RATES, of=slice(None)):
+    """The largest error of the coordinates and velocities `of` the block that `start` begins anew,
+    at t_end, with steps at each of the rates."""
+    return [np.abs((state_after(start(), rate, t_end) - exact)[of]).max() for rate in rates]
+
+
+def order(errors, rates=RATES):
+    """By how much log error falls with log rate: the observed order of a method."""
+    return -np.polyfit(np.log(rates), np.log(errors), 1)[0]
 
 
 def _on_own_memory(function):

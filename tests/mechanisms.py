@@ -1,6 +1,7 @@
-"""Linkages that tests share: the report's five-bar, and random ones."""
+"""Linkages that tests share: one body, a four-bar, the report's five-bar, and random ones."""
 
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -43,24 +44,69 @@ def five_bar(l=TABLE_6_1["l"], m=TABLE_6_1["m"], I=TABLE_6_1["I"], f=(0.5,) * 4,
 
 def open_arm(linkage):
     """The same tree with its loops left open."""
+    return replace(linkage, loop=())
+
+
+def one_body(body, at=None, start=None, rate=None, gravity=None, spring=(), **joint):
+    """A body on a joint called `joint`, held by the hand at a point of it."""
     return Linkage(
-        body=linkage.body,
-        joint=linkage.joint,
-        operational_point=linkage.operational_point,
-        start=linkage.start,
+        body=(body,),
+        joint=(Joint(name="joint", child=body.name, **joint),),
+        operational_point=OperationalPoint(body=body.name, at=at),
+        gravity=gravity,
+        spring=spring,
+        start={} if start is None else {"joint": start},
+        start_velocity={} if rate is None else {"joint": rate},
     )
 
 
+def rod(name, length, mass=1.0):
+    """A uniform rod from the origin of its frame along x."""
+    return Body(name=name, mass=mass, inertia=mass * length**2 / 12, center=(length / 2, 0.0))
+
+
+def four_bar(masses=(1.0, 1.0, 1.0), cut="middle", rate=None):
+    """Crank .2, coupler .5, rocker .4, ground .5 m, of uniform rods under gravity; `rate` is the
+    crank's. The cut joint is between coupler and rocker, or at the rocker's pivot on the ground."""
+    lengths = {"crank": 0.2, "coupler": 0.5, "rocker": 0.4}
+    crank = Joint(name="crank", child="crank")
+    elbow = Joint(name="elbow", parent="crank", child="coupler", at_parent=(0.2, 0.0))
+    if cut == "middle":
+        last = Joint(name="rocker", child="rocker", at_parent=(0.5, 0.0))
+        loop = Loop(bodies=("coupler", "rocker"), at=((0.5, 0.0), (0.4, 0.0)))
+    else:
+        last = Joint(name="rocker", parent="coupler", child="rocker", at_parent=(0.5, 0.0))
+        loop = Loop(bodies=("rocker", "ground"), at=((0.4, 0.0), (0.5, 0.0)))
+    return Linkage(
+        body=tuple(rod(*of, mass) for of, mass in zip(lengths.items(), masses, strict=True)),
+        joint=(crank, elbow, last),
+        loop=(loop,),
+        gravity=(0.0, -9.81),
+        operational_point=OperationalPoint(body="coupler", at=(0.25, 0.0)),
+        start={"crank": 1.0, "elbow": -0.6, "rocker": 1.5 if cut == "middle" else -2.0},
+        start_velocity={} if rate is None else {"crank": rate},
+    )
+
+
+def evaluated(linkage, expressions, *sizes):
+    """(q, qd, *more, of=linkage) -> the values of `expressions(model, *symbols)`, of the symbolic
+    model of a linkage and further symbols of these sizes; `of` is a linkage of the same structure
+    whose parameters are taken."""
+    p, n = Signals("p", parameters(linkage)), sum({"free": 3}.get(j.type, 1) for j in linkage.joint)
+    q, qd, more = ca.SX.sym("q", n), ca.SX.sym("qd", n), [ca.SX.sym("u", *s) for s in sizes]
+    found = expressions(LinkageModel(linkage, p, q, qd), *more)
+    f = ca.Function("f", [q, qd, *more, p.vector], list(found))
+
+    def values(q, qd, *more, of=linkage):
+        starts = [s for v in parameters(of) for s in v.starts]
+        return [np.array(a) for a in f.call([ca.DM(v) for v in (q, qd, *more, starts)])]
+
+    return values
+
+
 def terms(linkage, *names):
-    """Numpy-valued terms of a linkage at (q, qd), with its own parameter values."""
-    variables = parameters(linkage)
-    p = Signals("p", variables)
-    n = sum({"free": 3}.get(j.type, 1) for j in linkage.joint)
-    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    model = LinkageModel(linkage, p, q, qd)
-    f = ca.Function("f", [q, qd, p.vector], [getattr(model, name) for name in names])
-    values = [s for v in variables for s in v.starts]
-    return lambda q, qd: [np.array(a) for a in f.call([ca.DM(q), ca.DM(qd), ca.DM(values)])]
+    """NumPy-valued terms of a linkage at (q, qd), with its own parameter values."""
+    return evaluated(linkage, lambda model: [getattr(model, name) for name in names])
 
 
 @st.composite

@@ -8,16 +8,15 @@ test_controller.py, (B.14)'s rows of U in test_constrained_directions.py.
 import numpy as np
 import pytest
 
-from hapticlink.components.specs.linkage import Directions, Mechanism
-from tests.blocks import Running, virtual_mechanism
+from hapticlink.components.specs.linkage import Directions
+from tests.blocks import advance, running
 from tests.components import appendix_a
-from tests.mechanisms import Q0, TABLE_6_1, WRENCH, five_bar, open_arm, terms
+from tests.components.appendix_a import L
+from tests.mechanisms import Q0, WRENCH, five_bar, open_arm, terms
 
-L = TABLE_6_1["l"]
 F_CM = (0.3, 0.6, 0.45, 0.7)  # not 1/2: f and 1 - f must differ
 F = np.array(WRENCH)
-RNG = np.random.default_rng(3)
-QD = RNG.uniform(-3, 3, 4)
+QD = np.random.default_rng(3).uniform(-3, 3, 4)
 MODEL = terms(five_bar(f=F_CM), "D", "C_qd", "W", "w", "J_h", "h")
 
 
@@ -30,9 +29,7 @@ def model(q, qd=QD):
 @pytest.fixture(scope="module")
 def at():
     """The mechanism's outputs and its terms at a moving, assembled pose."""
-    component = virtual_mechanism(five_bar(f=F_CM), Mechanism(), Directions(), step_s=1 / 512)
-    block = Running(component)
-    block.put(qd=QD)
+    block = running(five_bar(f=F_CM), directions=Directions()).put(qd=QD)
     block.set(F_hand=F)
     q = block.state["q"]
     return block.y | model(q) | {"q": q}
@@ -79,24 +76,16 @@ def test_coriolis_terms_have_the_rate_of_the_mass_matrix(at):
 
 def test_last_sign_of_the_christoffel_symbols(at):
     """(2.11), (2.12): the last sign is -; with the printed + Ddot - 2C is not skew."""
-    dD = slopes(D, at["q"])
+    dD = np.array(slopes(D, at["q"]))
 
     def C(sign):
-        return np.array(
-            [
-                [
-                    sum(
-                        0.5 * (dD[i][k, j] + dD[j][k, i] + sign * dD[k][i, j]) * QD[i]
-                        for i in range(4)
-                    )
-                    for j in range(4)
-                ]
-                for k in range(4)
-            ]
-        )
+        """sum over i of (dD_kj/dq_i + dD_ki/dq_j + sign dD_ij/dq_k) qd_i / 2."""
+        first, second, last = ("ikj,i->kj", "jki,i->kj", "kij,i->kj")
+        parts = np.einsum(first, dD, QD) + np.einsum(second, dD, QD)
+        return 0.5 * (parts + sign * np.einsum(last, dD, QD))
 
     only_first(C(-1) @ QD, C(+1) @ QD, at["C_qd"], 1e-7)
-    Ddot = sum(dD[i] * QD[i] for i in range(4))
+    Ddot = np.einsum("ikj,i->kj", dD, QD)
     assert close(Ddot - 2 * C(-1), -(Ddot - 2 * C(-1)).T)
     assert not close(Ddot - 2 * C(+1), -(Ddot - 2 * C(+1)).T, 1e-3)
 
@@ -119,14 +108,8 @@ ALPHA, BETA = 40.0, 0.7
 
 def closing(at, qd):
     """(hddot, hdot, h) of the Baumgarte-stabilised mechanism, off its closure."""
-    component = virtual_mechanism(
-        five_bar(f=F_CM),
-        Mechanism(
-            integrator="semi-implicit-euler", stabilization="baumgarte", alpha=ALPHA, beta=BETA
-        ),
-        step_s=1 / 512,
-    )
-    block = Running(component)
+    euler = {"integrator": "semi-implicit-euler", "stabilization": "baumgarte"}
+    block = running(five_bar(f=F_CM), **euler, alpha=ALPHA, beta=BETA)
     q = at["q"] + np.array([1e-3, -2e-3, 0, 0])
     block.put(q=q, qd=qd)
     block.set(F_hand=F)
@@ -151,7 +134,7 @@ def test_baumgarte_damps_the_closure_rate(at):
 def test_mobility_of_the_open_chain(at):
     """(5.4) prints J' D^-1 J' for J D^-1 J'; (5.6) prints D for D^-1."""
     arm = open_arm(five_bar(f=F_CM))
-    y = Running(virtual_mechanism(arm, Mechanism(), Directions(), step_s=1 / 512)).y
+    y = running(arm, directions=Directions()).y
     J_h, D = model(y["q"])["J_h"], model(y["q"])["D"]
     only_first(J_h @ np.linalg.inv(D) @ J_h.T, J_h @ D @ J_h.T, y["Lambda_inv"])
 
@@ -167,8 +150,7 @@ def test_appendix_a_centres_of_mass(at):
     """r_cm,2 and r_cm,4 print (1 - f_i) where Jacobians and D have f_i."""
     printed = tuple(1 - f if i in (1, 3) else f for i, f in enumerate(F_CM))
     only_first(appendix_a.r_h(at["q"], L, F_CM), appendix_a.r_h(at["q"], L, printed), at["x"])
-    wrong = Running(virtual_mechanism(five_bar(f=printed), Mechanism(), step_s=1 / 512))
-    wrong.put(q=at["q"], qd=QD)
+    wrong = running(five_bar(f=printed)).put(q=at["q"], qd=QD)
     wrong.set(F_hand=F)
     assert not close(wrong.y["qdd"], at["qdd"], 1e-3)
 
@@ -195,14 +177,9 @@ def test_appendix_a_w_has_two_rows(at):
 @pytest.mark.parametrize("kind", ["none", "baumgarte"])
 def test_without_w_stab_the_closure_drifts(kind):
     """(B.17) has no w_stab: with none the loop opens, with (B.15)'s it stays closed."""
-    component = virtual_mechanism(
-        five_bar(), Mechanism(integrator="semi-implicit-euler", stabilization=kind), step_s=1 / 512
-    )
-    block = Running(component)
-    block.set(F_hand=F)
-    for _ in range(1536):
-        block.step(1 / 512)
-    assert (block.y["closure_error"] > 1e-3 * min(L)) == (kind == "none")
+    euler = {"integrator": "semi-implicit-euler", "stabilization": kind}
+    block = running(five_bar(), step_s=1 / 512, **euler).set(F_hand=F)
+    assert (advance(block, 3.0, 512).y["closure_error"] > 1e-3 * min(L)) == (kind == "none")
 
 
 def gap(lengths):

@@ -43,16 +43,14 @@ def _virtual_mechanism(
 ) -> Component:
     from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 
-    return virtual_mechanism(
-        linkage,
-        mechanism,
-        directions,
-        contacts,
-        length_scale=length_scale,
-        frame_s=FRAME if local_model else None,
-        felt=felt,
-        users=users,
-    )
+    frame_s = FRAME if local_model else None
+    options: dict[str, Any] = {
+        "length_scale": length_scale,
+        "frame_s": frame_s,
+        "felt": felt,
+        "users": users,
+    }
+    return virtual_mechanism(linkage, mechanism, directions, contacts, **options)
 
 
 def _virtual_environment(
@@ -66,15 +64,8 @@ def _virtual_environment(
 ) -> Component:
     from hapticlink.components.blocks.virtual_environment import virtual_environment
 
-    return virtual_environment(
-        linkage,
-        graphics,
-        directions,
-        contacts,
-        mobility=mobility,
-        local_model=local_model,
-        users=users,
-    )
+    options: dict[str, Any] = {"mobility": mobility, "local_model": local_model, "users": users}
+    return virtual_environment(linkage, graphics, directions, contacts, **options)
 
 
 def _haptic_device(device: Device, encoders: bool = False) -> Component:
@@ -87,10 +78,8 @@ def _controller(controller: Controller, linkage: Linkage, directions: Directions
     from hapticlink.components.blocks import controller as block
     from hapticlink.components.linkage.parameters import mean_link_length
 
-    length_scale = directions.length_scale
-    if length_scale is None:
-        length_scale = mean_link_length(linkage)
-    return block.controller(controller, length_scale)
+    given = directions.length_scale
+    return block.controller(controller, mean_link_length(linkage) if given is None else given)
 
 
 def _hand(hand: Hand) -> Component:

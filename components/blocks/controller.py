@@ -42,33 +42,25 @@ _DRIFT = Spring("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_dr
 
 def _signals(spec: Controller, law: Topology | None) -> list[Variable]:
     """The inputs that the chosen parts need."""
-    coupled = bool(spec.teleoperation or law)
-    needed = {
-        Variable("x_S", (3,), POSE, description="pose of the operational point"): coupled,
-        Variable("v_S", (3,), TWIST, description="velocity of the operational point"): coupled,
-        Variable("x_D", (3,), POSE, description="pose of the handle"): (
-            coupled or spec.stiffness is not None or bool(spec.passivity)
-        ),
-        Variable("v_D", (3,), TWIST, description="velocity of the handle"): (
-            coupled or spec.damping is not None
-        ),
-        Variable("F_hand", (3,), WRENCH, description="wrench of the hand"): spec.impedance,
-        Variable("F_env", (3,), WRENCH, description="wrench of contacts and others"): spec.contact,
-        Variable("M", (3, 3), INERTIA, IDENTITY, "inertia of the device"): bool(
-            spec.impedance or law or spec.passivity
-        ),
-        Variable(
-            "c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms of the device"
-        ): spec.impedance,
-        Variable(
-            "Lambda_inv", (3, 3), MOBILITY, IDENTITY, "mobility at the operational point"
-        ): spec.impedance,
-        Variable("P_c", (3, 3), description="projector on the constrained directions"): bool(law),
-        Variable(
-            "a_bias", (3,), ACCELERATION, description="operational acceleration at zero wrench"
-        ): spec.bias == "full",
-    }
-    return [variable for variable, wanted in needed.items() if wanted]
+    coupled, shaped = bool(spec.teleoperation or law), spec.impedance
+    posed = coupled or spec.stiffness is not None or bool(spec.passivity)
+    inertial = bool(shaped or law or spec.passivity)
+    coriolis = "C_d v, Coriolis and centrifugal terms of the device"
+    bias = "operational acceleration at zero wrench"
+    rows = (
+        ("x_S", (3,), POSE, 0.0, "pose of the operational point", coupled),
+        ("v_S", (3,), TWIST, 0.0, "velocity of the operational point", coupled),
+        ("x_D", (3,), POSE, 0.0, "pose of the handle", posed),
+        ("v_D", (3,), TWIST, 0.0, "velocity of the handle", coupled or spec.damping is not None),
+        ("F_hand", (3,), WRENCH, 0.0, "wrench of the hand", shaped),
+        ("F_env", (3,), WRENCH, 0.0, "wrench of contacts and others", spec.contact),
+        ("M", (3, 3), INERTIA, IDENTITY, "inertia of the device", inertial),
+        ("c", (3,), WRENCH, 0.0, coriolis, shaped),
+        ("Lambda_inv", (3, 3), MOBILITY, IDENTITY, "mobility at the operational point", shaped),
+        ("P_c", (3, 3), "1", 0.0, "projector on the constrained directions", bool(law)),
+        ("a_bias", (3,), ACCELERATION, 0.0, bias, spec.bias == "full"),
+    )
+    return [Variable(*declared) for *declared, needed in rows if needed]
 
 
 def _gains(spec: Controller, law: Topology | None, length_scale: float) -> list[Variable]:
@@ -173,8 +165,6 @@ def _wrenches(spec: Controller, law: Topology | None, block: Block) -> dict[str,
         motor = u["M"] @ a + u["c"] - u["F_hand"]
     if law:
         pull = p["k_j"] * (u["x_S"] - u["x_D"]) + p["b_j"] * (u["v_S"] - u["v_D"])
-        output["F_constraint"] = topology.constraint_wrench(
-            pull, u["M"], u["P_c"], p["length_scale"]
-        )
-        motor += output["F_constraint"]
+        F_T = topology.constraint_wrench(pull, u["M"], u["P_c"], p["length_scale"])
+        output["F_constraint"], motor = F_T, motor + F_T
     return output | {"F_motor": motor}

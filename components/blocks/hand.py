@@ -6,6 +6,8 @@ plant with F(t_{k+1}) at the end of its step. F acts with + on the handle.
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 
 from hapticlink.components import integrators, time_signals
@@ -17,14 +19,33 @@ from hapticlink.components.component import (
     WRENCH,
     Block,
     Component,
+    Timing,
     Variable,
 )
 from hapticlink.components.paths import signal
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
+from hapticlink.components.time_signals import TimeSignal
 
 _F = Variable("F", (3,), WRENCH, description="wrench of the hand on the handle")
 _X = Variable("x", (3,), POSE, description="pose of the handle")
 _V = Variable("v", (3,), TWIST, description="velocity of the handle")
+
+
+def _hand(
+    block: Block, kind: str, timing: Timing, F: ca.SX, signals: list[TimeSignal], **dynamics: Any
+) -> Component:
+    """The hand with the output F; dynamics: `initial` and `step` of one that has states."""
+    states = {"initial": {}, "step": {}} | dynamics
+    text, documentation = f"Hand: {kind}", hand.__doc__ or ""
+    return block.component(
+        "hand",
+        text,
+        timing,
+        output={"F": F},
+        documentation=documentation,
+        signals=signals,
+        **states,
+    )
 
 
 def _wrench(spec: ConstantHand | ProfileHand) -> Component:
@@ -35,7 +56,7 @@ def _wrench(spec: ConstantHand | ProfileHand) -> Component:
     if spec.damping is not None:
         inputs += [_V]
         parameters += [Variable("damping", (3,), DAMPING, spec.damping, "damping to ground")]
-    block, signals = Block(inputs=inputs, parameters=parameters, outputs=[_F]), []
+    block, signals = Block(inputs=inputs, parameters=parameters, outputs=[_F]), list[TimeSignal]()
     if isinstance(spec, ConstantHand):
         F, kind = block.p["wrench"], "a constant wrench"
     else:
@@ -43,16 +64,7 @@ def _wrench(spec: ConstantHand | ProfileHand) -> Component:
         F, kind = signals[0].value(block.t), "a wrench over time"
     if spec.damping is not None:
         F = F - block.p["damping"] * block.u["v"]
-    return block.component(
-        "hand",
-        f"Hand: {kind}",
-        "sampled",
-        initial={},
-        step={},
-        output={"F": F},
-        documentation=hand.__doc__ or "",
-        signals=signals,
-    )
+    return _hand(block, kind, "sampled", F, signals)
 
 
 def _arm(spec: ArmHand) -> Component:
@@ -81,16 +93,10 @@ def _arm(spec: ArmHand) -> Component:
     pull = p["stiffness"] * (target - x["x_arm"]) + p["damping"] * (target_rate - x["v_arm"])
     ode = block.ode({"x_arm": x["v_arm"], "v_arm": (pull - F) / p["mass"]}, over)
     given = ca.vertcat(u.vector, time_signals.over(signals, t, block.h))
-    return block.component(
-        "hand",
-        "Hand: an arm behind a grip",
-        spec.timing,
-        initial={"x_arm": u["x"], "v_arm": u["v"]},
-        step=integrators.step("rk4", ode, x.vector, given, p.vector, t, block.h, [0, 1, 2]),
-        output={"F": F},
-        documentation=hand.__doc__ or "",
-        signals=signals,
-    )
+    initial = {"x_arm": u["x"], "v_arm": u["v"]}
+    step = integrators.step("rk4", ode, x.vector, given, p.vector, t, block.h, [0, 1, 2])
+    kind = "an arm behind a grip"
+    return _hand(block, kind, spec.timing, F, signals, initial=initial, step=step)
 
 
 def _spring(spec: SpringHand) -> Component:
@@ -111,16 +117,7 @@ def _spring(spec: SpringHand) -> Component:
     F = block.p["stiffness"] * (target - block.u["x"])
     if damped:
         F += block.p["damping"] * (rate - block.u["v"])
-    return block.component(
-        "hand",
-        "Hand: a spring to a target path",
-        spec.timing,
-        initial={},
-        step={},
-        output={"F": F},
-        documentation=hand.__doc__ or "",
-        signals=signals,
-    )
+    return _hand(block, "a spring to a target path", spec.timing, F, signals)
 
 
 def hand(spec: Hand) -> Component:

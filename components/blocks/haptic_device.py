@@ -57,35 +57,26 @@ _TUNABLE = (
 )
 
 
+_POWER = Power("x_true")
 _INPUTS = [
-    Variable(name, (3,), WRENCH, description=text, power=Power("x_true"))
-    for name, text in (
-        ("F_motor", "desired wrench of the motors"),
-        ("F_hand", "wrench of the hand on the handle"),
-    )
+    Variable("F_motor", (3,), WRENCH, 0.0, "desired wrench of the motors", power=_POWER),
+    Variable("F_hand", (3,), WRENCH, 0.0, "wrench of the hand on the handle", power=_POWER),
 ]
 _OUTPUTS = [
     Variable("x", (3,), POSE, description="measured pose of the handle"),
     Variable("v", (3,), TWIST, description="measured velocity of the handle", derivative_of="x"),
     Variable("F_hand_observed", (3,), WRENCH, description="observed wrench of the hand"),
-    Variable(
-        "M",
-        (3, 3),
-        INERTIA,
-        description="inertia of the device at the handle",
-        kind="semidefinite",
-    ),
+    Variable("M", (3, 3), INERTIA, 0.0, "inertia of the device at the handle", kind="semidefinite"),
     Variable("c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms at the handle"),
     Variable(
         "workspace_margin",
         (),
         "m",
-        description="smallest distance of an arm to a stop, negative beyond it",
+        0.0,
+        "smallest distance of an arm to a stop, negative beyond it",
     ),
     Variable("x_true", (3,), POSE, description="true pose of the handle"),
-    Variable(
-        "v_true", (3,), TWIST, description="true velocity of the handle", derivative_of="x_true"
-    ),
+    Variable("v_true", (3,), TWIST, 0.0, "true velocity of the handle", derivative_of="x_true"),
 ]
 _STATES = [
     Variable("x_true", (3,), POSE, description="pose of the handle"),
@@ -132,11 +123,11 @@ def _plant(block: Block) -> ca.Function:
 
 def _moved(block: Block, tau: ca.SX, substeps: int) -> ca.SX:
     """[x_true, v_true] after h, with the torques tau and the hand's wrench held."""
-    plant, h, held = _plant(block), block.h / substeps, ca.vertcat(tau, block.u["F_hand"])
+    plant, h, inputs = _plant(block), block.h / substeps, ca.vertcat(tau, block.u["F_hand"])
     motion = ca.vertcat(block.x["x_true"], block.x["v_true"])
     for i in range(substeps):
         t = block.t + i * block.h / substeps
-        motion = integrators.step("heun", plant, motion, held, block.p.vector, t, h, [0, 1, 2])
+        motion = integrators.step("heun", plant, motion, inputs, block.p.vector, t, h, [0, 1, 2])
     return motion
 
 
@@ -166,9 +157,8 @@ class _Encoders:
         """The states after h, at the end of which the handle is at true_pose."""
         pose = self._measure(true_pose, self.pose)
         F_motor = pantograph.jacobian(self.pose, self._p).T @ tau
-        after = self._observer.step(
-            self._state, self.pose, pose, F_motor, self._M, self._C, self._h
-        )
+        matrices = self._M, self._C
+        after = self._observer.step(self._state, self.pose, pose, F_motor, *matrices, self._h)
         return {"x_measured": pose, "x_observer": after.x1, "v_observer": after.x2}
 
 
@@ -202,22 +192,16 @@ def haptic_device(device: Device, encoders: bool = False) -> Component:
         initial |= measured.initial()
         step |= measured.step(motion[:3], tau)
     M, c = pantograph.motion(pose, v, p)
+    output = {"x": pose, "v": v, "F_hand_observed": F_hand, "M": M, "c": c}
+    output |= {"workspace_margin": ca.mmin(pantograph.margins(x["x_true"], p))}
+    output |= {name: x[name] for name in ("x_true", "v_true")}
+    sensing = "encoders and observer" if encoders else "ideally sensed"
     return block.component(
         "haptic_device",
-        "Twin-pantograph haptic device with motors"
-        + (", encoders and observer" if encoders else ", ideally sensed"),
+        f"Twin-pantograph haptic device with motors, {sensing}",
         "continuous",
         initial=initial,
         step=step,
-        output={
-            "x": pose,
-            "v": v,
-            "F_hand_observed": F_hand,
-            "M": M,
-            "c": c,
-            "workspace_margin": ca.mmin(pantograph.margins(x["x_true"], p)),
-            "x_true": x["x_true"],
-            "v_true": x["v_true"],
-        },
+        output=output,
         documentation=haptic_device.__doc__ or "",
     )

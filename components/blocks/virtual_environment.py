@@ -35,6 +35,11 @@ from hapticlink.components.linkage.parameters import coordinate_units, coordinat
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage
 
+_BRANCH = (
+    Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"),
+    Variable("q_error", (), "1", description="norm of q_ref - q"),
+)
+
 
 def virtual_environment(
     linkage: Linkage,
@@ -58,17 +63,9 @@ def virtual_environment(
     counts = further_points.counts(users) if directions else []
     block = Block(
         inputs=follow_mechanism.inputs(linkage, copy),
-        parameters=[
-            *parameters(linkage),
-            *start_parameters(linkage),
-            *follow_mechanism.gains(copy),
-            *(_direction_parameters(linkage, directions) if directions else []),
-            *(contact_forces.detection_parameters(linkage, contacts) if contacts else []),
-        ],
+        parameters=_parameters(linkage, copy, directions, contacts),
         states=[*states(linkage), *(Variable(name) for name in counts)],
-        outputs=_outputs(
-            linkage, directions, contacts, users, mobility=mobility, local_model=local_model
-        ),
+        outputs=_outputs(linkage, directions, contacts, users, mobility, local_model),
     )
     model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
     q1, qd1 = follow_mechanism.step(block, model, copy)
@@ -105,9 +102,14 @@ def virtual_environment(
     return component
 
 
-def _direction_parameters(linkage: Linkage, directions: Directions) -> list[Variable]:
-    length = length_parameter(linkage, directions.length_scale)
-    return [length, *direction_parameters(directions)]
+def _parameters(
+    linkage: Linkage, copy: GraphicsCopy, directions: Directions | None, contacts: Contacts | None
+) -> list[Variable]:
+    variables = [*parameters(linkage), *start_parameters(linkage), *follow_mechanism.gains(copy)]
+    if directions:
+        variables.append(length_parameter(linkage, directions.length_scale))
+        variables += direction_parameters(directions)
+    return variables + (contact_forces.detection_parameters(linkage, contacts) if contacts else [])
 
 
 def _outputs(
@@ -115,7 +117,6 @@ def _outputs(
     directions: Directions | None,
     contacts: Contacts | None,
     users: further_points.Users,
-    *,
     mobility: bool,
     local_model: bool,
 ) -> list[Variable]:
@@ -128,29 +129,16 @@ def _outputs(
         *(direction_outputs() if directions else []),
         *(further_points.mobility_output(name) for name in users if mobility),
         *(further_points.direction_outputs(users) if directions else []),
-        *_branch_outputs(linkage),
+        *(_BRANCH if linkage.closed else []),
         *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
         *(held_matrices.ports(linkage) if local_model else []),
     ]
 
 
-def _branch_outputs(linkage: Linkage) -> list[Variable]:
-    if not linkage.closed:
-        return []
-    return [
-        Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"),
-        Variable("q_error", (), "1", description="norm of q_ref - q"),
-    ]
-
-
 def _branch(block: Block, model: LinkageModel) -> dict[str, ca.SX]:
     linkage, q_ref = model.linkage, block.u["q_ref"]
-    start = [*coordinates(linkage, linkage.start)]
-    defaults = [s for v in block.p.variables for s in v.starts]
-    rows, columns = branch.dependent_coordinates(model, np.array([*start, *defaults]))
+    start = np.array([*coordinates(linkage, linkage.start), *block.p.starts])
+    rows, columns = branch.dependent_coordinates(model, start)
     W = ca.Function("W", [model.q, block.p.vector], [model.W])
     signs = [branch.branch_sign(W(q, block.p.vector), rows, columns) for q in (model.q, q_ref)]
-    return {
-        "branch_ok": signs[0] * signs[1] >= 0,
-        "q_error": ca.norm_2(q_ref - model.q),
-    }
+    return {"branch_ok": signs[0] * signs[1] >= 0, "q_error": ca.norm_2(q_ref - model.q)}

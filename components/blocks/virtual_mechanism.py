@@ -220,15 +220,8 @@ class _Equations:
     def _after(self) -> ca.SX:
         """q, qd and deflections after a step, and by how much the method's counters grow."""
         parts, model, n = self._parts, self.model, self.model.q.numel()
-        steps = MechanismSteps(
-            self._block,
-            parts.mechanism,
-            self._space,
-            self._applied,
-            self.touching,
-            self._energy,
-            self.signals,
-        )
+        acting = self._applied, self.touching, self._energy, self.signals
+        steps = MechanismSteps(self._block, parts.mechanism, self._space, *acting)
         after = integrators.mechanism_step(parts.method, steps)
         if k := model.deflection.numel():
             after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
@@ -279,31 +272,18 @@ class _Equations:
         """All outputs."""
         parts, block, model, space = self._parts, self._block, self.model, self._space
         qdd, multipliers = space.motion(self._applied + self._pushed)
-        output = {
-            "x": model.x_h,
-            "v": model.v_h,
-            "q": model.q,
-            "qd": model.qd,
-            "qdd": qdd,
-            "a_bias": space.a_bias,
-            "energy": self._energy,
-        }
+        output = {"x": model.x_h, "v": model.v_h, "q": model.q, "qd": model.qd, "qdd": qdd}
+        output |= {"a_bias": space.a_bias, "energy": self._energy}
         if self._contact:
             output["contact_gap"] = self._contact.gap
         if self.touching or parts.felt:
             output["F_env"] = self._environment_wrench()
         if parts.linkage.closed:
             output |= {"lambda": multipliers, "closure_error": model.closure_error}
-            output |= (
-                closure_diagnostics.values(space.solver) if parts.mechanism.diagnostics else {}
-            )
-        output |= further_points.values(
-            space,
-            block,
-            parts.users,
-            self._applied + self._pushed,
-            mobility=parts.directions is not None,
-        )
+            if parts.mechanism.diagnostics:
+                output |= closure_diagnostics.values(space.solver)
+        mobility, efforts = parts.directions is not None, self._applied + self._pushed
+        output |= further_points.values(space, block, parts.users, efforts, mobility=mobility)
         output |= joint_ports.values(model)
         output |= {name: block.x[name] for name in parts.method.counters}
         if parts.directions:

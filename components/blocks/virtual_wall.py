@@ -52,19 +52,16 @@ def virtual_wall(
     inputs = [Variable("x", (), "m", description="position of the device")]
     if moved and measured_velocity:
         inputs += [Variable("v", (), "m/s", description="velocity of the device")]
-    parameters = [
-        Variable("stiffness", (), "N/m", stiffness, "K"),
-        Variable("position", (), "m", position, "x_w"),
-    ]
-    if damping is not None:
-        parameters += [Variable("damping", (), "N.s/m", damping, "B")]
-    if quantum is not None:
-        parameters += [Variable("quantum", (), "m", quantum, "resolution of the encoder")]
-    if pulse is not None:
-        parameters += [
-            Variable("pulse", (), "kg", pulse[0], "impulse of a contact by its velocity"),
-            Variable("pulse_duration", (), "s", pulse[1], "duration of the impulse"),
-        ]
+    impulse, duration = pulse or (None, None)
+    rows = (
+        ("stiffness", "N/m", stiffness, "K"),
+        ("position", "m", position, "x_w"),
+        ("damping", "N.s/m", damping, "B"),
+        ("quantum", "m", quantum, "resolution of the encoder"),
+        ("pulse", "kg", impulse, "impulse of a contact by its velocity"),
+        ("pulse_duration", "s", duration, "duration of the impulse"),
+    )
+    parameters = [Variable(n, (), unit, v, text) for n, unit, v, text in rows if v is not None]
     if differenced or pulse is not None or passivity is not None:
         parameters += [Variable(STEP_SIZE, (), "s", PERIOD, "period T", "fixed")]
     states = [Variable("x_last", (), "m")] if differenced else []
@@ -72,10 +69,9 @@ def virtual_wall(
         states += [Variable("inside"), Variable("pulse_force", (), "N"), Variable("samples_left")]
     outputs = [Variable("F", (), "N", description="force of the wall on the device")]
     if passivity is not None:
-        parameters += [
-            Variable("mass", (), "kg", passivity, "m of the device, for its passivity controller"),
-            *observer.parameters(Passivity()),
-        ]
+        text = "m of the device, for its passivity controller"
+        parameters += [Variable("mass", (), "kg", passivity, text)]
+        parameters += observer.parameters(Passivity())
         states += observer.states(Passivity(), ("m",), ("N",))
         outputs += observer.OUTPUTS
     block = Block(inputs=inputs, parameters=parameters, states=states, outputs=outputs)
@@ -127,9 +123,6 @@ def _pulse(block: Block, inside: ca.SX, v: ca.SX) -> tuple[ca.SX, dict[str, ca.S
     strength = -p["pulse"] * ca.fmax(v, 0.0) / (samples * p[STEP_SIZE])
     force = ca.if_else(begun, strength, x["pulse_force"])
     left = ca.if_else(begun, samples, x["samples_left"])
-    states = {
-        "inside": inside,
-        "pulse_force": force,
-        "samples_left": ca.fmax(left - 1.0, 0.0),
-    }
+    after = ca.fmax(left - 1.0, 0.0)
+    states = {"inside": inside, "pulse_force": force, "samples_left": after}
     return ca.if_else(left > 0.0, force, 0.0), states

@@ -44,8 +44,8 @@ def nearest_on_segment(ends: ca.SX, position: ca.SX, back: ca.SX | int = 0) -> l
     away = position - point
     side = ca.if_else(ca.dot(away, right) >= 0, 1, -1)
     side = ca.if_else(back == 0, side, back)
-    beside = ca.logic_and(s >= 0, s <= 1)
-    return [point, ca.if_else(beside, side * right, away / (ca.norm_2(away) + TINY))]
+    on_segment = ca.logic_and(s >= 0, s <= 1)
+    return [point, ca.if_else(on_segment, side * right, away / (ca.norm_2(away) + TINY))]
 
 
 def nearest_on_boundary(walls: list[tuple[ca.SX, ca.SX, ca.SX]], position: ca.SX) -> list[ca.SX]:

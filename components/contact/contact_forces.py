@@ -50,18 +50,15 @@ def contact_port(linkage: Linkage, contacts: Contacts) -> Variable:
 
 def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
     """Parameters of the block that evaluates the contact forces."""
+    laws = (
+        ("k_contact", "N/m", contacts.stiffness, "stiffness of a contact"),
+        ("b_contact", "N.s/m", contacts.damping, "damping of a contact"),
+        ("mu_contact", "1", contacts.friction, "friction of a contact"),
+    )
     return [
         *detection_parameters(linkage, contacts, contacts.detection == "haptics"),
-        Variable("k_contact", (), "N/m", contacts.stiffness, "stiffness of a contact"),
-        Variable("b_contact", (), "N.s/m", contacts.damping, "damping of a contact"),
-        *_friction(contacts),
+        *(Variable(name, (), unit, v, text) for name, unit, v, text in laws if v is not None),
     ]
-
-
-def _friction(contacts: Contacts) -> list[Variable]:
-    if contacts.friction is None:
-        return []
-    return [Variable("mu_contact", (), "1", contacts.friction, "friction of a contact")]
 
 
 def lag(h: ca.SX) -> ca.SX:
@@ -165,10 +162,8 @@ class ContactForces(OneSidedForces):
         return super().energy + 0.5 * self._p["k_contact"] * ca.sumsqr(self._z)
 
     def _pushes(self, laws: ca.SX | None) -> ca.SX:
-        if laws is None:
-            return ca.vertcat(*(side.force() for side in self.sides))
-        each = zip(self.sides, ca.vertsplit(laws), strict=True)
-        return ca.vertcat(*(side.force(law) for side, law in each))
+        each = [None] * len(self.sides) if laws is None else ca.vertsplit(laws)
+        return ca.vertcat(*(s.force(law) for s, law in zip(self.sides, each, strict=True)))
 
     def _breaks(self, pushes: ca.SX) -> ca.SX:
         """Deflections at which the contacts slide."""
@@ -178,8 +173,7 @@ class ContactForces(OneSidedForces):
         pushes, rubs = self._pushes(laws), ca.SX(len(self.sides), 1)
         if self._z is not None:
             breaks, tau = self._breaks(pushes), self._p["tau_contact"]
-            held = dry_friction.held(self._z, self._slides, breaks, tau)
-            rubs = -self._p["k_contact"] * held
+            rubs = -self._p["k_contact"] * dry_friction.held(self._z, self._slides, breaks, tau)
         wrenches: dict[str, ca.SX] = {}
         for i, (touch, arms) in enumerate(zip(self._touches, self._arms, strict=True)):
             F = touch.normal * pushes[i] + _along(touch) * rubs[i]

@@ -63,14 +63,11 @@ def depths(
 ) -> Iterator[tuple[Pair, NDArray[np.float64]]]:
     """Each pair that can touch, and its depth (m), negative where it is apart, (k,), at joint
     coordinates q (k, n)."""
-    variables = [*body_parameters(linkage), *detection_parameters(linkage, contacts)]
-    p = Signals("p", variables)
-    rows = np.atleast_2d(np.asarray(q, float))
-    model = LinkageModel(linkage, p, ca.SX.sym("q", rows.shape[1]), ca.SX(rows.shape[1], 1))
+    p = Signals("p", [*body_parameters(linkage), *detection_parameters(linkage, contacts)])
+    model = LinkageModel.symbolic(linkage, p)
     gaps = ca.vertcat(*(gap(model, touch) for touch in touches(model, contacts, p)))
-    values = [value for variable in variables for value in variable.starts]
-    gap_function = ca.Function("gaps", [model.q, p.vector], [gaps])
-    gap_rows = np.array([np.array(gap_function(row, values)).ravel() for row in rows])
+    function, rows = ca.Function("gaps", [model.q, p.vector], [gaps]), np.atleast_2d(q)
+    gap_rows = np.array([np.array(function(row, p.starts)).ravel() for row in rows])
     first = 0
     for pair in near(linkage, contacts):
         last = first + pair.places
@@ -85,8 +82,7 @@ def overlaps(
     that parts them, (k,), at joint coordinates q (k, n); -inf where their cores are apart (Ericson,
     Real-Time Collision Detection, section 5.2.1)."""
     p = Signals("p", body_parameters(linkage))
-    model = LinkageModel(linkage, p, ca.SX.sym("q", q.shape[1]), ca.SX(q.shape[1], 1))
-    values = [value for variable in p.variables for value in variable.starts]
+    model = LinkageModel.symbolic(linkage, p)
     bodies = {b.name: b for b in linkage.body}
 
     def placed(name: str) -> NDArray[np.float64]:
@@ -94,7 +90,7 @@ def overlaps(
         frame = model.frames[name]
         corners = [frame.point(ca.SX(ca.DM(point))) for point in bodies[name].shape]
         in_world = ca.Function("corners", [model.q, p.vector], [ca.vertcat(*corners)])
-        stacked = np.array(in_world(q.T, np.tile(values, (len(q), 1)).T))
+        stacked = np.array(in_world(q.T, np.tile(p.starts, (len(q), 1)).T))
         return stacked.T.reshape(len(q), -1, 2)
 
     for pair in near(linkage, contacts):
@@ -105,13 +101,13 @@ def overlaps(
         if min(len(other), len(bodies[pair.body].shape)) > 1:
             fixed = np.tile(counterclockwise(other), (len(q), 1, 1))
             both = placed(pair.body), placed(pair.obstacle) if pair.kind == "body" else fixed
-            apart = np.maximum(_apart(*both), _apart(*both[::-1]))
+            distance = np.maximum(_distance(*both), _distance(*both[::-1]))
             names = (pair.body, pair.obstacle) if pair.kind == "body" else (pair.body,)
             radii = sum(bodies[name].radius or 0.0 for name in names)
-            yield pair, np.where(apart < 0, radii - apart, -math.inf)
+            yield pair, np.where(distance < 0, radii - distance, -math.inf)
 
 
-def _apart(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
     """Largest distance (k,) of the corners `other` from an edge of `one`, along its normal."""
     span = np.roll(one, -1, axis=1) - one
     outward = np.stack([span[..., 1], -span[..., 0]], axis=-1)

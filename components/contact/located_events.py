@@ -52,7 +52,7 @@ class LocatedEvents(Integrator):
             rate, q = ode.rate, ode.positions
             return integrators.step(self.method, rate, x, given, p, t, h, q)
 
-        def at(x: ca.SX, pushing: ca.SX, t: ca.SX) -> tuple[ca.SX, _Contacts]:
+        def evaluated(x: ca.SX, pushing: ca.SX, t: ca.SX) -> tuple[ca.SX, _Contacts]:
             rate = ode(x, ca.vertcat(pushing, u), p, t)
             return rate, _Contacts(*self.functions(x, rate, u, p))
 
@@ -60,17 +60,18 @@ class LocatedEvents(Integrator):
         begun, left = ca.SX.zeros(pushing.numel()), h
         for _ in range(self.events):
             trial = stepped(x, pushing, t, left)
-            before, after = at(x, pushing, t)[1], at(trial, pushing, t + left)[1]
-            apart = before.gap >= 0
-            start, end = before.event(pushing, apart), after.event(pushing, apart)
+            _, before = evaluated(x, pushing, t)
+            _, after = evaluated(trial, pushing, t + left)
+            was_apart = before.gap >= 0
+            start, end = before.event(pushing, was_apart), after.event(pushing, was_apart)
             changes = after.pushing != pushing
             crossed = ca.logic_and(changes, ca.logic_and(start.value >= 0, end.value < 0))
             share = ca.if_else(crossed, _root(start, end, left), 1 - changes)
             first = ca.mmin(share)
             x = stepped(x, pushing, t, first * left)
-            rate, there = at(x, pushing, t + first * left)
+            rate, there = evaluated(x, pushing, t + first * left)
             now = ca.logic_and(crossed, share <= first + TOGETHER)
-            delay = _newton(there.event(pushing, apart), now, first, left)
+            delay = _newton(there.event(pushing, was_apart), now, first, left)
             x += delay * rate
             t += first * left + delay
             left = (1 - first) * left - delay
@@ -106,12 +107,13 @@ class _Contacts:
     gap_rate: ca.SX
     push_rate: ca.SX
 
-    def event(self, pushing: ca.SX, apart: ca.SX) -> _Event:
-        """e for contacts that were `pushing` or `apart` when the step began."""
-        return _Event(
-            ca.if_else(pushing, self.push, ca.if_else(apart, self.gap, -self.push)),
-            ca.if_else(pushing, self.push_rate, ca.if_else(apart, self.gap_rate, -self.push_rate)),
-        )
+    def event(self, pushing: ca.SX, was_apart: ca.SX) -> _Event:
+        """e for contacts that were `pushing` or apart when the step began."""
+
+        def chosen(push: ca.SX, gap: ca.SX) -> ca.SX:
+            return ca.if_else(pushing, push, ca.if_else(was_apart, gap, -push))
+
+        return _Event(chosen(self.push, self.gap), chosen(self.push_rate, self.gap_rate))
 
 
 def _root(start: _Event, end: _Event, h: ca.SX) -> ca.SX:

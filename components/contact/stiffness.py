@@ -52,16 +52,16 @@ def _poles(
 def _mobilities(linkage: Linkage, along: bool) -> dict[str, float]:
     """The largest mobility of each body's corners in any direction, or of points of its surface
     `along` it, at the radius r from a corner: u' A u, u = (cos, sin, r), in 64 directions."""
-    points = [(body, at) for body in linkage.body for at in body.shape]
+    corners = [(body, corner) for body in linkage.body for corner in body.shape]
 
     def places(model: LinkageModel) -> ca.SX:
-        frames = [(model.frames[body.name], at) for body, at in points]
-        return ca.vertcat(*(ca.vertcat(f.point(ca.SX(ca.DM(at))), f.angle) for f, at in frames))
+        placed = ((model.frames[body.name], ca.SX(ca.DM(corner))) for body, corner in corners)
+        return ca.vertcat(*(ca.vertcat(f.point(corner), f.angle) for f, corner in placed))
 
     closed, _ = start_mobility(linkage, places)
     mobilities = {"ground": 0.0}
     angles = np.arange(64) * math.pi / 32
-    for i, (body, _) in enumerate(points):
+    for i, (body, _) in enumerate(corners):
         own = closed[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
         u = np.stack([np.cos(angles), np.sin(angles), np.full(64, body.radius or 0.0)])
         most = np.max(np.sum(u * (own @ u), 0)) if along else np.linalg.eigvalsh(own[:2, :2])[-1]

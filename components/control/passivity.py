@@ -78,22 +78,18 @@ def passive(rendered: ca.SX, x: ca.SX, M: ca.SX, state: Signals, p: Signals) -> 
     moved = x - state["x_before"]
     left = state["E_before"] - ca.dot(state["F_before"], moved)
     step: dict[str, ca.SX] = {}
-    initial = {
-        "E_before": p["passivity_energy"],
-        "x_before": x,
-        "F_before": ca.SX.zeros(x.shape[0]),
-    }
+    none = ca.SX.zeros(x.shape[0])
+    initial = {"E_before": p["passivity_energy"], "x_before": x, "F_before": none}
     if "passivity_reset_after" in p:
         free = ca.if_else(ca.dot(rendered, rendered) > 0.0, 0.0, state["free_time"] + T)
-        again = free >= p["passivity_reset_after"]
-        left = ca.if_else(again, ca.fmin(left, p["passivity_energy"]), left)
+        is_reset = free >= p["passivity_reset_after"]
+        left = ca.if_else(is_reset, ca.fmin(left, p["passivity_energy"]), left)
         initial["free_time"], step["free_time"] = ca.SX(0), free
     momentum = M @ moved / T
     twice = ca.dot(moved, momentum) / T
     acts = ca.logic_and(left < 0.0, twice > 2.0 * p["passivity_noise"])
-    beta = ca.if_else(
-        acts, ca.fmin(-left / ca.if_else(acts, twice, 1.0), p["passivity_limit"]), 0.0
-    )
+    needed = -left / ca.if_else(acts, twice, 1.0)
+    beta = ca.if_else(acts, ca.fmin(needed, p["passivity_limit"]), 0.0)
     wrench = rendered - beta / T * momentum
     step |= {"E_before": left, "x_before": x, "F_before": wrench}
     output = {"passivity_energy_left": left, "passivity_damping": beta / T}

@@ -95,13 +95,14 @@ def workspace(device: Device) -> Workspace:
     return Workspace(x, y, theta, margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3]))
 
 
-def _ends(at: Field, margin: Field) -> Range:
+def _ends(grid: Field, margin: Field) -> Range:
+    """The first and the last coordinate at which the margin, interpolated, is not negative."""
     inside = np.flatnonzero(margin >= 0)
     ends = []
     for last, beyond in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
-        if not 0 <= beyond < len(at):
-            ends.append(float(at[last]))
+        if not 0 <= beyond < len(grid):
+            ends.append(float(grid[last]))
             continue
         share = margin[last] / (margin[last] - margin[beyond])
-        ends.append(float(at[last] + share * (at[beyond] - at[last])))
+        ends.append(float(grid[last] + share * (grid[beyond] - grid[last])))
     return ends[0], ends[1]

@@ -104,9 +104,9 @@ class TreeInertia:
             d[c.index] = ca.dot(c.S, U)
             self._gain[i] = U / d[c.index]
             if c.parent is not None:
-                rest = _across(c.S, symmetric(articulated[i] - self._gain[i] @ U.T))
-                rest = _across(c.S, rest.T)
-                articulated[c.parent] += symmetric(c.X.T @ rest @ c.X)
+                passed = _across(c.S, symmetric(articulated[i] - self._gain[i] @ U.T))
+                passed = _across(c.S, passed.T)
+                articulated[c.parent] += symmetric(c.X.T @ passed @ c.X)
         self.d = ca.vertcat(*d)
 
     def solve(self, b: ca.SX) -> ca.SX:

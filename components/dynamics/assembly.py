@@ -42,8 +42,8 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     if not model.linkage.closed:
         return q, qd
     n, count = q.numel(), rows(model.linkage)
-    symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    symbolic = LinkageModel(model.linkage, model.p, *symbols)
+    symbolic = LinkageModel.symbolic(model.linkage, model.p)
+    symbols = symbolic.q, symbolic.qd
     least = ClosedLoopSolver(UnitInertia(n), symbolic.W, count, MU)
     parameters = model.p.vector
     shared = {"cse": True}

@@ -34,13 +34,11 @@ GOLDEN = 0.6180339887498949
 
 def outputs() -> list[Variable]:
     """The outputs of `mechanism.diagnostics`."""
+    rank = "number of closures that are independent at this pose"
+    condition = "condition of W D^-1 W' without its zero eigenvalues"
     return [
-        Variable("rank", description="number of closures that are independent at this pose"),
-        Variable(
-            "condition",
-            description="condition of W D^-1 W' without its zero eigenvalues",
-            max=ANY,
-        ),
+        Variable("rank", description=rank),
+        Variable("condition", description=condition, max=ANY),
     ]
 
 

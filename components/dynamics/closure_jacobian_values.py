@@ -19,10 +19,7 @@ Matrix = NDArray[np.float64]
 def closure_jacobian(linkage: Linkage) -> Callable[[NDArray[np.float64]], Matrix]:
     """W(q) = dh/dq of (2.14), (m, n), with the linkage's own parameters. Raises ValueError as
     `LinkageModel` does."""
-    variables = parameters(linkage)
-    p = Signals("p", variables)
-    n = sum(3 if joint.type == "free" else 1 for joint in linkage.joint)
-    model = LinkageModel(linkage, p, ca.SX.sym("q", n), ca.SX(n, 1))
+    p = Signals("p", parameters(linkage))
+    model = LinkageModel.symbolic(linkage, p)
     W = ca.Function("W", [model.q, p.vector], [model.W])
-    values = [value for variable in variables for value in variable.starts]
-    return lambda q: np.array(W(q, values))
+    return lambda q: np.array(W(q, p.starts))

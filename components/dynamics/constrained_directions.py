@@ -119,21 +119,16 @@ def constrained_directions(
     S = scaling(p["length_scale"])
     mobility = space.Lambda_inv if J is None else space.mobility(J)
     least = locked(space.open_mobility(space.terms.J_h if J is None else J), p["length_scale"])
-    scaled = ca.Function(
-        "scaled", [q, block.u.vector, p.vector], [S @ mobility @ S, least], {"cse": True}
-    )
+    given = block.u.vector, p.vector
+    scaled = ca.Function("scaled", [q, *given], [S @ mobility @ S, least], {"cse": True})
     tolerance, hysteresis = p["rank_tolerance"], p["hysteresis"]
 
-    def number(at: ca.SX, before: ca.SX) -> ca.SX:
-        mobility, least = scaled(at, block.u.vector, p.vector)
+    def number(q: ca.SX, before: ca.SX) -> ca.SX:
+        mobility, least = scaled(q, *given)
         return count(eigen(mobility)[0], before, tolerance, hysteresis, least)
 
-    now, vectors = eigen(scaled(q, block.u.vector, p.vector)[0])
-    return ConstrainedDirections(
-        first=number(q0, ca.SX(0)),
-        after=number(q1, before),
-        output={
-            f"{prefix}P_c": projector(now, vectors, before),
-            f"{prefix}n_constraints": before,
-        },
-    )
+    output = {
+        f"{prefix}P_c": projector(*eigen(scaled(q, *given)[0]), before),
+        f"{prefix}n_constraints": before,
+    }
+    return ConstrainedDirections(number(q0, ca.SX(0)), number(q1, before), output)

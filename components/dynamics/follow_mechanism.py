@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.component import POSE, TWIST, Block, Variable
+from hapticlink.components.component import DAMPING, POSE, STIFFNESS, TWIST, Block, Variable
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.projection import MU, projection
@@ -50,10 +50,9 @@ def gains(copy: GraphicsCopy) -> list[Variable]:
             Variable("K_g", (), "1/s2", copy.joint_stiffness, "pull on a coordinate's error"),
             Variable("B_g", (), "1/s", copy.joint_damping, "pull on its rate"),
         ]
-    stiffness, damping = ("N/m", "N/m", "N.m/rad"), ("N.s/m", "N.s/m", "N.m.s/rad")
     return [
-        Variable("K_g", (3,), stiffness, copy.stiffness, "stiffness of the graphics controller"),
-        Variable("B_g", (3,), damping, copy.damping, "damping of the graphics controller"),
+        Variable("K_g", (3,), STIFFNESS, copy.stiffness, "stiffness of the graphics controller"),
+        Variable("B_g", (3,), DAMPING, copy.damping, "damping of the graphics controller"),
     ]
 
 
@@ -65,11 +64,10 @@ def step(block: Block, model: LinkageModel, copy: GraphicsCopy) -> tuple[ca.SX, 
 
 
 def _exact(block: Block, model: LinkageModel) -> tuple[ca.SX, ca.SX]:
-    n = model.q.numel()
-    reference = LinkageModel(model.linkage, block.p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
+    reference = LinkageModel.symbolic(model.linkage, block.p)
     project = projection(reference, TreeInertia(reference))
-    closed, rate = project(block.u["q_ref"], block.u["qd_ref"], block.p.vector)
-    return closed, rate
+    q, qd = project(block.u["q_ref"], block.u["qd_ref"], block.p.vector)
+    return q, qd
 
 
 def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
@@ -81,8 +79,8 @@ def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX,
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
         K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
-        held = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
-        solver = ClosedLoopSolver(TreeInertia(model, held), model.W, rows(model.linkage), MU)
+        added = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
+        solver = ClosedLoopSolver(TreeInertia(model, added), model.W, rows(model.linkage), MU)
         pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)
     momentum = D.apply(qd) + h * (pull - model.C_qd)

@@ -99,13 +99,11 @@ def require_slow(scales: Iterable[Scale], h: float) -> None:
     methods."""
     for what, pole in (named_pole for scale in scales for named_pole in scale.poles):
         if pole * h > STABLE:
-            raise ValueError(f"{what} makes a pole at {pole:.3g} 1/s, {TOO_FAST.format(h)}")
-
-
-TOO_FAST = (
-    "too fast for steps of {:.3g} s: leave it out, take a larger one, a higher rate, more "
-    "`mechanism.substeps`, or `mechanism.integrator` = 'linearly-implicit'"
-)
+            raise ValueError(
+                f"{what} makes a pole at {pole:.3g} 1/s, too fast for steps of {h:.3g} s: leave it "
+                "out, take a larger one, a higher rate, more `mechanism.substeps`, or "
+                "`mechanism.integrator` = 'linearly-implicit'"
+            )
 
 
 def _mobilities(linkage: Linkage, joints: list[JointCoordinate]) -> list[tuple[float, float]]:

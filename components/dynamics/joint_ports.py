@@ -35,16 +35,12 @@ def _of(linkage: Linkage, port: str) -> Iterator[tuple[Joint, str]]:
 def inputs(linkage: Linkage) -> list[Variable]:
     """An effort (N.m or N) for each joint with this port; it carries power where the joint's
     position is an output, too."""
-    return [
-        Variable(
-            name,
-            (),
-            _UNITS[joint.type][0],
-            description=f"effort on {joint.name} from outside",
-            power=Power(f"{joint.name}.position") if "position" in joint.ports else None,
-        )
-        for joint, name in _of(linkage, "effort")
-    ]
+    rows = []
+    for joint, name in _of(linkage, "effort"):
+        power = Power(f"{joint.name}.position") if "position" in joint.ports else None
+        text = f"effort on {joint.name} from outside"
+        rows.append(Variable(name, (), _UNITS[joint.type][0], description=text, power=power))
+    return rows
 
 
 def outputs(linkage: Linkage) -> list[Variable]:

@@ -41,15 +41,11 @@ def ports(linkage: Linkage) -> list[Variable]:
     text = "joint-space inertia"
     variables = [Variable("D", (n, n), D_units, starts["D"], text, kind="semidefinite")]
     if m:
-        variables.append(
-            Variable("W", (m, n), lengths, starts["W"], "Jacobian of the loop closures")
-        )
+        text = "Jacobian of the loop closures"
+        variables.append(Variable("W", (m, n), lengths, starts["W"], text))
         variables.append(Variable("w", (m,), "m/s2", starts["w"], "Wdot qd"))
-    J_units = (*lengths, *lengths, *turns)
-    variables.append(
-        Variable("J_h", (3, n), J_units, starts["J_h"], "Jacobian of the operational point")
-    )
-    return variables
+    J_units, text = (*lengths, *lengths, *turns), "Jacobian of the operational point"
+    return [*variables, Variable("J_h", (3, n), J_units, starts["J_h"], text)]
 
 
 def values(model: LinkageModel) -> dict[str, ca.SX]:
@@ -60,15 +56,13 @@ def values(model: LinkageModel) -> dict[str, ca.SX]:
 
 def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
     p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
-    n = len(coordinate_units(linkage))
     start = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
     assembled = ca.Function("assembled", [p.vector], list(start))
-    q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    matrices = values(LinkageModel(linkage, p, q, qd))
+    model, defaults = LinkageModel.symbolic(linkage, p), ca.DM(p.starts)
+    matrices = values(model)
     rows = [ca.vec(ca.densify(value).T) for value in matrices.values()]
-    evaluated = ca.Function("evaluated", [q, qd, p.vector], rows)
-    defaults = [s for v in p.variables for s in v.starts]
-    numbers = evaluated.call([*assembled.call([ca.DM(defaults)]), ca.DM(defaults)])
+    evaluated = ca.Function("evaluated", [model.q, model.qd, p.vector], rows)
+    numbers = evaluated.call([*assembled.call([defaults]), defaults])
     return {
         name: tuple(float(x) for x in column.elements())
         for name, column in zip(matrices, numbers, strict=True)

@@ -24,13 +24,10 @@ def start_mobility(
     """The mobilities (k x k) of k `coordinates` of a model, with closed and with open loops."""
     p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
     q0, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
-    q, qd = ca.SX.sym("q", q0.numel()), ca.SX.sym("qd", q0.numel())
-    model = LinkageModel(linkage, p, q, qd)
-    J = ca.jacobian(coordinates(model), q)
+    model = LinkageModel.symbolic(linkage, p)
+    J, space = ca.jacobian(coordinates(model), model.q), OperationalSpace(model)
     start = ca.Function("start", [p.vector], [q0])
-    space = OperationalSpace(model)
     both = [space.mobility(J), space.open_mobility(J)]
-    mobilities = ca.Function("mobilities", [q, p.vector], both)
-    values = [value for v in p.variables for value in v.starts]
-    closed, opened = (np.array(m) for m in mobilities(start(values), values))
+    mobilities = ca.Function("mobilities", [model.q, p.vector], both)
+    closed, opened = (np.array(m) for m in mobilities(start(p.starts), p.starts))
     return closed, opened

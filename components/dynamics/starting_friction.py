@@ -33,11 +33,11 @@ def start(space: OperationalSpace, Q: ca.SX, q: ca.SX, qd: ca.SX, t: ca.SX) -> c
     motion = J @ space.motion(Q)[0] + ca.jtimes(joints.v, model.q, model.qd)
     a = ca.substitute(motion, model.deflection, sliding)
     a = ca.if_else(resting, a, 0)
-    rest = ca.diag(resting)
-    A = rest @ space.mobility(J) @ rest
+    chosen = ca.diag(resting)
+    A = chosen @ space.mobility(J) @ chosen
     shift = ca.if_else(resting, MU * ca.trace(A) / k + TINY, 1)
     F = -Regularised(A, shift).proximal(a)
-    held = ca.if_else(resting, -F * joints.d / ca.fmax(joints.f, TINY), sliding)
-    z = ca.fmin(ca.fmax(held, -joints.d), joints.d)
+    deflection = ca.if_else(resting, -F * joints.d / ca.fmax(joints.f, TINY), sliding)
+    z = ca.fmin(ca.fmax(deflection, -joints.d), joints.d)
     symbols, values = ca.vertcat(model.q, model.qd, t), ca.densify(ca.vertcat(q, qd, 0))
     return ca.substitute(z, symbols, values)

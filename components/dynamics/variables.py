@@ -40,16 +40,10 @@ def start_parameters(linkage: Linkage) -> list[Variable]:
     rates = tuple(f"{u}/s" for u in units)
     q, qd = (tuple(coordinates(linkage, s)) for s in (linkage.start, linkage.start_velocity))
     n = (len(units),)
+    text = "joint rates before assembly; those that the scene gives are kept"
     return [
         Variable("q_start", n, units, q, "joint coordinates before assembly", "fixed"),
-        Variable(
-            "qd_start",
-            n,
-            rates,
-            qd,
-            "joint rates before assembly; those that the scene gives are kept",
-            "fixed",
-        ),
+        Variable("qd_start", n, rates, qd, text, "fixed"),
     ]
 
 
@@ -61,21 +55,12 @@ def length_parameter(linkage: Linkage, length: float | None) -> Variable:
 
 def direction_parameters(directions: Directions) -> list[Variable]:
     """Parameters of the detection of constrained directions: tolerance and hysteresis."""
+    tolerance, hysteresis = directions.rank_tolerance, directions.hysteresis
+    text = "eigenvalue ratio below which a direction is constrained"
+    to_become_free = "factor on rank_tolerance to become free again"
     return [
-        Variable(
-            "rank_tolerance",
-            (),
-            "1",
-            directions.rank_tolerance,
-            "eigenvalue ratio below which a direction is constrained",
-        ),
-        Variable(
-            "hysteresis",
-            (),
-            "1",
-            directions.hysteresis,
-            "factor on rank_tolerance to become free again",
-        ),
+        Variable("rank_tolerance", (), "1", tolerance, text),
+        Variable("hysteresis", (), "1", hysteresis, to_become_free),
     ]
 
 
@@ -87,39 +72,23 @@ def states(linkage: Linkage) -> list[Variable]:
 
 def motion_outputs(linkage: Linkage) -> list[Variable]:
     units, m = coordinate_units(linkage), sum(rows(linkage))
-    n = (len(units),)
+    rates, changes = (tuple(f"{u}/{per}" for u in units) for per in ("s", "s2"))
+    n, velocity = (len(units),), "velocity of the operational point"
+    bias = "operational acceleration at zero wrench"
     variables = [
         Variable("x", (3,), POSE, description="pose of the operational point"),
-        Variable(
-            "v", (3,), TWIST, description="velocity of the operational point", derivative_of="x"
-        ),
+        Variable("v", (3,), TWIST, description=velocity, derivative_of="x"),
         Variable("q", n, units, description="joint coordinates"),
-        Variable(
-            "qd",
-            n,
-            tuple(f"{u}/s" for u in units),
-            description="joint rates",
-            derivative_of="q",
-        ),
-        Variable(
-            "qdd",
-            n,
-            tuple(f"{u}/s2" for u in units),
-            description="joint accelerations",
-            derivative_of="qd",
-        ),
-        Variable(
-            "a_bias", (3,), ACCELERATION, description="operational acceleration at zero wrench"
-        ),
+        Variable("qd", n, rates, description="joint rates", derivative_of="q"),
+        Variable("qdd", n, changes, description="joint accelerations", derivative_of="qd"),
+        Variable("a_bias", (3,), ACCELERATION, description=bias),
         Variable("energy", (), "J", description="kinetic and potential energy"),
     ]
     if m:
-        variables.append(
-            Variable("lambda", (m,), "N", description="Lagrange multipliers of the loops")
-        )
-        gap = "largest gap over the loops"
-        apart = mean_link_length(linkage)  # a loop that is open by a link's length has diverged
-        variables.append(Variable("closure_error", (), "m", description=gap, max=apart))
+        text, gap = "Lagrange multipliers of the loops", "largest gap over the loops"
+        link = mean_link_length(linkage)  # a loop that is open by a link's length has diverged
+        variables.append(Variable("lambda", (m,), "N", description=text))
+        variables.append(Variable("closure_error", (), "m", description=gap, max=link))
     return variables
 
 

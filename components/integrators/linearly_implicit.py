@@ -42,13 +42,8 @@ class LinearlyImplicit(Integrator):
             )
         symbols = [ca.SX.sym("symbol", given.numel()) for given in (x, u, p, t)]
         rate = ode(*symbols)[y]
-        slopes = ca.Function(
-            "slopes",
-            symbols,
-            [ca.jacobian(rate, symbols[0][q]), ca.jacobian(rate, symbols[0][y])],
-            {"cse": True},
-        )
-        J_q, J_y = slopes(x, u, p, t)
+        both = [ca.jacobian(rate, symbols[0][of]) for of in (q, y)]
+        J_q, J_y = ca.Function("slopes", symbols, both, {"cse": True})(x, u, p, t)
         g = GAMMA * h
         A = ca.SX.eye(len(y)) - g * J_y
         A[:, : len(q)] -= g**2 * J_q

@@ -96,8 +96,8 @@ def _moved(m: MechanicalSystem) -> tuple[ca.SX, ca.SX]:
         G += (slope - slope.T) / 2 @ (s - qd)
         s = qd + midpoint(q_m, lag, h / 2 * G, A, qd, p)
     after = q + h * s
-    rest = 2 * m.velocities(q_m, s, p) - V - m.velocities(after, s, p)
-    qd = s + next_pose(after, rest, ca.SX(n, 1), none, s, p)
+    left = 2 * m.velocities(q_m, s, p) - V - m.velocities(after, s, p)
+    qd = s + next_pose(after, left, ca.SX(n, 1), none, s, p)
     rate = m.rates(_half(m, s, x, u, p, t, h), u, p, t + h / 2)
     return ca.vertcat(after, qd, z + h * rate), h * m.displacement_rates(q_m, s, p)
 
@@ -119,9 +119,8 @@ def _linear_forces(m: MechanicalSystem) -> tuple[ca.Function, bool]:
     s, h = ca.SX.sym("s", m.n), ca.SX.sym("h")
     G, rigid, _ = m.forces(_half(m, s, x, u, p, t, h), u, p, t + h / 2)
     slope = ca.jacobian(G, s)
-    return ca.Function(
-        "pull", [s, x, u, p, t, h], [G + rigid, slope], {"cse": True}
-    ), slope.nnz() > 0
+    pull = ca.Function("pull", [s, x, u, p, t, h], [G + rigid, slope], {"cse": True})
+    return pull, slope.nnz() > 0
 
 
 def _balanced(m: MechanicalSystem, after: ca.SX, moved: ca.SX) -> tuple[ca.SX, ca.SX]:

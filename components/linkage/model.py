@@ -33,21 +33,18 @@ class Frame:
     rotation: ca.SX
 
     @staticmethod
-    def at(origin: ca.SX, angle: ca.SX) -> Frame:
-        return Frame(origin, angle, _rotation(angle))
+    def turned(origin: ca.SX, angle: ca.SX) -> Frame:
+        """The frame at an origin, turned by an angle from the world."""
+        c, s = ca.cos(angle), ca.sin(angle)
+        return Frame(origin, angle, ca.vertcat(ca.horzcat(c, -s), ca.horzcat(s, c)))
 
-    def point(self, at: ca.SX | None) -> ca.SX:
+    def point(self, local: ca.SX | None) -> ca.SX:
         """World position of a point of the body; None is the frame's origin."""
-        return self.origin if at is None else self.origin + self.rotation @ at
+        return self.origin if local is None else self.origin + self.rotation @ local
 
-    def local(self, at: ca.SX) -> ca.SX:
+    def local(self, point: ca.SX) -> ca.SX:
         """Position in the body's frame of a point of the world."""
-        return self.rotation.T @ (at - self.origin)
-
-
-def _rotation(angle: ca.SX) -> ca.SX:
-    c, s = ca.cos(angle), ca.sin(angle)
-    return ca.vertcat(ca.horzcat(c, -s), ca.horzcat(s, c))
+        return self.rotation.T @ (point - self.origin)
 
 
 class LinkageModel:
@@ -72,6 +69,12 @@ class LinkageModel:
         self.tabled = ca.SX(0, 1) if tabled is None else tabled
         self.t = ca.SX(math.nan) if t is None else t
         self.deflection = ca.SX.nan(linkage.rubbing, 1) if deflection is None else deflection
+
+    @classmethod
+    def symbolic(cls, linkage: Linkage, p: Signals) -> LinkageModel:
+        """The model at symbols q and qd of its own."""
+        n = sum(COORDINATES[j.type] for j in linkage.joint)
+        return cls(linkage, p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
 
     @cached_property
     def _offsets(self) -> dict[str, int]:
@@ -109,7 +112,7 @@ class LinkageModel:
     @cached_property
     def frames(self) -> dict[str, Frame]:
         """World frame of every body, from the ground outward."""
-        frames = {"ground": Frame.at(ca.SX(2, 1), ca.SX(0))}
+        frames = {"ground": Frame.turned(ca.SX(2, 1), ca.SX(0))}
         for j in self.outward:
             frames[j.child] = self._child(j, frames[j.parent], self._of(j))
         return frames
@@ -141,10 +144,8 @@ class LinkageModel:
         return moved, [slide(R[:, 0]), slide(R[:, 1]), turn]
 
     def _child(self, joint: Joint, parent: Frame, q: ca.SX) -> Frame:
-        def at(end: str) -> ca.SX | None:
-            return self.p.get(f"{joint.name}.{end}")
-
-        pivot, angle = parent.point(at("at_parent")), parent.angle
+        at_parent, back = (self.p.get(f"{joint.name}.at_{end}") for end in ("parent", "child"))
+        pivot, angle = parent.point(at_parent), parent.angle
         if joint.type == "revolute":
             angle = angle + q
         elif joint.type == "prismatic":
@@ -152,11 +153,10 @@ class LinkageModel:
             pivot = pivot + parent.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis)) * q
         else:
             pivot, angle = pivot + parent.rotation @ q[:2], angle + q[2]
-        child = Frame.at(pivot, angle)
-        back = at("at_child")
-        return (
-            child if back is None else Frame(pivot - child.rotation @ back, angle, child.rotation)
-        )
+        child = Frame.turned(pivot, angle)
+        if back is None:
+            return child
+        return Frame(pivot - child.rotation @ back, angle, child.rotation)
 
     def rate(self, r: ca.SX) -> ca.SX:
         """Time derivative (dr/dq) qd of an expression r in q."""
@@ -235,10 +235,10 @@ class LinkageModel:
         """Pose (x, y, theta) of the operational point (2.16)."""
         return self.pose(self.linkage.operational_point.body, "operational_point.at")
 
-    def pose(self, body: str, at: str) -> ca.SX:
-        """Pose (x, y, theta) of the point of a body given by parameter `at`, or of its origin."""
+    def pose(self, body: str, point: str) -> ca.SX:
+        """Pose (x, y, theta) of the point of a body that a parameter gives, or of its origin."""
         frame = self.frames[body]
-        return ca.vertcat(frame.point(self.p.get(at)), frame.angle)
+        return ca.vertcat(frame.point(self.p.get(point)), frame.angle)
 
     @cached_property
     def J_h(self) -> ca.SX:

@@ -22,10 +22,9 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
 
     rows = []
     for b in linkage.body:
+        text = f"inertia of {b.name} about its centre"
         rows.append(fixed(f"{b.name}.mass", "kg", b.mass, f"mass of {b.name}"))
-        rows.append(
-            fixed(f"{b.name}.inertia", "kg.m2", b.inertia, f"inertia of {b.name} about its centre")
-        )
+        rows.append(fixed(f"{b.name}.inertia", "kg.m2", b.inertia, text))
         if b.center is not None:
             rows.append(fixed(f"{b.name}.center", "m", b.center, f"centre of mass of {b.name}"))
     for j in linkage.joint:

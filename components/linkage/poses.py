@@ -10,21 +10,18 @@ from numpy.typing import NDArray
 
 from hapticlink.components.component import Signals
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import body_parameters, coordinates
+from hapticlink.components.linkage.parameters import body_parameters
 from hapticlink.components.specs.linkage import Linkage
 
 
 def pose_function(linkage: Linkage) -> tuple[list[str], ca.Function]:
     """The names of the bodies, "ground" among them, and their poses (x m, y m, theta rad), (3, k),
     as a function of the joint coordinates, (n,). Raises ValueError as `LinkageModel` does."""
-    parameters = body_parameters(linkage)
-    p = Signals("p", parameters)
-    n = len(coordinates(linkage, {}))
-    model = LinkageModel(linkage, p, ca.SX.sym("q", n), ca.SX(n, 1))
+    p = Signals("p", body_parameters(linkage))
+    model = LinkageModel.symbolic(linkage, p)
     stacked = ca.horzcat(*(ca.vertcat(f.origin, f.angle) for f in model.frames.values()))
-    values = [value for variable in parameters for value in variable.starts]
     function = ca.Function("poses", [model.q, p.vector], [stacked])
-    return [*model.frames], ca.Function("poses", [model.q], [function(model.q, values)])
+    return [*model.frames], ca.Function("poses", [model.q], [function(model.q, p.starts)])
 
 
 def poses(linkage: Linkage, q: Sequence[Sequence[float]]) -> dict[str, NDArray[np.float64]]:

@@ -44,11 +44,15 @@ def test_an_ssp_takes_no_place_of_a_folder(bar: Path, tmp_path: Path) -> None:
         hl.export(bar, out=tmp_path)
 
 
-@pytest.mark.parametrize(("rate", "told"), [(30, "17.07"), (32, ""), ("512/16", "")])
+@pytest.mark.parametrize(
+    ("rate", "said"),
+    [(30, "17.07"), (32, ""), (64, ""), ("512/16", ""), ({"min": 20, "max": 40}, "graphics is")],
+)
 def test_an_export_of_rates_that_do_not_divide_says_so(
-    rate: float | str, told: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    rate: object, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """512 / 30 = 17.07: masters with whole decimation factors step the graphics copy elsewhere."""
     hl.export("closed-loop", {"graphics.rate": rate}, out=tmp_path / "loop.ssp")
     warned = [line for line in caplog.messages if "whole multiples of the fastest rate" in line]
-    assert [told in line for line in warned] == [True] * bool(told)
+    assert [said in line and "at other instants" in line for line in warned] == [True] * bool(said)
+    assert ("a step of graphics is" in caplog.text) == bool(said)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import random
 import stat
-import tempfile
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,6 +18,7 @@ from fmpy import platform, sharedLibraryExtension
 from hapticlink.fmus.build import build
 from tests.attack import cases
 from tests.attack.commands import Place
+from tests.attack.processes import own_folder
 from tests.fmus import sample_components
 
 Entries = Mapping[str, bytes]
@@ -126,26 +126,14 @@ class Maker:
     def name(self) -> bytes:
         """An entry whose name leads elsewhere, is none, or is in the way of another."""
         up = "../" * self.draw.randrange(1, 12)
+        up_and_out = (f"{up}{self.outside}/evil", f"resources/{up}evil", f"{up}evil")
+        long = "resources/" + "x" * self.draw.choice((255, 256, 5000))
+        deep = "x/" * self.draw.choice((100, 2000)) + "y"
+        odd = ("resources/\u00fc\u202e\n", "resources/con.txt ", "resources/evil\0/../../evil")
+        windows = (f"..\\..\\{self.outside}\\evil", "C:/evil", "//server/share/evil")
+        taken = ("resources", "binaries/", f"{XML}/evil")
         name = self.draw.choice(
-            (
-                f"{self.outside}/evil",
-                f"{up}{self.outside}/evil",
-                f"resources/{up}evil",
-                f"{up}evil",
-                f"..\\..\\{self.outside}\\evil",
-                "C:/evil",
-                "//server/share/evil",
-                "resources",
-                "binaries/",
-                f"{XML}/evil",
-                "resources/" + "x" * self.draw.choice((255, 256, 5000)),
-                "x/" * self.draw.choice((100, 2000)) + "y",
-                "resources/\u00fc\u202e\n",
-                "resources/con.txt ",
-                "resources/evil\0/../../evil",
-                ".",
-                "",
-            )
+            (f"{self.outside}/evil", *up_and_out, *windows, *taken, long, deep, *odd, ".", "")
         )
         info = zipfile.ZipInfo("x")
         info.filename = name
@@ -177,6 +165,11 @@ KINDS: dict[str, tuple[Callable[[Maker], bytes], bool]] = {
 checksum is right is code that anything may come of."""
 
 
+def entries(content: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
 def zipped(entries: Entries, further: Sequence[tuple[str | zipfile.ZipInfo, bytes]] = ()) -> bytes:
     """`further` come after the entries, under names that may be there already or be no names."""
     file = io.BytesIO()
@@ -191,25 +184,23 @@ def zipped(entries: Entries, further: Sequence[tuple[str | zipfile.ZipInfo, byte
 
 def attack(number: int, seed: int) -> Iterator[cases.Made]:
     """`number` archives, the kinds in turn."""
-    with tempfile.TemporaryDirectory(prefix="attack-") as name:
-        folder = Path(name)
+    with own_folder() as folder:
         (folder / "cases").mkdir()
         place, outside = Place(folder / "cases"), folder / "outside"
         outside.mkdir()
-        with zipfile.ZipFile(build(sample_components.spring(), folder)) as archive:
-            entries = {n: archive.read(n) for n in archive.namelist()}
+        good = entries(build(sample_components.spring(), folder).read_bytes())
         scene = folder / "scene.toml"
-        for i in range(number):
+        for i, case, draw in cases.seeded(number, seed):
             kind = [*KINDS][i % len(KINDS)]
             make, isolate = KINDS[kind]
-            maker = Maker(entries, outside, random.Random(f"{seed} {i}"))
+            maker = Maker(good, outside, draw)
             (folder / "model.fmu").write_bytes(make(maker))
             scene.write_text(SCENE.format(isolate=str(isolate).lower()))
             there = _there(folder)
             outcome, wrong = place.made(["run", str(scene), "--out", str(place.out)])
             if escaped := _there(folder) - there:
                 outcome, wrong = "lost", f"written: {', '.join(sorted(escaped))}"
-            yield cases.Made(kind, f"number {i} of seed {seed}", outcome, wrong)
+            yield cases.Made(kind, case, outcome, wrong)
 
 
 def _there(folder: Path) -> set[str]:

@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,6 +25,7 @@ from hapticlink.fmus.native.compiler import compile_library
 from hapticlink.fmus.native.source import component_source
 from tests.attack import cases
 from tests.attack.caller import TOLD, Target
+from tests.attack.processes import own_folder
 from tests.fmus import sample_components
 from tests.mechanisms import five_bar
 
@@ -172,10 +172,10 @@ def attack(number: int, seed: int) -> Iterator[cases.Made]:
     )
     kinds = [k for k in KINDS if k is not sanitized or can_sanitize()]
     share = max(1, number // (len(made) * len(kinds)))
-    with tempfile.TemporaryDirectory(prefix="attack-") as name:
+    with own_folder() as folder:
         for kind in kinds:
             for component in made:
-                yield from called(kind(component, Path(name)), share, seed, Path(name))
+                yield from called(kind(component, folder), share, seed, folder)
 
 
 if __name__ == "__main__":

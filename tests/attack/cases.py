@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import csv
+import random
 import signal
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +18,12 @@ OUTCOMES = ("done", "refused", "told", "lost", "crashed", "hung")
 """done: accepted and run; refused: status 2 and a message; told: status 1 and a message, results up
 to then kept; lost: results of an earlier run are gone, or something stays behind; crashed: a
 signal, a traceback, an error of ours; hung: beyond a stated bound."""
+WITH_BELIEVED = (*OUTCOMES, "believed")
+"""believed: what is wrong was taken for right."""
+OF_SIGNALS = ("before", "done", "told", "lost", "crashed", "hung")
+"""before: a signal in Python's own start; done: after the last thing that asks."""
 BAD = ("lost", "crashed", "hung", "believed")
 FOLDER = Path("results/faults")
-PATIENCE = 120.0
-"""Seconds after which a process counts as hung, on a machine that is busy with other things."""
-MARK = "HAPTICLINK_ATTACK"
-"""Variable of the environment by which the processes of an attack are known: its folder."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,12 @@ class Made:
     case: str
     outcome: str
     wrong: str = ""
+
+
+def seeded(number: int, seed: int) -> Iterator[tuple[int, str, random.Random]]:
+    """(i, its name, what draws it) of each case."""
+    for i in range(number):
+        yield i, f"number {i} of seed {seed}", random.Random(f"{seed} {i}")
 
 
 def counted(made: Iterable[Made]) -> dict[str, Counter[str]]:
@@ -48,10 +55,14 @@ def counted(made: Iterable[Made]) -> dict[str, Counter[str]]:
     return counts
 
 
+def total(counts: Mapping[str, Counter[str]]) -> Counter[str]:
+    """Outcomes of all kinds."""
+    return sum(counts.values(), Counter())
+
+
 def bad(counts: Mapping[str, Counter[str]]) -> dict[str, int]:
-    """How many cases were lost, crashed or hung; empty where none was."""
-    found = sum(counts.values(), Counter())
-    return {outcome: found[outcome] for outcome in BAD if found[outcome]}
+    """How many cases had each bad outcome; empty where none had."""
+    return {outcome: n for outcome, n in total(counts).items() if n and outcome in BAD}
 
 
 def write(
@@ -89,16 +100,6 @@ def hear_interrupts() -> None:
     """Processes that this one starts hear SIGINT, which a shell ignores in the background."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def marked(folder: Path) -> list[str]:
-    """The processes of the attack in `folder`."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/environ"):
-        with suppress(OSError):  # gone, or somebody else's
-            if f"{MARK}={folder}".encode() in path.read_bytes().split(b"\0"):
-                found.append(path.parent.name)
-    return found
 
 
 def command(

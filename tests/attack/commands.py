@@ -24,7 +24,7 @@ from pathlib import Path
 
 from hapticlink import commands
 from hapticlink.commands import internal_error
-from tests.attack.cases import PATIENCE
+from tests.attack.processes import PATIENCE, Room
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""
@@ -39,22 +39,19 @@ MESSAGE = 20_000
 """Characters of a message that somebody may read."""
 
 
-class Place:
+class Place(Room):
     """A folder for the cases: an earlier run's results in `out`, a temporary folder of its own."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.out = folder, folder / "out"
-        self._earlier, self._temporary = folder / "earlier", folder / "temporary"
-        self.here = folder / "here"
-        for each in (self._temporary, self.here):
-            each.mkdir()
-        status, said = self.forked(["run", "pendulum", "--out", str(self._earlier)])
+        super().__init__(folder)
+        self.out, self.earlier, self.here = (folder / name for name in ("out", "earlier", "here"))
+        self.here.mkdir()
+        status, said = self.forked(["run", "pendulum", "--out", str(self.earlier)])
         assert status == 0, said
 
     def made(self, arguments: Sequence[str]) -> tuple[str, str]:
         """One of OUTCOMES, and what was wrong; the command may write to `out`."""
-        shutil.rmtree(self.out, ignore_errors=True)
-        shutil.copytree(self._earlier, self.out)
+        self.renew()
         status, said = self.forked(arguments)
         if bad := self.broken(status, said):
             return bad
@@ -63,6 +60,11 @@ class Place:
             return "lost", f"status {status}: {'; '.join(wrong)}: {said[-500:]}"
         ended = status == 0 or "interrupted" in said
         return ("done" if ended else "told" if status == 1 else "refused"), ""
+
+    def renew(self) -> None:
+        """The earlier run is in `out` again."""
+        shutil.rmtree(self.out, ignore_errors=True)
+        shutil.copytree(self.earlier, self.out)
 
     def broken(self, status: int | None, said: str) -> tuple[str, str] | None:
         """hung or crashed, and what was wrong; None for a command that has ended as it should."""
@@ -79,39 +81,32 @@ class Place:
     def reports(self) -> str:
         """The ends of the reports of errors of ours."""
         found = ""
-        for path in self._temporary.glob("hapticlink-error-*"):
+        for path in self.temporary.glob("hapticlink-error-*"):
             found += path.read_text("utf-8")[-700:]
             path.unlink()
         return found
 
     def _lost(self, status: int) -> Iterator[str]:
         story = self.out / "run.json"
-        if status == 2 or not story.exists() or _same(story, self._earlier / "run.json"):
-            for path in self._earlier.iterdir():
+        if status == 2 or not story.exists() or _same(story, self.earlier / "run.json"):
+            for path in self.earlier.iterdir():
                 if not (self.out / path.name).exists() or not _same(path, self.out / path.name):
                     yield f"{path.name} of the earlier run has changed or is gone"
         elif json.loads(story.read_text("utf-8"))["end"].get("reason") in (None, "running"):
             yield "run.json has no end"
         if hidden := [p.name for p in self.out.glob(".*")]:
             yield f"files {', '.join(hidden)}"
-        if left := self.left():
+        if left := self.left_files():
             yield f"temporary {', '.join(left)}"
-
-    def left(self) -> list[str]:
-        """What a command has left in the temporary folder, which is removed."""
-        if names := [p.name for p in self._temporary.iterdir()]:
-            shutil.rmtree(self._temporary)
-            self._temporary.mkdir()
-        return names
 
     def forked(self, arguments: Sequence[str]) -> tuple[int | None, str]:
         """Status (negative: the signal; None: no end within PATIENCE) and what it said."""
-        told, rows = self.folder / "told.txt", self.out / "run.json"
+        said, rows = self.folder / "said.txt", self.out / "run.json"
         earlier = rows.stat().st_ino if rows.exists() else None
         process = os.fork()
         if process == 0:
             os.chdir(self.here)
-            _child(lambda: commands.main(arguments), told, self._temporary)
+            _child(lambda: commands.main(arguments), said, self.temporary)
         status = None
         try:
             patience = WORK if arguments[:1] == ["sweep"] else math.inf
@@ -120,7 +115,7 @@ class Place:
             if status is None:
                 os.killpg(process, signal.SIGKILL)
                 os.waitpid(process, 0)
-        return status, told.read_text("utf-8", errors="replace")
+        return status, said.read_text("utf-8", errors="replace")
 
     def _ended(self, process: int, rows: Path, earlier: int | None, patience: float) -> int | None:
         """Its status, None where it takes longer than PATIENCE; it is interrupted after `patience`
@@ -145,14 +140,14 @@ def _same(a: Path, b: Path) -> bool:
     return filecmp.cmp(a, b, shallow=False)
 
 
-def _child(call: Callable[[], object], told: Path, temporary: Path) -> None:
+def _child(call: Callable[[], object], said: Path, temporary: Path) -> None:
     """Never returns."""
     status = 70
     try:
         os.setsid()
-        said = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        file = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         for stream in (1, 2):
-            os.dup2(said, stream)
+            os.dup2(file, stream)
         sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
         sys.stderr = open(2, "w", closefd=False, errors="backslashreplace")  # noqa: SIM115
         resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_TIME, PROCESSOR_TIME + 5))

@@ -7,15 +7,13 @@ from __future__ import annotations
 import json
 import random
 import signal
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import PATIENCE, Made, command
+from tests.attack.cases import Made, command, seeded
+from tests.attack.processes import Process, own_folder
 
 SCENES = ("pendulum", "closed-loop", "four-bar")
 REFUSED = "another run writes there"
@@ -25,37 +23,26 @@ def _case(out: Path, draw: random.Random, kills: bool) -> tuple[str, str]:
     begin = time.monotonic()
     count = draw.choice((2, 3, 4))
     starts = sorted(draw.uniform(0.0, 2.0) for _ in range(count))
-    processes: list[tuple[str, subprocess.Popen[str]]] = []
+    processes: list[tuple[str, Process]] = []
     for start in starts:
         time.sleep(max(0.0, begin + start - time.monotonic()))
         scene = draw.choice(SCENES)
         arguments = ["run", scene, "--set", "duration=0.5", "--out", str(out)]
-        processes.append(
-            (
-                scene,
-                subprocess.Popen(
-                    [sys.executable, "-m", "hapticlink", *arguments],
-                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                ),
-            )
-        )  # fmt: skip
+        processes.append((scene, Process(arguments, out.parent, {}, stdout=False)))
     if kills:
         time.sleep(draw.uniform(0.0, 2.0))
-        processes[draw.randrange(count)][1].kill()
+        processes[draw.randrange(count)][1].signal(signal.SIGKILL, group=False)
     regular = []
     for scene, process in processes:
-        try:
-            said = process.communicate(timeout=PATIENCE)[1]
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
+        status, said = process.ended()
+        if status is None:
             return "hung", scene
-        if process.returncode == 0:
+        if status == 0:
             regular.append(scene)
-        elif process.returncode == 2 and REFUSED in said and "Traceback" not in said:
+        elif status == 2 and REFUSED in said and "Traceback" not in said:
             pass
-        elif not (kills and process.returncode == -signal.SIGKILL):
-            return "crashed", f"status {process.returncode}: {said[-400:]}"
+        elif not (kills and status == -signal.SIGKILL):
+            return "crashed", f"status {status}: {said[-400:]}"
     return _whole(out, regular, kills)
 
 
@@ -67,11 +54,8 @@ def _whole(out: Path, regular: list[str], kills: bool) -> tuple[str, str]:
         return ("told", "") if kills and not regular else ("lost", "no run.json")
     story = json.loads((out / "run.json").read_text("utf-8"))
     if story["end"]["reason"] == "running":  # killed: what is there is recovered
-        command = [sys.executable, "-m", "hapticlink", "recover", str(out)]
-        ended = subprocess.run(command, capture_output=True, text=True, check=False)
-        if ended.returncode:
-            return "lost", f"not recovered: {ended.stderr[-300:]}"
-        return "told", ""
+        status, said = Process(["recover", str(out)], out.parent, {}).ended()
+        return ("lost", f"not recovered: {said[-300:]}") if status else ("told", "")
     there, listed = {p.name for p in out.iterdir()}, set(story["files"])
     if there != listed and not kills:
         return "lost", f"run.json lists other files: {', '.join(sorted(there ^ listed))}"
@@ -82,12 +66,11 @@ def _whole(out: Path, regular: list[str], kills: bool) -> tuple[str, str]:
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     """`number` folders, every third with a run that is killed."""
-    for i in range(number):
-        draw, kills = random.Random(f"{seed} {i}"), i % 3 == 2
-        with tempfile.TemporaryDirectory(prefix="attack-") as folder:
-            outcome, wrong = _case(Path(folder) / "out", draw, kills)
-        kind = "at once, one killed" if kills else "at once"
-        yield Made(kind, f"number {i} of seed {seed}", outcome, wrong)
+    for i, case, draw in seeded(number, seed):
+        kills = i % 3 == 2
+        with own_folder() as folder:
+            ended = _case(folder / "out", draw, kills)
+        yield Made("at once, one killed" if kills else "at once", case, *ended)
 
 
 if __name__ == "__main__":

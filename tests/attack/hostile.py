@@ -14,19 +14,16 @@ asked about, and a process that it forks there are left out.
 from __future__ import annotations
 
 import json
-import os
-import random
-import signal
+import shutil
 import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import MARK, PATIENCE, Made, command, marked
+from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
+from tests.attack.processes import PATIENCE, Room, own_folder
 from tests.orchestrator import hostile_slave
 from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
 
@@ -41,18 +38,8 @@ ACTS = (
     *STATUSES,
     *("nan", "inf", "huge", "root", "gone", "upward", "zero", "flush"),
     *("exit", "exit3", "leave", "abort", "null", "stack", "loop", "sleep", "slow"),
-    *(
-        "stdout",
-        "stderr",
-        "stdin",
-        "deaf",
-        "locale",
-        "prints",
-        "nothing",
-        "format",
-        "long",
-        "bytes",
-    ),
+    *("stdout", "stderr", "stdin", "deaf", "locale"),
+    *("prints", "nothing", "format", "long", "bytes"),
     *("thread", "child", "term", "int", "umask", "environ"),
     *("traps", "alarm", "default", "memory", "outside", "early", *ENDS_THE_RUN),
 )
@@ -60,18 +47,9 @@ CUT_SHORT = {("step", "early"), ("step", "middle"), ("step", "never")}
 PACKED = {"C": ACTS, "Python": tuple(hostile_slave.ACTS)}
 FILES = {"C": "hostile.fmu", "Python": "Hostile{fmi}.fmu"}
 ENDS_THE_PROCESS = (
-    "exit",
-    "exit3",
-    "leave",
-    "abort",
-    "null",
-    "stack",
-    "thread",
-    "queue",
-    "alarm",
-    "default",
+    "exit", "exit3", "leave", "abort", "null", "stack", "thread", "queue", "alarm", "default",
     "memory",
-)
+)  # fmt: skip
 """thread: where it outlives the library that it runs; queue: pythonfmu's libraries read the fields
 of what is no message."""
 NEVER_RETURNS = ("loop", "sleep")
@@ -80,13 +58,12 @@ BEFORE_SIGNALS = 6.0
 ROWS = 33
 
 
-class Attack:
+class Attack(Room):
     """Cases in a folder of their own."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.out = folder, folder / "out"
-        self._temporary = folder / "temporary"
-        self._temporary.mkdir()
+        super().__init__(folder, LOCPATH=str(folder))
+        self.out = folder / "out"
         for fmi in ("2", "3"):
             (folder / fmi).mkdir()
             hostile_fmu(folder / fmi, fmi)
@@ -95,15 +72,15 @@ class Attack:
         with suppress(FileNotFoundError):  # where it is not, the act `locale` changes nothing
             subprocess.run(locale, check=False, capture_output=True)
         good = hostile_scene(folder / "2", "good_none_0")
-        status, said = self._ended(good, "compiled", patience=PATIENCE)
+        status, said = self._ended(good, "compiled", PATIENCE)
         assert status == 0, said
         table = tables.load(self.out).haptics
         self._source = [table[f"source.{port}"].tolist() for port in ("y", "slope")]
 
     def made(
         self, fmi: str, packed: str, place: str, act: str, step: int, keys: str, loop: str
-    ) -> list[str]:
-        """What was wrong, after an outcome."""
+    ) -> tuple[str, str]:
+        """One of OUTCOMES, and what was wrong."""
         isolated = "isolate" in keys
         name = f"{place}_{act}_{step}"
         file = FILES[packed].format(fmi=fmi)
@@ -111,46 +88,25 @@ class Attack:
         hangs = act in NEVER_RETURNS and not isolated
         status, said = self._ended(scene, loop, BEFORE_SIGNALS if hangs else PATIENCE)
         if status is None:
-            return ["hung", said[-300:]]
+            return "hung", said[-300:]
         crash = not isolated and act in ENDS_THE_PROCESS
         if not crash and (status not in (0, 1) or "Traceback" in said or "Fatal Python" in said):
-            return ["crashed", f"status {status}: {said[-400:]}"]
+            return "crashed", f"status {status}: {said[-400:]}"
         if act == "exit" and crash and status == 0:
-            return ["believed", "exit(0) of an FMU was a success"]
-        if wrong := [*self._untrue(status, said, crash), *self._left()]:
-            return ["lost", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
+            return "believed", "exit(0) of an FMU was a success"
+        if wrong := [*self._untrue(status, said, crash), *self.left(15.0), *self._hidden()]:
+            return "lost", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"
         if wrong := [*self._believed(fmi, packed, place, act, status)]:
-            return ["believed", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"]
-        return ["done" if status == 0 else "told", ""]
+            return "believed", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"
+        return "done" if status == 0 else "told", ""
 
     def _ended(self, scene: Path, loop: str, patience: float) -> tuple[int | None, str]:
         """Status and what was said; after `patience` (s) a signal, later another, then None."""
-        subprocess.run(["rm", "-rf", str(self.out)], check=True)
-        environment = os.environ | {
-            "TMPDIR": str(self._temporary),
-            "HAPTICLINK_LOOP": "python" if loop == "python" else "",
-            "LOCPATH": str(self.folder),
-            MARK: str(self.folder),
-        }
+        shutil.rmtree(self.out, ignore_errors=True)
         arguments = ["run", str(scene), "--out", str(self.out), "--no-figures"]
-        with (self.folder / "said.txt").open("w+b") as said:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "hapticlink", *arguments, "--set", "faults.timeout=3"],
-                stdout=said, stderr=said, env=environment, cwd=self.folder,
-                start_new_session=True,
-            )  # fmt: skip
-            status: int | None = None
-            for _ in range(3):
-                try:
-                    status = process.wait(patience)
-                    break
-                except subprocess.TimeoutExpired:
-                    os.killpg(process.pid, signal.SIGINT)
-            if status is None:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-            said.seek(0)
-            return status, said.read().decode(errors="replace")
+        arguments += ["--set", "faults.timeout=3"]
+        chosen = "python" if loop == "python" else ""
+        return self.started(arguments, HAPTICLINK_LOOP=chosen).ended(patience, interrupts=2)
 
     def _untrue(self, status: int, said: str, crash: bool) -> Iterator[str]:
         story = self.out / "run.json"
@@ -178,19 +134,9 @@ class Attack:
         if run["end"]["reason"] == "duration" and len(times) != ROWS:
             yield f"{len(times)} rows"
 
-    def _left(self) -> Iterator[str]:
-        until = time.monotonic() + 15.0
-        while (processes := marked(self.folder)) and time.monotonic() < until:
-            time.sleep(0.05)
-        if processes:
-            yield f"processes {', '.join(processes)}"
-            for process in processes:
-                os.kill(int(process), signal.SIGKILL)
-        if names := [p.name for p in self._temporary.iterdir()]:
-            yield f"temporary {', '.join(names)}"
-            subprocess.run(["rm", "-rf", *map(str, self._temporary.iterdir())], check=True)
-        if self.out.exists() and (hidden := [p.name for p in self.out.glob(".*")]):
-            yield f"files {', '.join(hidden)}"
+    def _hidden(self) -> Iterator[str]:
+        if names := [path.name for path in self.out.glob(".*")]:
+            yield f"files {', '.join(names)}"
 
     def _believed(self, fmi: str, packed: str, place: str, act: str, status: int) -> Iterator[str]:
         called = place in ("make", "enter", "leave", "set", "get", "step", "end")
@@ -211,10 +157,9 @@ class Attack:
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     """`number` FMUs, by seed."""
-    with tempfile.TemporaryDirectory(prefix="attack-") as name:
-        made = Attack(Path(name))
-        for i in range(number):
-            draw = random.Random(f"{seed} {i}")
+    with own_folder() as folder:
+        made = Attack(folder)
+        for i, _, draw in seeded(number, seed):
             fmi, packed = draw.choice("23"), ("C", "Python")[i % 2]
             act = PACKED[packed][i // 2 % len(PACKED[packed])]
             place = draw.choice((*PLACES, "step", "step", "step"))
@@ -224,12 +169,11 @@ def attack(number: int, seed: int) -> Iterator[Made]:
             if act in ("leave", "child"):
                 keys = "isolate = true"
             case = (fmi, packed, place, act, step, keys, loop)
-            outcome, wrong = made.made(*case)
             kind = f"FMI {fmi}.0 in {packed}, {'isolated' if keys else 'in process'}"
-            yield Made(kind, str(case), outcome, wrong)
+            yield Made(kind, str(case), *made.made(*case))
 
 
-OUTCOMES = ("done", "told", "lost", "crashed", "hung", "believed")
+OUTCOMES = tuple(outcome for outcome in WITH_BELIEVED if outcome != "refused")
 
 if __name__ == "__main__":
     command("hostile", "FMUs that behave badly.", attack, 300, OUTCOMES)

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import subprocess
 import sys
-import tempfile
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +23,8 @@ from hapticlink.orchestrator.run.compiled import build
 from hapticlink.orchestrator.scene import find_scene
 from tests.attack import mutations
 from tests.attack.c_interface import UNDEFINED, _address_library, can_sanitize
-from tests.attack.cases import Made, command
+from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
+from tests.attack.processes import own_folder
 from tests.attack.scenes import written
 
 PATIENCE = 1200.0
@@ -60,8 +59,7 @@ for scene in json.loads(sys.argv[1]):
 def scenes(number: int, seed: int, folder: Path) -> Iterator[Path]:
     """Shipped scenes with numbers near theirs, other rates and other holds."""
     names = [*find_scene.shipped()]
-    for i in range(number):
-        draw = random.Random(f"{seed} {i}")
+    for i, _, draw in seeded(number, seed):
         tables: Any = tomllib.loads(find_scene.find(draw.choice(names))[1])
         tables["duration"] = draw.choice((0.05, 0.1, 0.2))
         for path in draw.sample([*mutations.places(tables)], 2):
@@ -114,8 +112,7 @@ def sanitized(folder: Path) -> str:
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     """`number` scenes on both loops; where gcc has sanitizers, a third of them with these, too."""
-    with tempfile.TemporaryDirectory(prefix="attack-") as name:
-        folder = Path(name)
+    with own_folder() as folder:
         library = sanitized(folder) if can_sanitize() else ""
         every = [*scenes(number, seed, folder)]
         for i in range(0, number, AT_A_TIME):
@@ -154,7 +151,5 @@ def _judged(compiled: Any, python: Any) -> str:
     return "told" if compiled[1][1] else "done"
 
 
-OUTCOMES = ("done", "refused", "told", "lost", "crashed", "hung", "believed")
-
 if __name__ == "__main__":
-    command("loops", "Random scenes on both loops.", attack, 300, OUTCOMES)
+    command("loops", "Random scenes on both loops.", attack, 300, WITH_BELIEVED)

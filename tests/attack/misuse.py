@@ -7,14 +7,16 @@ import inspect
 import os
 import random
 import signal
-import tempfile
+import traceback
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.faults import Fault
-from tests.attack.cases import Made, command
+from tests.attack.cases import Made, command, seeded
+from tests.attack.processes import own_folder
 
 VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, -1, 1, 7, 2**70, 0.5, -0.5, 1e300, float("nan"), float("inf")),
@@ -54,8 +56,8 @@ def _drawn(
     return positional, named
 
 
-def _live(draw: random.Random) -> Callable[[], object]:
-    """A call of a method of a scene that runs."""
+def _live(draw: random.Random) -> tuple[str, Callable[[], object]]:
+    """A call of a method of a scene that runs, and what it is."""
     names = ("set", "hold", "rate", "step", "__getitem__")
     name = draw.choice(names)
     count = draw.choice((1, 2, 3))
@@ -74,19 +76,18 @@ def _live(draw: random.Random) -> Callable[[], object]:
 
         return hl.RealTime("closed-loop", {"duration": 0.05}).run(turn)
 
-    call.__doc__ = f"RealTime.{name}{ascii(tuple(values))[:200]}"
-    return call
+    return f"RealTime.{name}{ascii(tuple(values))[:200]}", call
 
 
 def _outcome(call: Callable[[], object], folder: Path) -> tuple[str, str]:
     """Of a call in a process of its own, in `folder`."""
-    told = folder / "told.txt"
-    told.unlink(missing_ok=True)
+    output = folder / "said.txt"
+    output.unlink(missing_ok=True)
     process = os.fork()
     if process == 0:
         try:
             os.chdir(folder)
-            said = os.open(told, os.O_WRONLY | os.O_CREAT)
+            said = os.open(output, os.O_WRONLY | os.O_CREAT)
             os.dup2(said, 1)
             os.dup2(said, 2)
             signal.alarm(PATIENCE)
@@ -97,14 +98,12 @@ def _outcome(call: Callable[[], object], folder: Path) -> tuple[str, str]:
         except TypeError:
             os._exit(2)
         except BaseException as error:
-            import traceback
-
             os.write(2, "".join(traceback.format_exception(error)).encode(errors="replace")[-700:])
             os._exit(3)
     code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
     if code in (0, 1, 2):
         return ("done", "told", "refused")[code], ""
-    text = told.read_text(errors="replace")[-500:] if told.exists() else ""
+    text = output.read_text(errors="replace")[-500:] if output.exists() else ""
     return ("hung" if code == -signal.SIGALRM else "crashed"), f"{code}: {text}"
 
 
@@ -113,24 +112,16 @@ def attack(number: int, seed: int) -> Iterator[Made]:
     functions = _functions()
     kinds = [*functions, "RealTime"]
     hl.run("closed-loop", {"duration": 0.02})  # FMUs are built before
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
-        for i in range(number):
-            draw, kind = random.Random(f"{seed} {i}"), kinds[i % len(kinds)]
+    with own_folder() as folder:
+        for i, _, draw in seeded(number, seed):
+            kind = kinds[i % len(kinds)]
             if kind == "RealTime":
-                call = _live(draw)
-                case = call.__doc__ or ""
+                case, call = _live(draw)
             else:
                 positional, named = _drawn(functions[kind], draw)
                 case = f"{kind}({ascii(positional)[:200]}, {ascii(named)[:200]})"
-
-                def call(
-                    function: Callable[..., object] = functions[kind],
-                    positional: list[Any] = positional,
-                    named: dict[str, Any] = named,
-                ) -> object:
-                    return function(*positional, **named)
-
-            yield Made(kind, case, *_outcome(call, Path(folder)))
+                call = partial(functions[kind], *positional, **named)
+            yield Made(kind, case, *_outcome(call, folder))
 
 
 if __name__ == "__main__":

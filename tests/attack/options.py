@@ -6,7 +6,6 @@ python -m tests.attack.options --cases 4000
 from __future__ import annotations
 
 import random
-import tempfile
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,37 +15,17 @@ from hapticlink.orchestrator.scene import find_scene
 from tests.attack import mutations
 from tests.attack.cases import Made, command
 from tests.attack.commands import Place
+from tests.attack.processes import own_folder
 from tests.attack.scenes import SMALL
 
 KINDS = ("set", "vary", "flags")
 WORDS = (
-    *("run", "info", "build", "export", "sweep", "schema", "--set", "--vary", "--out", "--explain"),
-    *("--plugin", "--jobs", "--runs", "--metric", "--scheduler", "--help", "--version", "--bogus"),
-    *(
-        "--",
-        "-",
-        "",
-        "=",
-        "--set=",
-        "--jobs=-1",
-        "--jobs=1e9",
-        "0",
-        "two",
-        "/dev/null",
-        "/dev/full",
-    ),
-    *(
-        "none.toml",
-        "none.ssp",
-        "none.csv",
-        ".",
-        "/",
-        "\udcff",
-        "closed-loop",
-        "pendulum",
-        "x" * 300,
-    ),
-)
+    "run", "info", "build", "export", "sweep", "schema", "--set", "--vary", "--out", "--explain",
+    "--plugin", "--jobs", "--runs", "--metric", "--scheduler", "--help", "--version", "--bogus",
+    "--", "-", "", "=", "--set=", "--jobs=-1", "--jobs=1e9", "0", "two", "/dev/null", "/dev/full",
+    "none.toml", "none.ssp", "none.csv", ".", "/", "\udcff", "closed-loop", "pendulum",
+    "x" * 300,
+)  # fmt: skip
 NUMBERS = ("0", "1", "-1", "1e400", "1e-400", "0.5", "nan", "inf", "1e9", "9" * 5000, "", "x", "²")
 
 
@@ -110,8 +89,8 @@ def arguments(kind: str, out: Path, draw: random.Random) -> list[str]:
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     draw = random.Random(seed)
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
-        place = Place(Path(folder))
+    with own_folder() as folder:
+        place = Place(folder)
         for i in range(number):
             kind = KINDS[i % len(KINDS)]
             made = [a.replace("\0", "") for a in arguments(kind, place.out, draw)]

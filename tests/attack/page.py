@@ -12,7 +12,6 @@ import gc
 import os
 import random
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,7 +21,8 @@ import hapticlink as hl
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.visualization.served import messages
 from hapticlink.visualization.served.session import Session
-from tests.attack.cases import Made, command
+from tests.attack.cases import Made, command, seeded
+from tests.attack.processes import own_folder
 
 ASKED = {"resets": 10, "holds": 100, "anything": 50}
 """What a case of each kind asks for, so often."""
@@ -108,12 +108,12 @@ def attack(number: int, seed: int) -> Iterator[Made]:
         return
     places = [(kind, packed) for packed in ("python", "native") for kind in ASKED]
     before: dict[str, list[tuple[int, int, int]]] = {}
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
-        for i in range(number):
+    with own_folder() as folder:
+        for i, case, draw in seeded(number, seed):
             kind, packed = places[i * len(places) // number]
             name = f"{kind}, {packed} FMUs"
             scene = hl.scene("closed-loop", {"packaging": packed, "duration": 1e4})
-            outcome, wrong = _case(scene, kind, random.Random(f"{seed} {i}"), Path(folder))
+            outcome, wrong = _case(scene, kind, draw, folder)
             counts = before.setdefault(name, [])
             counts.append(_left_behind())
             if outcome == "done" and len(counts) > 3:
@@ -124,7 +124,7 @@ def attack(number: int, seed: int) -> Iterator[Made]:
                 print(said, file=sys.stderr, flush=True)
                 if grown[0] > 2**20 + MOST_BYTES[kind] * asked or grown[1] > 40 or grown[2] > 2:
                     outcome, wrong = "lost", said
-            yield Made(name, f"number {i} of seed {seed}", outcome, wrong)
+            yield Made(name, case, outcome, wrong)
 
 
 if __name__ == "__main__":

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import random
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 
-from tests.attack.cases import Made, command
+from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
 from tests.attack.commands import Place
+from tests.attack.processes import own_folder
 
 FAILURES = (
     "raise RuntimeError('broken')",
@@ -45,10 +43,9 @@ NAMES = (
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     """`number` plugins, every third one a name."""
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
-        place = Place(Path(folder))
-        for i in range(number):
-            draw = random.Random(f"{seed} {i}")
+    with own_folder() as folder:
+        place = Place(folder)
+        for i, _, draw in seeded(number, seed):
             if named := i % 3 == 2:
                 module = draw.choice(NAMES)
             else:
@@ -67,7 +64,4 @@ def attack(number: int, seed: int) -> Iterator[Made]:
 
 
 if __name__ == "__main__":
-    command(
-        "plugins", "Plugins that fail.", attack, 200,
-        ("done", "refused", "told", "lost", "crashed", "hung", "believed"),
-    )  # fmt: skip
+    command("plugins", "Plugins that fail.", attack, 200, WITH_BELIEVED)

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import random
 import re
-import tempfile
 import tomllib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.scene import find_scene, overrides
 from tests.attack import mutations
 from tests.attack.cases import Made, command
 from tests.attack.commands import Place
+from tests.attack.processes import own_folder
 
 SMALL = ("pendulum", "single-body", "four-bar", "slider-crank", "sampled-spring", "trammel")
 KINDS = ("values", "lines", "bytes")
@@ -53,9 +52,8 @@ def cases(number: int, seed: int) -> Iterator[tuple[str, str, bytes]]:
 
 
 def attack(number: int, seed: int) -> Iterator[Made]:
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
-        place = Place(Path(folder))
-        path = Path(folder) / "scene.toml"
+    with own_folder() as folder:
+        place, path = Place(folder), folder / "scene.toml"
         for kind, said, content in cases(number, seed):
             path.write_bytes(content)
             yield Made(kind, said, *place.made(["run", str(path), "--out", str(place.out)]))

@@ -5,19 +5,16 @@ comes before the project hears any is Python's."""
 
 from __future__ import annotations
 
-import os
 import random
 import shutil
 import signal
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from tests.attack.cases import MARK, PATIENCE, Made, command, marked
-from tests.attack.signals import _python_itself
+from tests.attack.cases import OF_SIGNALS, Made, command, seeded
+from tests.attack.processes import PATIENCE, Room, own_folder
+from tests.attack.signals import python_itself
 
 LATEST = (1.0, 3.0, 12.0)
 """Seconds after the start at which the first signal comes at the latest, in turn by chance."""
@@ -62,74 +59,57 @@ def _contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def _case(name: str, folder: Path, read: dict[str, bytes], draw: random.Random) -> tuple[str, str]:
+def _case(name: str, room: Room, read: dict[str, bytes], draw: random.Random) -> tuple[str, str]:
     """`read`: what the folder of the earlier run has."""
-    here, temporary = folder / "here", folder / "temporary"
-    environment = os.environ | {"TMPDIR": str(temporary), MARK: str(folder)}
+    here = room.folder / "here"
     number = draw.choice((signal.SIGINT, signal.SIGTERM))
     if draw.random() < 0.5:
-        for path in here.iterdir():
-            if path.name != READ:
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "hapticlink", *COMMANDS[name]],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment, cwd=here,
-        start_new_session=True,
-    )  # fmt: skip
+        _removed(path for path in here.iterdir() if path.name != READ)
+    process = room.started(COMMANDS[name], "here")
     time.sleep(draw.uniform(0.0, draw.choice(LATEST)))
     for _ in range(draw.choice((1, 1, 2))):
-        heard = _heard(process.pid)
-        if process.poll() is None:
-            os.killpg(process.pid, number) if number == signal.SIGINT else process.terminate()
+        heard = _heard(process.number)
+        process.signal(number, group=number == signal.SIGINT)
         time.sleep(draw.uniform(0.0, 0.3))
-    hung = False
-    try:
-        said = process.communicate(timeout=PATIENCE)[0].decode(errors="replace")
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        said, hung = process.communicate()[0].decode(errors="replace"), True
-    until = time.monotonic() + 10.0
-    while (processes := marked(folder)) and time.monotonic() < until:
-        time.sleep(0.05)
-    left = [p.name for p in temporary.iterdir()]
-    hidden = [*here.rglob(".*")]
-    left += [str(path.relative_to(folder)) for path in hidden]
-    shutil.rmtree(temporary)
-    temporary.mkdir()
-    for path in hidden:
-        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    status, said = process.ended()
+    left = [*room.left(), *_removed(here.rglob(".*"))]
     if _contents(here / READ) != read:
         return "lost", f"the folder of the earlier run has changed: {said[-300:]}"
-    if hung:  # Python's own start may lose a signal, such as in a callback of its imports
+    if status is None:  # Python's own start may lose a signal, such as in a callback of its imports
         return ("hung" if heard else "before"), f"no end after {PATIENCE:g} s: {said[-300:]}"
-    if not heard and (process.returncode == -number or _python_itself(process.returncode, said)):
+    if not heard and (status == -number or python_itself(status, said)):
         return "before", ""
     broken = any(mark in said for mark in ("Traceback", "Exception ignored", "leaked", "Fatal"))
-    if process.returncode not in (0, 1, 2) or broken:
-        return "crashed", f"status {process.returncode}: {said[-500:]}"
-    if processes or left:
-        return "lost", f"processes {processes}, temporary {left}: {said[-300:]}"
-    if process.returncode and "hapticlink: " not in said and "interrupted" not in said:
-        return "crashed", f"status {process.returncode} without a word: {said[-300:]}"
-    return "told" if process.returncode else "done", ""
+    if status not in (0, 1, 2) or broken:
+        return "crashed", f"status {status}: {said[-500:]}"
+    if left:
+        return "lost", f"{'; '.join(left)}: {said[-300:]}"
+    if status and "hapticlink: " not in said and "interrupted" not in said:
+        return "crashed", f"status {status} without a word: {said[-300:]}"
+    return "told" if status else "done", ""
+
+
+def _removed(paths: Iterable[Path]) -> list[str]:
+    """Their names."""
+    found = [*paths]
+    for path in found:
+        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    return [path.name for path in found]
 
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     """`number` cases, the commands in turn."""
-    with tempfile.TemporaryDirectory(prefix="attack-") as name:
-        folder = Path(name)
-        for each in ("here", "temporary"):
-            (folder / each).mkdir()
-        first = [sys.executable, "-m", "hapticlink", *RUN, "--out", READ]
-        subprocess.run(first, cwd=folder / "here", check=True, capture_output=True)
+    with own_folder() as folder:
+        (folder / "here").mkdir()
+        room = Room(folder)
+        status, said = room.started([*RUN, "--out", READ], "here").ended()
+        assert status == 0, said
         read = _contents(folder / "here" / READ)
-        for i in range(number):
+        for i, case, draw in seeded(number, seed):
             kind = [*COMMANDS][i % len(COMMANDS)]
-            outcome, wrong = _case(kind, folder, read, random.Random(f"{seed} {i}"))
-            yield Made(kind, f"number {i} of seed {seed}", outcome, wrong)
+            yield Made(kind, case, *_case(kind, room, read, draw))
 
-
-OUTCOMES = ("before", "done", "told", "lost", "crashed", "hung")
 
 if __name__ == "__main__":
-    command("signals_of_commands", "Signals at random instants of commands.", attack, 300, OUTCOMES)
+    about = "Signals at random instants of commands."
+    command("signals_of_commands", about, attack, 300, OF_SIGNALS)

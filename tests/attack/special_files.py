@@ -5,15 +5,13 @@ from __future__ import annotations
 
 import json
 import os
-import random
-import shutil
 import socket
-import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from tests.attack.cases import Made, command
+from tests.attack.cases import Made, command, seeded
 from tests.attack.commands import Place
+from tests.attack.processes import own_folder
 
 NAMES = ("run.json", "haptics.csv", "plan.txt", "haptics.rows", "new")
 COMMANDS = ("run", "report", "compare", "recover", "export", "sweep")
@@ -68,14 +66,12 @@ def _arguments(name: str, out: Path, elsewhere: Path) -> list[str]:
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     """`number` folders, the kinds in turn."""
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
-        place = Place(Path(folder))
-        elsewhere = Path(folder) / "elsewhere"
+    with own_folder() as folder:
+        place, elsewhere = Place(folder), folder / "elsewhere"
         elsewhere.mkdir()
-        for i in range(number):
-            draw, kind = random.Random(f"{seed} {i}"), [*KINDS][i % len(KINDS)]
-            shutil.rmtree(place.out, ignore_errors=True)
-            shutil.copytree(place.folder / "earlier", place.out)
+        for i, _, draw in seeded(number, seed):
+            kind = [*KINDS][i % len(KINDS)]
+            place.renew()
             spoiled = place.out / draw.choice(NAMES)
             if kind != "a folder that is listed" or spoiled.name != "run.json":
                 spoiled.unlink(missing_ok=True)
@@ -90,7 +86,7 @@ def _judged(place: Place, status: int | None, said: str) -> tuple[str, str]:
         return bad
     if "╭" in said:
         return "crashed", f"the attack's own command: {said[-300:]}"
-    if left := place.left():
+    if left := place.left_files():
         return "lost", f"temporary {', '.join(left)}: {said[-300:]}"
     return ("done", "told", "refused")[status or 0], ""
 

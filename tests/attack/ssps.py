@@ -8,18 +8,16 @@ from __future__ import annotations
 import json
 import random
 import re
-import tempfile
-import zipfile
 from collections.abc import Iterator
 from html import escape, unescape
-from io import BytesIO
-from pathlib import Path
 from xml.etree import ElementTree
 
 import hapticlink as hl
 from tests.attack import mutations
+from tests.attack.archives import entries, zipped
 from tests.attack.cases import Made, command
 from tests.attack.commands import Place
+from tests.attack.processes import own_folder
 
 SCENES = ("pendulum", "sampled-spring", "closed-loop")
 KINDS = ("bytes", "text", "elements", "annotation", "description")
@@ -30,19 +28,6 @@ XML = (
     *("4294967297", "2147483649", "9" * 5000, "x" * 5000, "../../etc/passwd", "/etc/passwd"),
 )
 """Words that hurt where an attribute or some text stands."""
-
-
-def entries(content: bytes) -> dict[str, bytes]:
-    with zipfile.ZipFile(BytesIO(content)) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
-
-
-def packed(files: dict[str, bytes]) -> bytes:
-    made = BytesIO()
-    with zipfile.ZipFile(made, "w") as archive:
-        for name, content in files.items():
-            archive.writestr(name, content)
-    return made.getvalue()
 
 
 def elements(text: bytes, draw: random.Random) -> bytes:
@@ -106,21 +91,20 @@ def changed(kind: str, content: bytes, draw: random.Random) -> bytes:
         inside = entries(files[name])
         change = draw.choice((text, elements))
         inside[DESCRIPTION] = change(inside[DESCRIPTION], draw)
-        files[name] = packed(inside)
+        files[name] = zipped(inside)
     else:
         files[STRUCTURE] = CHANGES[kind](files[STRUCTURE], draw)
-    return packed(files)
+    return zipped(files)
 
 
 def attack(number: int, seed: int) -> Iterator[Made]:
     draw = random.Random(seed)
-    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+    with own_folder() as folder:
         whole = [
-            hl.export(name, {"duration": 0.05}, out=Path(folder) / f"{name}.ssp").read_bytes()
+            hl.export(name, {"duration": 0.05}, out=folder / f"{name}.ssp").read_bytes()
             for name in SCENES
         ]
-        place = Place(Path(folder))
-        path = Path(folder) / "attack.ssp"
+        place, path = Place(folder), folder / "attack.ssp"
         for i in range(number):
             kind, which = KINDS[i % len(KINDS)], draw.randrange(len(SCENES))
             path.write_bytes(changed(kind, whole[which], draw))

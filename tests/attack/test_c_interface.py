@@ -1,6 +1,5 @@
 """The attack on the C interface, in short."""
 
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pytest
 from hapticlink.components.component import Component
 from hapticlink.fmus.native.archive import WRAPPER
 from tests.attack.c_interface import Fmu, called, can_sanitize, native, python, sanitized, trapped
-from tests.attack.cases import counted
+from tests.attack.cases import counted, total
 from tests.fmus import sample_components
 
 with_gcc = pytest.mark.skipif(not can_sanitize(), reason="no gcc with a library for addresses")
@@ -20,7 +19,7 @@ def test_every_call_returns(
     tmp_path: Path, make: Callable[[Component, Path], Fmu], capsys: pytest.CaptureFixture[str]
 ) -> None:
     made = make(sample_components.controller(), tmp_path)
-    counts = sum(counted(called(made, 2000, 7, tmp_path)).values(), Counter())
+    counts = total(counted(called(made, 2000, 7, tmp_path)))
     assert counts == {"returned": 2000}, capsys.readouterr().err
 
 
@@ -43,5 +42,4 @@ def test_the_attack_finds_what_is_wrong(
     assert good in text
     (tmp_path / "broken.c").write_text(text.replace(good, bad))
     broken = make(sample_components.controller(), tmp_path, tmp_path / "broken.c")
-    outcomes = sum(counted(called(broken, 4000, 7, tmp_path)).values(), Counter())
-    assert outcomes["crashed"]
+    assert total(counted(called(broken, 4000, 7, tmp_path)))["crashed"]

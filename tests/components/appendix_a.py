@@ -1,10 +1,16 @@
 """The report's Appendix A, written out by hand as corrected: an independent five-bar.
 
 f are the centre-of-mass fractions; r_cm,2 and r_cm,4 take f_i (printed: 1 - f_i), W21 has the
-plus sign that is missing in print, w has two rows (printed: four), C its two missing zeros.
+plus sign that is missing in print, w has two rows (printed: four), C its two missing zeros. Masses,
+lengths, inertias and fractions are those of Table 6.1 if not given.
 """
 
 import numpy as np
+
+from tests.mechanisms import TABLE_6_1
+
+M, L, J = (TABLE_6_1[name] for name in "mlI")
+F = (0.5,) * 4
 
 
 def trig(q):
@@ -14,7 +20,7 @@ def trig(q):
     )
 
 
-def D(q, m, l, J, f):  # noqa: E741
+def D(q, m=M, l=L, J=J, f=F):  # noqa: E741
     (_, _, _, _, c2, c4), _ = trig(q)
     out = np.zeros((4, 4))
     for o, (a, b, c) in ((0, (0, 1, c2)), (2, (2, 3, c4))):
@@ -26,7 +32,7 @@ def D(q, m, l, J, f):  # noqa: E741
     return out
 
 
-def C(q, qd, m, l, f):  # noqa: E741
+def C(q, qd, m=M, l=L, f=F):  # noqa: E741
     _, (_, _, _, _, s2, s4) = trig(q)
     k2, k4 = m[1] * l[0] * f[1] * l[1] * s2, m[3] * l[2] * f[3] * l[3] * s4
     return np.array(
@@ -39,7 +45,7 @@ def C(q, qd, m, l, f):  # noqa: E741
     )
 
 
-def h(q, l):  # noqa: E741
+def h(q, l=L):  # noqa: E741
     (c1, c12, c3, c34, *_), (s1, s12, s3, s34, *_) = trig(q)
     return np.array(
         [
@@ -49,7 +55,7 @@ def h(q, l):  # noqa: E741
     )
 
 
-def W(q, l):  # noqa: E741
+def W(q, l=L):  # noqa: E741
     (c1, c12, c3, c34, *_), (s1, s12, s3, s34, *_) = trig(q)
     return np.array(
         [
@@ -59,7 +65,7 @@ def W(q, l):  # noqa: E741
     )
 
 
-def w(q, qd, l):  # noqa: E741
+def w(q, qd, l=L):  # noqa: E741
     (c1, c12, c3, c34, *_), (s1, s12, s3, s34, *_) = trig(q)
     a, b, c, d = qd[0] ** 2, (qd[0] + qd[1]) ** 2, qd[2] ** 2, (qd[2] + qd[3]) ** 2
     return np.array(
@@ -70,20 +76,31 @@ def w(q, qd, l):  # noqa: E741
     )
 
 
-def r_h(q, l, f):  # noqa: E741
+def r_h(q, l=L, f=F):  # noqa: E741
     (c1, c12, *_), (s1, s12, *_) = trig(q)
     return np.array([l[0] * c1 + f[1] * l[1] * c12, l[0] * s1 + f[1] * l[1] * s12, q[0] + q[1]])
 
 
-def J_h(q, l, f):  # noqa: E741
+def J_h(q, l=L, f=F):  # noqa: E741
     (c1, c12, *_), (s1, s12, *_) = trig(q)
     a, b = f[1] * l[1] * s12, f[1] * l[1] * c12
     return np.array([[-l[0] * s1 - a, -a, 0, 0], [l[0] * c1 + b, b, 0, 0], [1, 1, 0, 0]])
 
 
-def acceleration(q, qd, F, m, l, J, f):  # noqa: E741
-    """(qdd, lambda) of (2.3) and (3.1), by a dense solve."""
-    K = np.block([[D(q, m, l, J, f), -W(q, l).T], [W(q, l), np.zeros((2, 2))]])
-    rhs = np.concatenate([J_h(q, l, f).T @ F - C(q, qd, m, l, f) @ qd, -w(q, qd, l)])
-    out = np.linalg.solve(K, rhs)
-    return out[:4], out[4:]
+def solution(q, qd, Q):
+    """(qdd, lambda) of (2.3) and (3.1) under the joint efforts Q, by a dense solve."""
+    K = np.block([[D(q), -W(q).T], [W(q), np.zeros((2, 2))]])
+    solved = np.linalg.solve(K, np.concatenate([Q - C(q, qd) @ qd, -w(q, qd)]))
+    return solved[:4], solved[4:]
+
+
+def acceleration(q, qd, wrench):
+    """(qdd, lambda) under a wrench of the hand."""
+    return solution(q, qd, J_h(q).T @ wrench)
+
+
+def joint_mobility(q):
+    """D^-1 (1 - W' (W D^-1 W')^-1 W D^-1): joint accelerations by joint efforts."""
+    D_inv, closures = np.linalg.inv(D(q)), W(q)
+    through = closures @ D_inv
+    return D_inv - through.T @ np.linalg.solve(through @ closures.T, through)

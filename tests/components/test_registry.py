@@ -3,7 +3,7 @@
 import pytest
 
 from hapticlink.components import registry
-from hapticlink.components.registry import Registry
+from hapticlink.components.registry import Registry, near
 
 
 @pytest.fixture
@@ -52,3 +52,16 @@ def test_names_that_fit_are_read_when_they_are_asked_for(gears):
     assert forward.checked("second") == "second"
     with pytest.raises(ValueError, match="no gear 'reverse'; there are first, second"):
         forward.checked("reverse")
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "hint"),
+    [
+        ("rod", ["ground", "wheel"], "there are ground, wheel"),
+        ("bra", ["bar", "ground"], "did you mean 'bar'?"),
+        ("controler", ["controller", "hand"], "did you mean 'controller'?"),
+    ],
+)
+def test_a_hint_is_near(name, known, hint):
+    """What may have been meant, and nothing far from it."""
+    assert near(name, known) == hint

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipkinc
 
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import Running, advance, virtual_mechanism
 from tests.shared_fixtures import sets, status
 
 G = 9.81
@@ -39,9 +39,7 @@ def mechanism(n, rate):
 
 
 def tip_after(component, rate, duration=10):
-    block = Running(component)
-    for _ in range(duration * rate):
-        block.step(1 / rate)
+    block = advance(Running(component), duration, rate)
     return block.outputs("x")["x"][:2]
 
 

@@ -106,8 +106,7 @@ def test_six_bar_draws_the_output_of_its_coupler_point():
 
 def test_the_instrument_turns_about_the_trocar():
     """No joint is there, and one parallelogram would do: two redundant closures."""
-    block = running("remote-centre")
-    block.set(F_hand=(3.0, 0.5, 0.0))
+    block = running("remote-centre").set(F_hand=(3.0, 0.5, 0.0))
     angles = []
     for y in motion(block, 0.3):
         x, theta = y["x"][:2], y["x"][2]

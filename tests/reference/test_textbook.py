@@ -9,7 +9,7 @@ import pytest
 
 from hapticlink.components.specs.linkage import Loop
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import advance, running
 from tests.reference.absolute_coordinates import Absolute
 
 H = 1 / 512
@@ -30,13 +30,8 @@ def undriven(name):
     return replace(found, joint=joints, start_velocity=start)
 
 
-def running(found, **mechanism):
-    settings = replace(open_scene.load("four-bar").mechanism, **mechanism)
-    return Running(virtual_mechanism(found, settings, step_s=H))
-
-
 def motion(name, t_end):
-    block = running(linkage(name))
+    block = running(linkage(name), step_s=H)
     for _ in range(round(t_end / H)):
         block.step(H)
         yield block.y
@@ -57,10 +52,9 @@ def polar(r, angle):
 @pytest.mark.parametrize("name", [*SLOTS, *PINS])
 def test_motion_is_that_in_absolute_coordinates(name):
     found = undriven(name)
-    block = running(found, integrator="dormand-prince-8")
+    block = running(found, step_s=H, integrator="dormand-prince-8")
     q0, qd0, begin = block.y["q"], block.y["qd"], float(block.y["energy"])
-    for _ in range(128):
-        block.step(H)
+    advance(block, 128 * H, 512)
     q, gained = Absolute(found, q0, qd0).joints(128 * H)
     assert abs(gained) < 1e-10
     assert np.abs(block.y["q"] - q0).max() > 0.05
@@ -169,9 +163,8 @@ def test_a_cut_slide_moves_as_one_in_the_tree():
         if j is slide else j
         for j in tree.joint
     )  # fmt: skip
-    exact = {"integrator": "dormand-prince-8"}
+    exact = {"integrator": "dormand-prince-8", "step_s": H}
     blocks = [running(tree, **exact)]
-    start = dict(tree.start)
     q = dict(zip((j.name for j in tree.joint), blocks[0].y["q"], strict=True))
     start = {name: float(value) for name, value in q.items() if name != slide.name}
     start[slide.name] = -sum(start.values())  # the slider stays level

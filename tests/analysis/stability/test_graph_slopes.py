@@ -11,16 +11,9 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.stability import forward_sensitivity
 from tests.analysis.stability.own_hand import own_hand
+from tests.analysis.stability.test_stability import HELD
 
 Vector = NDArray[np.float64]
-HELD: dict[str, Any] = {
-    "hand": {
-        "type": "spring",
-        "stiffness": [300.0, 300.0, 1.0],
-        "damping": [5.0, 5.0, 0.01],
-        "target": [[0.0, 0.0445, 0.0148, -0.7878]],
-    }
-}
 AMPLIFIED = 1000
 """Of the rounding of results of order 1, by mobilities of 400 1/kg on the way to them."""
 CASES = {

@@ -14,6 +14,12 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.system.build_system import built
 
 T = 1 / 512
+HELD: dict[str, Any] = {
+    "hand": {
+        "type": "spring", "stiffness": [100.0, 100.0, 0.1], "damping": [5.0, 5.0, 0.005],
+        "target": [[0.0, 0.035, 0.025, -0.785]],
+    }
+}  # fmt: skip
 WALL: dict[str, Any] = {
     "fmu.wall.settings.unilateral": False,
     "fmu.wall.settings.damping": 1.0,
@@ -81,11 +87,8 @@ def test_too_many_forces_are_refused_before_anything_is_searched() -> None:
 
 def test_a_rate_that_hardly_repeats_is_judged_with_whole_frames() -> None:
     """29.97 and 512 Hz repeat after 100 s; 17 haptic periods are a frame of 30.118 Hz."""
-    hold = {"stiffness": [100.0, 100.0, 0.1], "damping": [5.0, 5.0, 0.005]}
-    hand = {"type": "spring", "target": [[0.0, 0.035, 0.025, -0.785]]} | hold
     found, whole = (
-        hl.passivity("closed-loop", {"graphics.rate": rate, "hand": hand})
-        for rate in (30, "512/17")
+        hl.passivity("closed-loop", HELD | {"graphics.rate": rate}) for rate in (30, "512/17")
     )
     assert "30.118 Hz" in found.rounded
     assert found.rounded in "".join(found.lines())
@@ -106,9 +109,7 @@ def test_a_target_that_comes_to_rest_later_is_judged_from_there() -> None:
 def test_at_half_the_rate_rounding_is_no_damping() -> None:
     """A force that changes its sign every period does not move the device, which has no impedance
     there: its own damping was found to be -1.5e8 N.s/m, that of rounding."""
-    hold = {"stiffness": [100.0, 100.0, 0.1], "damping": [5.0, 5.0, 0.005]}
-    hand = {"type": "spring", "target": [[0.0, 0.035, 0.025, -0.785]]} | hold
-    found = hl.passivity("closed-loop", {"graphics.rate": 512, "hand": hand})
+    found = hl.passivity("closed-loop", HELD | {"graphics.rate": 512})
     assert abs(found.own) < 1.0
     assert found.needed < 10.0
     assert max(f for f, _ in found.curve) < 256.0

@@ -197,35 +197,33 @@ def test_an_algebraic_loop_has_the_growth_of_its_run(method: str, interpolation:
     assert found.kinks.max() < KINK
 
 
-def test_redundant_closures_are_kept_by_perturbations(tmp_path: Path) -> None:
+def test_redundant_closures_are_kept_by_perturbations() -> None:
     """A bar that hangs on three equal rods, of which two would do (one equation is redundant):
     phi'' = -g (3 m/2 + M)/(l (m + M)) phi. Nothing dissipates: the radius is 1, though z is not."""
-    rods, bar, length = 0.5, 2.0, 0.8
-    lines = [
-        'title = "a bar on three rods"',
-        "duration = 1.0",
-        "haptics.rate = 512",
-        "[linkage]",
-        'operational_point = { body = "bar" }',
-        "gravity = [0.0, -9.81]",
-        "start = { joint1 = -1.5707963267948966, joint2 = -1.5707963267948966, "
-        "joint3 = -1.5707963267948966, bar = 1.5707963267948966 }",
-        f'[[linkage.body]]\nname = "bar"\nmass = {bar}\ninertia = 0.1\ncenter = [0.5, 0.0]',
-        '[[linkage.joint]]\nname = "bar"\nparent = "rod1"\nchild = "bar"'
-        f"\nat_parent = [{length}, 0.0]",
-    ]
-    for k in (1, 2, 3):
-        lines += [
-            f'[[linkage.body]]\nname = "rod{k}"\nmass = {rods}\ninertia = {rods * length**2 / 12}',
-            f"center = [{length / 2}, 0.0]",
-            f'[[linkage.joint]]\nname = "joint{k}"\nchild = "rod{k}"\nat_parent = [{0.5 * k}, 0.0]',
-        ]
-    for k in (2, 3):
-        ends = f"[[{0.5 * (k - 1)}, 0.0], [{length}, 0.0]]"
-        lines += [f'[[linkage.loop]]\nbodies = ["bar", "rod{k}"]\nat = {ends}']
-    path = tmp_path / "bar.toml"
-    path.write_text("\n".join(lines))
-    found = own_hand(path)
+    rods, bar, length, down = 0.5, 2.0, 0.8, -math.pi / 2
+    rod = {"mass": rods, "inertia": rods * length**2 / 12, "center": [length / 2, 0.0]}
+    on_bar = {"parent": "rod1", "child": "bar", "at_parent": [length, 0.0]}
+    linkage = {
+        "gravity": [0.0, -9.81],
+        "operational_point": {"body": "bar"},
+        "start": {"joint1": down, "joint2": down, "joint3": down, "bar": -down},
+        "body": [
+            {"name": "bar", "mass": bar, "inertia": 0.1, "center": [0.5, 0.0]},
+            *({"name": f"rod{k}"} | rod for k in (1, 2, 3)),
+        ],
+        "joint": [
+            {"name": "bar"} | on_bar,
+            *(
+                {"name": f"joint{k}", "child": f"rod{k}", "at_parent": [0.5 * k, 0.0]}
+                for k in (1, 2, 3)
+            ),
+        ],
+        "loop": [
+            {"bodies": ["bar", f"rod{k}"], "at": [[0.5 * (k - 1), 0.0], [length, 0.0]]}
+            for k in (2, 3)
+        ],
+    }
+    found = own_hand(hl.scene("pendulum", {"linkage": linkage, "duration": 1.0}))
     (mode,) = found.modes
     omega = math.sqrt(9.81 * (1.5 * rods + bar) / (length * (rods + bar)))
     assert mode.omega == pytest.approx(omega, rel=1e-6)
@@ -348,9 +346,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.fixture(scope="module")
 def held_by_spring() -> tuple[dict[str, Any], float]:
     """A spring hand that holds `closed-loop-direct`, and its spectral radius with zoh."""
-    hand = {"type": "spring", "stiffness": [300.0, 300.0, 1.0], "damping": [5.0, 5.0, 0.01]}
-    target = [[0.0, 0.0445, 0.0148, -0.7878]]
-    options = {"graphics.rate": 64, "hand": hand | {"target": target}}
+    options = HELD | {"graphics.rate": 64}
     return options, own_hand("closed-loop-direct", options).radius
 
 

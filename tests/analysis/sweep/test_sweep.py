@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from decimal import Decimal
 from pathlib import Path
@@ -185,8 +185,13 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def read(folder: Path) -> list[dict[str, str]]:
+    """The rows of the table, without the run time."""
     with (folder / "table.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
+        return [{k: v for k, v in r.items() if k != "run_time_s"} for r in csv.DictReader(file)]
+
+
+def ends(folder: Path) -> list[str]:
+    return [row["end"] for row in read(folder)]
 
 
 def test_one_table_whatever_the_processes(bar: Path, tmp_path: Path) -> None:
@@ -198,11 +203,11 @@ def test_one_table_whatever_the_processes(bar: Path, tmp_path: Path) -> None:
         assert status("sweep", bar, "--vary", vary, "--out", out, "--jobs", jobs) == 0
         assert (out / "sweep.png").is_file()
         assert not (out / ".running").exists()
-        tables.append([{k: v for k, v in r.items() if k != "run_time_s"} for r in read(out)])
+        tables.append(read(out))
     assert tables[0] == tables[1]
     # x = t/2: the run ends at the first tick at which that is above the limit.
-    ends = [(np.floor(1024 * limit) + 1) / 512 for limit in limits]
-    assert [float(r["end_time_s"]) for r in tables[0]] == ends
+    times = [(np.floor(1024 * limit) + 1) / 512 for limit in limits]
+    assert [float(r["end_time_s"]) for r in tables[0]] == times
     assert {r["end"] for r in tables[0]} == {"stop_when"}
 
 
@@ -271,7 +276,7 @@ def test_a_sweep_of_which_nothing_is_left_fails(bar: Path, tmp_path: Path) -> No
     line = ("sweep", bar, "--vary", "duration=0.1,0.2", "--out", tmp_path / "out", "--jobs", 1)
     set_ = ("--set", "linkage.start.slide=1.7e308", "--set", "linkage.start_velocity.slide=1e308")
     assert status(*line, *set_) == 1
-    assert [r["end"] for r in read(tmp_path / "out")] == ["fault", "fault"]
+    assert ends(tmp_path / "out") == ["fault", "fault"]
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -308,25 +313,34 @@ class Unit(Fmi2Slave):
 """
 
 
+def unit(folder: Path, slave: str = SLAVE, keys: str = "duration = 0.2") -> Path:
+    """A scene of one FMU."""
+    (folder / "unit.py").write_text(slave)
+    FmuBuilder.build_FMU(folder / "unit.py", dest=folder)
+    path = folder / "foreign.toml"
+    path.write_text(f"""title = "One unit"
+haptics.rate = 100
+{keys}
+[[fmu]]
+name = "unit"
+path = "Unit.fmu"
+rate = "haptics"
+start = {{ die = 0.0, nap = 0.0 }}
+""")
+    return path
+
+
 @pytest.fixture
 def foreign(tmp_path: Path) -> Path:
     """A scene of one FMU that can crash its process, or take its time."""
-    (tmp_path / "unit.py").write_text(SLAVE)
-    FmuBuilder.build_FMU(tmp_path / "unit.py", dest=tmp_path)
-    path = tmp_path / "foreign.toml"
-    path.write_text(
-        'title = "One unit"\nduration = 0.2\nhaptics.rate = 100\n'
-        '[[fmu]]\nname = "unit"\npath = "Unit.fmu"\nrate = "haptics"\n'
-        "start = { die = 0.0, nap = 0.0 }\n"
-    )
-    return path
+    return unit(tmp_path)
 
 
 def test_a_crashed_process_takes_one_run(foreign: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     vary = "fmu.unit.start.die=0.0,1.0,2.0"
     assert status("sweep", foreign, "--vary", vary, "--out", out, "--jobs", 2) == 0
-    assert [r["end"] for r in read(out)] == ["duration", "died", "duration"]
+    assert ends(out) == ["duration", "died", "duration"]
     assert len(list((out / "rows").iterdir())) == 2  # the next sweep tries the dead one again
 
 
@@ -349,31 +363,36 @@ def test_what_fails_for_the_machine_is_made_again_and_what_the_scene_gives_is_no
                 raise OSError("no space left on device")
             if self.die == 3.0:
                 os.kill(os.getpid(), 9)"""
-    (tmp_path / "unit.py").write_text(
-        SLAVE.replace("\n        if self.die == 1.0:\n            os._exit(3)", body)
-    )
-    FmuBuilder.build_FMU(tmp_path / "unit.py", dest=tmp_path)
-    path = tmp_path / "foreign.toml"
-    path.write_text(
-        'title = "One unit"\nduration = 0.02\nhaptics.rate = 100\nisolate = true\n'
-        'faults.timeout = 2.0\n[[fmu]]\nname = "unit"\npath = "Unit.fmu"\n'
-        "start = { die = 0.0, nap = 0.0 }\n"
-    )
+    slave = SLAVE.replace("\n        if self.die == 1.0:\n            os._exit(3)", body)
+    path = unit(tmp_path, slave, "duration = 0.02\nisolate = true\nfaults.timeout = 2.0")
     line = ("sweep", path, "--vary", "fmu.unit.start.die=0.0,1.0,2.0,3.0,4.0", "--jobs", 1)
     ill.touch()
     assert status(*line, "--out", tmp_path / "out") == 0
-    ends = [r["end"] for r in read(tmp_path / "out")]
-    assert ends == ["duration", "died", "died", "died", "fault"]
+    assert ends(tmp_path / "out") == ["duration", "died", "died", "died", "fault"]
     ill.unlink()
     before = log.read_text()
     assert status(*line, "--out", tmp_path / "out") == 0
-    ends = [r["end"] for r in read(tmp_path / "out")]
-    assert ends == ["duration"] * 4 + ["fault"]
+    assert ends(tmp_path / "out") == ["duration"] * 4 + ["fault"]
     again = log.read_text().removeprefix(before).split()
     assert set(again) == {"1.0", "2.0", "3.0"}
 
 
-def _gone(group: int) -> bool:
+def started(*arguments: object) -> subprocess.Popen[str]:
+    """A sweep in a process group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "hapticlink", "sweep", *map(str, arguments)],
+        start_new_session=True, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    """For 60 s at most."""
+    until = time.monotonic() + 60
+    while not holds() and time.monotonic() < until:
+        time.sleep(0.05)
+
+
+def gone(group: int) -> bool:
     try:
         os.killpg(group, 0)
     except ProcessLookupError:
@@ -387,27 +406,17 @@ def test_an_interrupted_sweep_goes_on(
     foreign: Path, tmp_path: Path, number: int, in_this_process: None
 ) -> None:
     out, naps = tmp_path / "out", "0.0001,0.0002,0.0003,0.4,0.5,0.6"
-    arguments = [
-        "sweep", str(foreign), "--vary", f"fmu.unit.start.nap={naps}", "--out", str(out),
-        "--jobs", "2",
-    ]  # fmt: skip
-    code = f"from hapticlink.commands import main\nmain({arguments!r})"
-    started = subprocess.Popen(
-        [sys.executable, "-c", f"if __name__ == '__main__':\n {code.replace(chr(10), '; ')}"],
-        start_new_session=True, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    until = time.monotonic() + 60
-    while len(list(out.glob("rows/*.json"))) < 3 and time.monotonic() < until:
-        time.sleep(0.05)
-    started.send_signal(number)
-    message = started.communicate(timeout=30)[1]
-    while not _gone(started.pid) and time.monotonic() < until:
-        time.sleep(0.05)
-    assert _gone(started.pid)  # no worker outlives the sweep
+    vary = f"fmu.unit.start.nap={naps}"
+    sweep = started(foreign, "--vary", vary, "--out", out, "--jobs", 2)
+    wait_until(lambda: len(list(out.glob("rows/*.json"))) >= 3)
+    sweep.send_signal(number)
+    message = sweep.communicate(timeout=30)[1]
+    wait_until(lambda: gone(sweep.pid))
+    assert gone(sweep.pid)  # no worker outlives the sweep
     if number != signal.SIGKILL:
-        assert started.returncode == 1
+        assert sweep.returncode == 1
         assert "interrupted: 3 of 6 runs" in message
-        assert [r["end"] for r in read(out)] == ["duration"] * 3
+        assert ends(out) == ["duration"] * 3
         assert not (out / ".running").exists()
     kept = {p.name: p.read_text() for p in out.glob("rows/*.json")}
     assert len(kept) == 3
@@ -423,19 +432,13 @@ def test_an_interrupted_sweep_goes_on(
 def test_a_sweep_that_is_interrupted_twice_leaves_nothing(foreign: Path, tmp_path: Path) -> None:
     """The second signal, at once, ends the process where it is."""
     out = tmp_path / "out"
-    vary = ["--vary", "fmu.unit.start.nap=0.4,0.5,0.6", "--jobs", "2"]
-    started = subprocess.Popen(
-        [sys.executable, "-m", "hapticlink", "sweep", str(foreign), *vary, "--out", str(out)],
-        start_new_session=True, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    until = time.monotonic() + 60
-    while len(list(out.glob(".running/*"))) < 2 and time.monotonic() < until:
-        time.sleep(0.05)
+    vary = "fmu.unit.start.nap=0.4,0.5,0.6"
+    sweep = started(foreign, "--vary", vary, "--out", out, "--jobs", 2)
+    wait_until(lambda: len(list(out.glob(".running/*"))) >= 2)
     for number in (signal.SIGINT, signal.SIGTERM):  # two of one kind may come as one
-        started.send_signal(number)
-    message = started.communicate(timeout=30)[1]
-    while not _gone(started.pid) and time.monotonic() < until:
-        time.sleep(0.05)
+        sweep.send_signal(number)
+    message = sweep.communicate(timeout=30)[1]
+    wait_until(lambda: gone(sweep.pid))
     assert "interrupted twice" in message
     assert "resource_tracker" not in message
     assert not (out / ".running").exists()
@@ -445,9 +448,7 @@ def test_a_sweep_that_is_interrupted_twice_leaves_nothing(foreign: Path, tmp_pat
 def test_a_run_is_made_again_where_its_fmu_has_changed(foreign: Path, tmp_path: Path) -> None:
     arguments = ("sweep", foreign, "--vary", "duration=0.1", "--out", tmp_path / "out")
     assert status(*arguments) == 0
-    script = tmp_path / "unit.py"
-    script.write_text(SLAVE.replace("self.y = time_now", "self.y = 2 * time_now"))
-    FmuBuilder.build_FMU(script, dest=tmp_path)
+    unit(tmp_path, SLAVE.replace("self.y = time_now", "self.y = 2 * time_now"))
     assert status(*arguments) == 0
     assert len(list((tmp_path / "out" / "rows").iterdir())) == 2
 
@@ -525,12 +526,8 @@ def test_a_cluster_makes_the_same_table(bar: Path, tmp_path: Path, in_this_proce
         out = ("--out", tmp_path / "there")
         assert status("sweep", bar, "--vary", vary, "--scheduler", address, *out) == 0
     assert status("sweep", bar, "--vary", vary, "--out", tmp_path / "here") == 0
-    there, here = (
-        [{k: v for k, v in r.items() if k != "run_time_s"} for r in read(tmp_path / place)]
-        for place in ("there", "here")
-    )
-    assert there == here
-    assert [r["end"] for r in there] == ["stop_when", "stop_when", "refused"]
+    assert read(tmp_path / "there") == read(tmp_path / "here")
+    assert ends(tmp_path / "there") == ["stop_when", "stop_when", "refused"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")

@@ -86,8 +86,7 @@ def test_device_at_rest_accelerates_like_the_mechanism():
 
 def test_moving_device_accelerates_like_the_mechanism():
     """With C_d v sent, the velocity does not show."""
-    device = Running(haptic_device(Device()), {"F_hand": F_HAND})
-    device.put(v_true=(0.2, -0.1, 6.0))
+    device = Running(haptic_device(Device()), {"F_hand": F_HAND}).put(v_true=(0.2, -0.1, 6.0))
     y, v = device.y, device.y["v"]
     assert np.abs(np.linalg.solve(y["M"], y["c"])).max() > 0.1
     inputs = {"F_hand": F_HAND, "M": y["M"], "c": y["c"], "Lambda_inv": LAMBDA_INV}

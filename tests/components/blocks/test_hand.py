@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
-from tests.blocks import Running
+from tests.blocks import Running, advance
 
 TABLE = ((0.5, 0.0, 1.0, 0.0), (1.0, 2.0, 1.0, 0.01), (1.5, 0.0, -1.0, 0.01))
 
@@ -67,34 +67,23 @@ def test_arm_follows_its_target_path():
         return np.concatenate([x[3:], (pull - kg * x[:3] - bg * x[3:]) / m])
 
     exact = solve_ivp(derivative, (0, 0.4), np.zeros(6), "DOP853", rtol=1e-11, atol=1e-14).y[:, -1]
-    running = Running(hand(spec))
-    for _ in range(200):
-        running.step(0.002)
+    running = advance(Running(hand(spec)), 0.4)
     np.testing.assert_allclose(running.x, exact, rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(running.y["F"], kg * exact[:3] + bg * exact[3:], rtol=1e-5)
 
 
 def test_arm_settles_between_target_and_handle():
     """At rest the two springs share the distance."""
-    running = Running(hand(ArmHand(target=((0.0, 0.1, 0, 0),))))
-    for _ in range(4000):
-        running.step(0.002)
+    running = advance(Running(hand(ArmHand(target=((0.0, 0.1, 0, 0),)))), 8.0)
     assert running.y["F"][0] == pytest.approx(0.1 * 300 * 2000 / 2300, rel=1e-9)
 
 
 def test_a_spring_pulls_to_its_moving_target():
-    block = Running(
-        hand(
-            SpringHand(
-                stiffness=(100.0, 200.0, 3.0),
-                damping=(1.0, 2.0, 0.1),
-                target=((0.0, 0.0, 0.0, 0.0), (1.0, 0.1, 0.2, 0.3)),
-            )
-        )
-    )
-    block.t = 0.5
+    gains = {"stiffness": (100.0, 200.0, 3.0), "damping": (1.0, 2.0, 0.1)}
+    target = ((0.0, 0.0, 0.0, 0.0), (1.0, 0.1, 0.2, 0.3))
     x, v = np.array([0.01, -0.02, 0.3]), np.array([0.5, 0.0, -1.0])
-    block.set(x=x, v=v)
+    block = Running(hand(SpringHand(**gains, target=target))).set(x=x, v=v)
+    block.t = 0.5
     rate = np.array([0.1, 0.2, 0.3])
     expected = [100, 200, 3] * (0.5 * rate - x) + [1, 2, 0.1] * (rate - v)
     np.testing.assert_allclose(block.y["F"], expected, rtol=1e-13)

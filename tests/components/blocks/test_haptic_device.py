@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.device import pantograph
 from hapticlink.components.specs.device import Device, Observer
-from tests.blocks import Running
+from tests.blocks import Running, advance
 
 T = 1 / 512
 START = (-0.02, 0.01, 3.6)
@@ -38,10 +38,7 @@ def test_ideal_sensing_has_no_encoder_and_no_observer():
     assert [v.name for v in IDEAL.states] == ["x_true", "v_true"]
     names = {v.name for v in IDEAL.parameters}
     assert names.isdisjoint({"encoder_resolution", "omega_n", "k_D"})
-    device = at_start(IDEAL, F_hand=(0.3, -0.2, 0.001), F_motor=(0.1, 0.1, 0))
-    for _ in range(50):
-        device.step(T)
-    y = device.y
+    y = advance(at_start(IDEAL, F_hand=(0.3, -0.2, 0.001), F_motor=(0.1, 0.1, 0)), 50 * T, 512).y
     np.testing.assert_array_equal(y["x"], y["x_true"])
     np.testing.assert_array_equal(y["v"], y["v_true"])
     np.testing.assert_array_equal(y["F_hand_observed"], (0.3, -0.2, 0.001))
@@ -113,12 +110,10 @@ def test_measured_pose_is_within_a_count():
 
 
 def test_theta_is_continuous_over_many_turns():
-    device = at_start(ENCODERS)
-    device.put(v_true=(0, 0, 12.0))
+    device = at_start(ENCODERS).put(v_true=(0, 0, 12.0))
     for _ in range(600):
-        device.set(
-            F_motor=(*(-40 * (device.y["x_true"] - START)[:2] - 4 * device.y["v_true"][:2]), 0)
-        )
+        x, v = device.state["x_true"] - START, device.state["v_true"]
+        device.set(F_motor=(*(-40 * x[:2] - 4 * v[:2]), 0))
         device.step(T)
     y = device.y
     assert y["x_true"][2] - START[2] > 2 * np.pi
@@ -132,9 +127,7 @@ def test_observer_converges_to_a_constant_force(rule):
         Device(encoder_resolution=1e-6, observer=Observer(rule=rule)), encoders=True
     )
     hand = np.array([0.4, -0.3, 0.003])
-    device = at_start(component, F_hand=hand, F_motor=-hand)
-    for _ in range(512):
-        device.step(T)
+    device = advance(at_start(component, F_hand=hand, F_motor=-hand), 1.0, 512)
     np.testing.assert_allclose(device.y["F_hand_observed"], hand, atol=2e-3 * np.abs(hand).max())
     np.testing.assert_allclose(device.y["v"], 0, atol=2e-3)
 

@@ -5,30 +5,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Mechanism
-from tests.blocks import Running, virtual_environment, virtual_mechanism
+from hapticlink.components.specs.linkage import Directions, GraphicsCopy
+from tests.blocks import Running, running, virtual_environment
 from tests.components import appendix_a
-from tests.mechanisms import TABLE_6_1, WRENCH, five_bar
-
-L = np.mean(TABLE_6_1["l"])
+from tests.components.appendix_a import L
+from tests.mechanisms import WRENCH, five_bar
 
 
 def environment(**settings):
     return virtual_environment(five_bar(), GraphicsCopy(**settings), Directions())
 
 
-def mobility(q):
-    m, l, J, f = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4  # noqa: E741
-    D, W, J_h = appendix_a.D(q, m, l, J, f), appendix_a.W(q, l), appendix_a.J_h(q, l, f)
-    A, B = np.linalg.solve(D, J_h.T), np.linalg.solve(D, W.T)
-    return J_h @ (A - B @ np.linalg.solve(W @ B, W @ A))
-
-
 def test_mobility_and_projector_at_the_start():
     y = Running(environment()).y
-    Lambda_inv = mobility(y["q"])
+    J_h = appendix_a.J_h(y["q"])
+    Lambda_inv = J_h @ appendix_a.joint_mobility(y["q"]) @ J_h.T
     np.testing.assert_allclose(y["Lambda_inv"], Lambda_inv, atol=1e-12 * 522)
-    S = np.diag([1, 1, L])
+    S = np.diag([1, 1, np.mean(L)])
     U, values, _ = np.linalg.svd(S @ Lambda_inv @ S)  # (B.14), by LAPACK
     constrained = U[:, values / values[0] < 0.1]
     np.testing.assert_allclose(y["P_c"], constrained @ constrained.T, atol=1e-10)
@@ -52,19 +45,25 @@ def test_report_gains_are_stable_at_any_graphics_rate(rate, substeps):
     np.testing.assert_allclose(block.y["v"], 0, atol=1e-5)
 
 
-def frames(sync, rate):
-    """(branch_ok, q_error) frame by frame, following the mechanism alone for 3 s."""
-    leader = Running(virtual_mechanism(five_bar(), Mechanism(), step_s=1 / 512))
-    leader.set(F_hand=WRENCH)
-    copy, seen = Running(environment(sync=sync)), []
+def followed(copy, rate):
+    """(mechanism, its outputs when the frame began) after each frame of 3 s in which the copy
+    follows the mechanism alone, which is then at the end of the frame."""
+    leader = running(five_bar()).set(F_hand=WRENCH)
     for k in range(1, 3 * rate + 1):
-        y = leader.y
-        signals = {"x_ref": y["x"], "v_ref": y["v"], "q_ref": y["q"], "qd_ref": y["qd"]}
+        began = leader.y
+        signals = {f"{name}_ref": began[name] for name in ("x", "v", "q", "qd")}
         copy.set(**{v.name: signals[v.name] for v in copy.component.inputs})
         copy.step(1 / rate)
         while leader.t < k / rate - 1e-9:
             leader.step(1 / 512)
-        copy.set(q_ref=leader.y["q"])
+        yield leader, began
+
+
+def frames(sync, rate):
+    """(branch_ok, q_error) at the end of each frame."""
+    copy, seen = Running(environment(sync=sync)), []
+    for leader, _ in followed(copy, rate):
+        copy.set(q_ref=leader.state["q"])
         seen.append((copy.y["branch_ok"], copy.y["q_error"]))
     return np.array(seen)
 
@@ -88,18 +87,11 @@ def test_joint_synchronisation_stays_on_the_branch_where_the_pose_alone_folds():
 
 @pytest.mark.parametrize("rate", [10, 30, 60])
 def test_exact_synchronisation_is_where_the_mechanism_was_when_the_frame_began(rate):
-    leader = Running(virtual_mechanism(five_bar(), Mechanism(), step_s=1 / 512))
-    leader.set(F_hand=WRENCH)
     copy = Running(environment())
-    for k in range(1, 3 * rate + 1):
-        began = leader.y
-        copy.set(q_ref=began["q"], qd_ref=began["qd"])
-        copy.step(1 / rate)
+    for _, began in followed(copy, rate):
         np.testing.assert_allclose(copy.y["q"], began["q"], atol=1e-12)
         np.testing.assert_allclose(copy.y["v"], began["v"], atol=1e-11 * np.abs(began["v"]).max())
         assert copy.y["branch_ok"] == 1
-        while leader.t < k / rate - 1e-9:
-            leader.step(1 / 512)
 
 
 @settings(max_examples=30)
@@ -112,29 +104,22 @@ def test_exact_synchronisation_closes_what_its_reference_leaves_open(seed):
     qd = rng.uniform(-5, 5, 4)
     copy.set(q_ref=q, qd_ref=qd)
     copy.step(1 / 30)
-    l = TABLE_6_1["l"]  # noqa: E741
-    np.testing.assert_allclose(appendix_a.h(copy.y["q"], l), 0, atol=1e-12)
+    np.testing.assert_allclose(appendix_a.h(copy.y["q"]), 0, atol=1e-12)
     np.testing.assert_allclose(copy.y["q"], q, atol=0.01)
     closed = copy.x[4:8]
-    np.testing.assert_allclose(appendix_a.W(copy.y["q"], l) @ closed, 0, atol=1e-6)
+    np.testing.assert_allclose(appendix_a.W(copy.y["q"]) @ closed, 0, atol=1e-6)
     assert copy.y["branch_ok"] == 1
 
 
-def test_folded_copy_is_told():
-    component = environment(sync="operational")
-    block = Running(component)
+def test_a_folded_copy_is_reported():
+    block = Running(environment(sync="operational"))
     q = block.y["q"]
     block.set(q_ref=q)
     assert block.y["branch_ok"] == 1
     assert block.y["q_error"] == 0
     # The mirror image of links 3 and 4 about the line from ground to the tip.
-    tip = np.array([*TABLE_6_1["l"][2:]])
-    x, y = (
-        tip[0] * np.cos(q[2]) + tip[1] * np.cos(q[2] + q[3]),
-        tip[0] * np.sin(q[2]) + tip[1] * np.sin(q[2] + q[3]),
-    )
-    across = 2 * np.arctan2(y, x)
-    folded = np.array([q[0], q[1], across - q[2], -q[3]])
-    np.testing.assert_allclose(appendix_a.h(folded, TABLE_6_1["l"]), 0, atol=1e-12)
+    tip = L[2] * np.exp(1j * q[2]) + L[3] * np.exp(1j * (q[2] + q[3]))
+    folded = np.array([q[0], q[1], 2 * np.angle(tip) - q[2], -q[3]])
+    np.testing.assert_allclose(appendix_a.h(folded), 0, atol=1e-12)
     block.set(q_ref=folded)
     assert block.y["branch_ok"] == 0

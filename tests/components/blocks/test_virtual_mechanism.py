@@ -7,94 +7,87 @@ from scipy.optimize import minimize
 
 from hapticlink.components.dynamics.assembly import AssemblyError
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.specs.linkage import Directions, Mechanism
-from tests.blocks import Running, virtual_mechanism
+from hapticlink.components.specs.linkage import Directions
+from tests.blocks import Running, order, running
 from tests.components import appendix_a
-from tests.mechanisms import Q0, TABLE_6_1, WRENCH, five_bar, open_arm
-
-M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
-
-
-def mechanism(linkage=None, directions=None, **settings):
-    linkage = five_bar() if linkage is None else linkage
-    return virtual_mechanism(linkage, Mechanism(**settings), directions, step_s=1 / 512)
+from tests.components.appendix_a import L
+from tests.mechanisms import Q0, WRENCH, five_bar, open_arm
 
 
 def reference(q0, t_end):
     """(q, qd) at t_end by DOP853 on Appendix A, with the constant wrench of chapter 6."""
 
     def f(_, y):
-        return np.r_[y[4:], appendix_a.acceleration(y[:4], y[4:], np.array(WRENCH), M, L, J, F)[0]]
+        return np.r_[y[4:], appendix_a.acceleration(y[:4], y[4:], WRENCH)[0]]
 
     start = np.r_[q0, np.zeros(4)]
     return solve_ivp(f, (0, t_end), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
 
 
-def run(block, h, t_end):
+def largest_gap(block, steps, t_end):
+    """The largest closure error of a motion under the wrench, m."""
     block.set(F_hand=WRENCH)
-    worst = block.y.get("closure_error", 0.0)
-    for _ in range(round(t_end / h)):
-        block.step(h)
-        worst = max(worst, block.y.get("closure_error", 0.0))
-    return worst
+    gaps = [block.y["closure_error"]]
+    for _ in range(steps):
+        block.step(t_end / steps)
+        gaps.append(block.outputs("closure_error")["closure_error"])
+    return max(gaps)
+
+
+def errors(component, counts, t_end):
+    """Of the state after so many steps against DOP853, and the largest closure error."""
+    exact, found, gaps = reference(Running(component).state["q"], t_end), [], []
+    for count in counts:
+        block = Running(component)
+        gaps.append(largest_gap(block, count, t_end))
+        found.append(np.abs(block.x[:8] - exact).max())
+    return found, max(gaps)
 
 
 def test_accelerations_and_multipliers_while_moving():
     rng = np.random.default_rng(1)
-    block = Running(mechanism())
+    block = running(five_bar())
     q, qd = block.state["q"], rng.uniform(-3, 3, 4)
     block.put(qd=qd)
     block.set(F_hand=WRENCH, F_drift=(0.1, 0.2, 0.003))
     wrench = np.array(WRENCH) - (0.1, 0.2, 0.003)
-    qdd, multipliers = appendix_a.acceleration(q, qd, wrench, M, L, J, F)
+    qdd, multipliers = appendix_a.acceleration(q, qd, wrench)
     np.testing.assert_allclose(block.y["qdd"], qdd, rtol=1e-11)
     np.testing.assert_allclose(block.y["lambda"], multipliers, rtol=1e-11)
-    free, _ = appendix_a.acceleration(q, qd, np.zeros(3), M, L, J, F)
+    free, _ = appendix_a.acceleration(q, qd, np.zeros(3))
     step = 1e-6
-    Jdot = (appendix_a.J_h(q + step * qd, L, F) - appendix_a.J_h(q - step * qd, L, F)) / (2 * step)
-    bias = appendix_a.J_h(q, L, F) @ free + Jdot @ qd
+    Jdot = (appendix_a.J_h(q + step * qd) - appendix_a.J_h(q - step * qd)) / (2 * step)
+    bias = appendix_a.J_h(q) @ free + Jdot @ qd
     np.testing.assert_allclose(block.y["a_bias"], bias, rtol=1e-7)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_observed_order(method):
     """Slope of log error on log step, errors against DOP853 with its own step control."""
-    order = METHODS[method].order
+    claimed = METHODS[method].order
     # The eighth order is at rounding from 1/32 s on.
-    counts, end = ([8, 10, 12, 16], 1.0) if order == 8 else ([64, 128, 256, 512], 0.25)
-    errors = []
-    component = mechanism(integrator=method, stabilization="none")
-    exact = reference(Running(component).state["q"], end)
-    for count in counts:
-        block = Running(component)
-        run(block, end / count, end)
-        errors.append(np.abs(block.x[:8] - exact).max())
-    slope = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    assert slope == pytest.approx(order, abs=0.4 if order == 8 else 0.2)
+    counts, end = ([8, 10, 12, 16], 1.0) if claimed == 8 else ([64, 128, 256, 512], 0.25)
+    component = running(five_bar(), integrator=method, stabilization="none").component
+    found, _ = errors(component, counts, end)
+    assert order(found, counts) == pytest.approx(claimed, abs=0.4 if claimed == 8 else 0.2)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_projection_keeps_closure_to_rounding_and_the_order(method):
-    order = METHODS[method].order
-    counts, end = ((16, 24), 1.0) if order == 8 else ((128, 256), 0.25)
-    component = mechanism(integrator=method, stabilization="projection")
-    exact = reference(Running(component).state["q"], end)
-    errors = []
-    for count in counts:
-        block = Running(component)
-        assert run(block, end / count, end) < 1e-15
-        errors.append(np.abs(block.x[:8] - exact).max())
-    observed = np.log(errors[0] / errors[1]) / np.log(counts[1] / counts[0])
-    assert observed == pytest.approx(order, abs=1.5 if order == 8 else 0.25)
+    claimed = METHODS[method].order
+    counts, end = ((16, 24), 1.0) if claimed == 8 else ((128, 256), 0.25)
+    component = running(five_bar(), integrator=method, stabilization="projection").component
+    found, gap = errors(component, counts, end)
+    assert gap < 1e-15
+    assert order(found, counts) == pytest.approx(claimed, abs=1.5 if claimed == 8 else 0.25)
 
 
 def test_closure_under_semi_implicit_euler():
     """Figures 3.3 and 3.4: it drifts, and Baumgarte at dead beat holds it to 9 um."""
-    drift = run(
-        Running(mechanism(integrator="semi-implicit-euler", stabilization="none")), 1 / 512, 3
-    )
-    held = run(
-        Running(mechanism(integrator="semi-implicit-euler", stabilization="baumgarte")), 1 / 512, 3
+    euler = {"step_s": 1 / 512, "integrator": "semi-implicit-euler"}
+    drift, held = (
+        largest_gap(running(five_bar(), **euler, stabilization=kind), 3 * 512, 3.0)
+        for kind in ("none", "baumgarte")
     )
     assert drift > 1e-3
     assert held == pytest.approx(9e-6, rel=0.02)  # independent sketch of the same scheme: 9 um
@@ -102,17 +95,15 @@ def test_closure_under_semi_implicit_euler():
 
 
 def test_open_loop_has_no_multiplier_and_the_mobility_of_5_4():
-    linkage = open_arm(five_bar())
-    block = Running(mechanism(linkage, Directions()))
-    y = block.y
+    y = running(open_arm(five_bar()), directions=Directions()).y
     assert not {"lambda", "closure_error"} & set(y)
-    J_h, D = appendix_a.J_h(np.array(Q0), L, F), appendix_a.D(np.array(Q0), M, L, J, F)
+    J_h, D = appendix_a.J_h(Q0), appendix_a.D(Q0)
     np.testing.assert_allclose(y["Lambda_inv"], J_h @ np.linalg.solve(D, J_h.T), rtol=1e-12)
 
 
 def test_energy_is_the_work_of_the_hand():
     """RK4 at 1/512 s: the hand's work, by trapezoids, is the kinetic energy."""
-    block, work = Running(mechanism()), 0.0
+    block, work = running(five_bar()), 0.0
     block.set(F_hand=WRENCH)
     x = block.y["x"]
     for _ in range(512):
@@ -124,7 +115,7 @@ def test_energy_is_the_work_of_the_hand():
 
 def test_start_pose_is_hardly_farther_than_the_nearest_closed_one():
     """Against the constrained least-squares solution by SciPy; Newton's differs at second order."""
-    q = Running(mechanism()).state["q"]
+    q = running(five_bar()).state["q"]
     best = minimize(
         lambda q: np.sum((q - Q0) ** 2),
         Q0,
@@ -139,9 +130,9 @@ def test_start_pose_is_hardly_farther_than_the_nearest_closed_one():
 
 def test_a_loop_that_cannot_close_is_named_with_its_gap():
     with pytest.raises(AssemblyError, match=r"loop `loop1` \(link2 to link4\).*0\.\d+ m are left"):
-        mechanism(five_bar(l=(0.042, 0.042, 0.0184, 0.2)))
+        running(five_bar(l=(0.042, 0.042, 0.0184, 0.2)))
 
 
 def test_unknown_method_names_the_known():
     with pytest.raises(ValueError, match=r"no integrator .euler.; there are .*rk4"):
-        mechanism(integrator="euler")
+        running(five_bar(), integrator="euler")

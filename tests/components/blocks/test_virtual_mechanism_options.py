@@ -3,30 +3,19 @@
 import dataclasses
 import math
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.component import Signals
 from hapticlink.components.dynamics import closure_diagnostics
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.variables import parameters
-from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.specs.linkage import Directions, FurtherPoint, GraphicsCopy, Mechanism
+from hapticlink.components.specs.linkage import Directions, FurtherPoint, GraphicsCopy
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, virtual_environment, virtual_mechanism
+from tests.blocks import Running, running, virtual_environment
 from tests.components import appendix_a
-from tests.mechanisms import TABLE_6_1, WRENCH, five_bar, linkages
-
-M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
-
-
-def mechanism(linkage, directions=None, frame_s=None, **settings):
-    return virtual_mechanism(
-        linkage, Mechanism(**settings), directions, frame_s=frame_s, step_s=1 / 512
-    )
+from tests.components.appendix_a import L
+from tests.mechanisms import WRENCH, evaluated, five_bar, linkages
 
 
 def two_handed(at=(0.03, 0.0)):
@@ -48,16 +37,15 @@ def left(q, at=0.03):
 
 def test_two_hands_on_one_mechanism():
     """Accelerations and mobilities against Appendix A with both Jacobians."""
-    block = Running(mechanism(two_handed(), Directions()))
-    block.put(qd=appendix_a_velocity(block.state["q"]))
-    q, qd = block.state["q"], block.state["qd"]
+    block = running(two_handed(), directions=Directions())
+    q = block.state["q"]
+    qd = np.linalg.svd(appendix_a.W(q))[2][2:].T @ (2.0, -1.0)  # which the closures allow
+    block.put(qd=qd)
     second = (0.2, -0.4, 0.001)
     block.set(**{"F_hand": WRENCH, "left.F_hand": second})
     J_left = np.array([(left(q + 1e-6 * d) - left(q - 1e-6 * d)) / 2e-6 for d in np.eye(4)]).T
-    D, W, J_h = appendix_a.D(q, M, L, J, F), appendix_a.W(q, L), appendix_a.J_h(q, L, F)
-    D_inv = np.linalg.inv(D)
-    kept = D_inv - D_inv @ W.T @ np.linalg.solve(W @ D_inv @ W.T, W @ D_inv)
-    free, _ = appendix_a.acceleration(q, qd, np.array(WRENCH), M, L, J, F)
+    kept, J_h = appendix_a.joint_mobility(q), appendix_a.J_h(q)
+    free, _ = appendix_a.acceleration(q, qd, WRENCH)
     y = block.y
     np.testing.assert_allclose(y["qdd"], free + kept @ J_left.T @ second, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(y["left.x"], left(q), rtol=1e-14)
@@ -66,25 +54,14 @@ def test_two_hands_on_one_mechanism():
         np.testing.assert_allclose(y[name], of @ kept @ of.T, atol=1e-7 * np.abs(y[name]).max())
 
 
-def appendix_a_velocity(q):
-    """A velocity that the closures allow."""
-    return np.linalg.svd(appendix_a.W(q, L))[2][2:].T @ (2.0, -1.0)
+RANKS = {"five-bar": 2, "parallelogram": 3, "six-bar": 4, "remote-centre": 4, "n-four-bar": 4}
 
 
-@pytest.mark.parametrize(
-    ("name", "rank"),
-    [
-        ("five-bar", 2),
-        ("parallelogram", 3),
-        ("six-bar", 4),
-        ("remote-centre", 4),
-        ("n-four-bar", 4),
-    ],
-)
+@pytest.mark.parametrize(("name", "rank"), RANKS.items())
 def test_rank_of_shipped_linkages(name, rank):
     """Coordinates minus degrees of freedom: 2, 1, 1, 2 and 1 of them."""
     linkage = open_scene.load(name).linkage
-    block = Running(mechanism(linkage, diagnostics=True))
+    block = running(linkage, diagnostics=True)
     values = eigenvalues(*closures(linkage, block.state["q"])[2:])
     assert block.y["rank"] == rank
     assert block.y["condition"] == pytest.approx(values[0] / values[rank - 1], rel=0.02)
@@ -92,7 +69,7 @@ def test_rank_of_shipped_linkages(name, rank):
 
 def test_rank_drops_where_the_rods_line_up():
     linkage = open_scene.load("n-four-bar", ["linkage.n=1"]).linkage
-    block = Running(mechanism(linkage, diagnostics=True))
+    block = running(linkage, diagnostics=True)
     assert block.y["rank"] == 2
     block.put(q=(0.0, 0.0, 0.0))
     assert block.y["rank"] == 1
@@ -130,14 +107,15 @@ def eigenvalues(W, D):
 
 def closures(linkage, q):
     """(rank, condition, W, D) at q."""
-    variables = parameters(linkage)
-    p, n = Signals("p", variables), len(q)
-    symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    model = LinkageModel(linkage, p, *symbols)
-    told = closure_diagnostics.values(OperationalSpace(model).solver)
-    found = [told["rank"], told["condition"], model.W, model.D]
-    f = ca.Function("f", [*symbols, p.vector], found)
-    return [np.array(v) for v in f(q, np.zeros(n), [s for v in variables for s in v.starts])]
+
+    def diagnosed(model):
+        values = closure_diagnostics.values(OperationalSpace(model).solver)
+        return values["rank"], values["condition"], model.W, model.D
+
+    return evaluated(linkage, diagnosed)(q, np.zeros(len(q)))
+
+
+LOCAL_MODEL = ("D", "W", "w", "J_h")
 
 
 def coupled(**settings):
@@ -145,28 +123,28 @@ def coupled(**settings):
     copy = virtual_environment(
         five_bar(), GraphicsCopy(sync="joint"), Directions(), local_model=True
     )
-    held = mechanism(five_bar(), frame_s=1 / 64, stabilization="baumgarte", **settings)
-    return Running(copy), Running(held)
+    settings |= {"step_s": 1 / 512, "frame_s": 1 / 64, "stabilization": "baumgarte"}
+    return Running(copy), running(five_bar(), **settings)
 
 
 def test_the_local_model_holds_the_matrices_of_appendix_a():
     copy, held = coupled()
     q = copy.state["q"]
     y = copy.y
-    np.testing.assert_allclose(y["D"], appendix_a.D(q, M, L, J, F), rtol=1e-13)
-    np.testing.assert_allclose(y["W"], appendix_a.W(q, L), atol=1e-16)
-    np.testing.assert_allclose(y["J_h"], appendix_a.J_h(q, L, F), atol=1e-16)
+    np.testing.assert_allclose(y["D"], appendix_a.D(q), rtol=1e-13)
+    np.testing.assert_allclose(y["W"], appendix_a.W(q), atol=1e-16)
+    np.testing.assert_allclose(y["J_h"], appendix_a.J_h(q), atol=1e-16)
     starts = {v.name: np.reshape(v.starts, v.shape) for v in held.component.inputs}
-    for name in ("D", "W", "w", "J_h"):
+    for name in LOCAL_MODEL:
         np.testing.assert_allclose(starts[name], y[name], rtol=1e-13, atol=1e-15)
 
 
 def test_fresh_matrices_and_no_velocity_give_the_mechanisms_own_acceleration():
     copy, held = coupled()
-    own = Running(mechanism(five_bar()))
+    own = running(five_bar())
     for block in (held, own):
         block.set(F_hand=WRENCH)
-    held.set(**{name: copy.y[name] for name in ("D", "W", "w", "J_h")})
+    held.set(**{name: copy.y[name] for name in LOCAL_MODEL})
     for name in ("qdd", "lambda"):
         np.testing.assert_allclose(held.y[name], own.y[name], rtol=1e-11)
 
@@ -174,14 +152,14 @@ def test_fresh_matrices_and_no_velocity_give_the_mechanisms_own_acceleration():
 def test_matrices_held_over_a_frame_keep_the_loop_closed_to_a_millimetre():
     """60 Hz frames of 0.25 s; the closures themselves are fresh at every tick."""
     copy, held = coupled(integrator="semi-implicit-euler")
-    own = Running(mechanism(five_bar()))
+    own = running(five_bar())
     for block in (held, own):
         block.set(F_hand=WRENCH)
     for k in range(128):
         if k % 8 == 0:
             copy.set(q_ref=held.state["q"], qd_ref=held.state["qd"])
             copy.step(1 / 64)
-            held.set(**{name: copy.y[name] for name in ("D", "W", "w", "J_h")})
+            held.set(**{name: copy.y[name] for name in LOCAL_MODEL})
         held.step(1 / 512)
         own.step(1 / 512)
         assert held.y["closure_error"] < 1e-3

@@ -1,6 +1,7 @@
 """Contacts against closed forms: gaps, bounces, no pulling, and what the hand feels of them."""
 
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -12,47 +13,27 @@ from scipy.optimize import minimize_scalar
 from hapticlink.components.contact.broad_phase import near, out_of_reach, reach
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
-from hapticlink.components.specs.linkage import (
-    Body,
-    Directions,
-    GraphicsCopy,
-    Joint,
-    Linkage,
-    Mechanism,
-    OperationalPoint,
-)
-from tests.blocks import Running, virtual_environment, virtual_mechanism
+from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
+from tests.blocks import Running, running, virtual_environment
 from tests.components import appendix_a
-from tests.mechanisms import TABLE_6_1, five_bar
+from tests.components.appendix_a import L
+from tests.mechanisms import five_bar, one_body
 
 R, LENGTH = 0.05, 0.4
 NOISE = 1e-17 * np.array([[3.0, -1.0, 0.0], [-1.0, 2.0, 0.5], [0.0, 0.5, -1.0]])
 SQUARE = ((0.1, -0.3), (0.7, -0.1), (0.5, 0.5), (0.0, 0.3))
 
 
-def loose(capsule, gravity=None, start=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), center=None):
+def loose(capsule, start=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), center=None, gravity=None):
     """A free capsule of 2 kg."""
-    return Linkage(
-        body=(Body(name="bar", mass=2.0, inertia=0.03, center=center, radius=R, capsule=capsule),),
-        joint=(Joint(name="float", type="free", child="bar"),),
-        operational_point=OperationalPoint(body="bar"),
-        gravity=gravity,
-        start={"float": start},
-        start_velocity={"float": velocity},
-    )
+    body = Body(name="bar", mass=2.0, inertia=0.03, center=center, radius=R, capsule=capsule)
+    return one_body(body, start=start, rate=rate, gravity=gravity, type="free")
 
 
-def block(linkage, contacts, **settings):
-    contacts = {"detection": "haptics"} | contacts
-    return Running(
-        virtual_mechanism(linkage, Mechanism(**settings), None, Contacts(**contacts), step_s=1e-3)
-    )
-
-
-BAR = ((0.0, 0.0), (LENGTH, 0.0))
-DISC = block(loose(BAR), {"disc": (Disc(center=(0.3, 0.2), radius=0.1),)})
-POLYGON = block(loose(BAR), {"polygon": (Polygon(corners=SQUARE),)})
-WALLS = block(loose(BAR), {"enclosure": SQUARE[::-1]})
+BAR, POINT = ((0.0, 0.0), (LENGTH, 0.0)), ((0.0, 0.0),)
+DISC = running(loose(BAR), {"disc": (Disc(center=(0.3, 0.2), radius=0.1),)})
+POLYGON = running(loose(BAR), {"polygon": (Polygon(corners=SQUARE),)})
+WALLS = running(loose(BAR), {"enclosure": SQUARE[::-1]})
 
 
 def points(pose):
@@ -119,8 +100,8 @@ FLOOR = {"enclosure": ((-5.0, 0.0), (5.0, 0.0), (5.0, 5.0), (-5.0, 5.0))}
 
 
 def falling(**contacts):
-    ball = loose(((0.0, 0.0),), gravity=(0.0, -9.81), start=(0.0, R + 0.02, 0.3))
-    return block(ball, FLOOR | contacts)
+    ball = loose(POINT, gravity=(0.0, -9.81), start=(0.0, R + 0.02, 0.3))
+    return running(ball, FLOOR | contacts)
 
 
 def test_an_undamped_bounce_has_the_depth_and_the_energy_of_a_spring():
@@ -148,7 +129,7 @@ def test_a_damped_bounce_never_gains_energy_and_comes_to_rest_on_its_spring():
     assert ball.y["F_env"] == pytest.approx([0, 2.0 * 9.81, 0], abs=1e-2)
 
 
-BALL = block(loose(((0.0, 0.0),)), FLOOR)
+BALL = running(loose(POINT), FLOOR)
 
 
 @given(st.floats(-0.3, 0.05), st.floats(-2, 2))
@@ -159,41 +140,24 @@ def test_contacts_push_and_never_pull(height, speed):
     np.testing.assert_allclose(BALL.y["qdd"], (0, exact / 2.0, 0), rtol=1e-9, atol=1e-9)
 
 
-M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
-
-
 @pytest.mark.parametrize("omega", [-1.0, 0.02, 1.0])
 def test_damping_takes_the_velocity_of_the_touching_point(omega):
     """The end of a bar 1 mm deep in a disc, while the bar turns about its centre of mass at its
     other end: k depth - b omega l, and no pull."""
-    linkage = loose(BAR, velocity=(0.0, 0.0, omega))
     disc = Disc(center=(LENGTH, -(R + 0.1 - 1e-3)), radius=0.1)
     F = max(0.0, 15000.0 * 1e-3 - 300.0 * omega * LENGTH)
-    qdd = block(linkage, {"disc": (disc,)}).y["qdd"]
+    qdd = running(loose(BAR, rate=(0.0, 0.0, omega)), {"disc": (disc,)}).y["qdd"]
     np.testing.assert_allclose(qdd, (0.0, F / 2.0, LENGTH * F / 0.03), rtol=1e-9, atol=1e-9)
 
 
 def shaped():
     """The report's five-bar with capsules of 3 mm."""
     linkage = five_bar()
-    bodies = tuple(
-        Body(
-            name=b.name,
-            mass=b.mass,
-            inertia=b.inertia,
-            center=b.center,
-            radius=0.003,
-            capsule=((0.0, 0.0), (l, 0.0)),
-        )
-        for b, l in zip(linkage.body, L, strict=True)  # noqa: E741
+    bodies = (
+        replace(body, radius=0.003, capsule=((0.0, 0.0), (length, 0.0)))
+        for body, length in zip(linkage.body, L, strict=True)
     )
-    return Linkage(
-        body=bodies,
-        joint=linkage.joint,
-        loop=linkage.loop,
-        operational_point=linkage.operational_point,
-        start=linkage.start,
-    )
+    return replace(linkage, body=tuple(bodies))
 
 
 def link4(q, s):
@@ -204,12 +168,11 @@ def link4(q, s):
 
 def test_the_hand_feels_what_all_contacts_do_at_the_operational_point():
     """A disc under the middle of link 4: Lambda^-1 F_env is the acceleration that it causes."""
-    q = Running(virtual_mechanism(shaped(), Mechanism(), step_s=1 / 512)).state["q"]
+    q = running(shaped()).state["q"]
     along = link4(q, 1.0) - link4(q, 0.0)
     normal = np.array([-along[1], along[0]]) / np.linalg.norm(along)
     disc = Disc(center=tuple(link4(q, 0.4) - 0.0125 * normal), radius=0.01)
-    five = block(shaped(), {"disc": (disc,)})
-    five.put(q=q)
+    five = running(shaped(), {"disc": (disc,)}).put(q=q)
     force = 15000 * 0.0005 * normal
     assert five.y["contact_gap"] == pytest.approx(-0.0005, abs=1e-12)
 
@@ -217,9 +180,7 @@ def test_the_hand_feels_what_all_contacts_do_at_the_operational_point():
     J_contact = np.array(
         [(link4(q + e * d, 0.4) - link4(q - e * d, 0.4)) / (2 * e) for d in np.eye(4)]
     ).T
-    D, W, J_h = appendix_a.D(q, M, L, J, F), appendix_a.W(q, L), appendix_a.J_h(q, L, F)
-    D_inv = np.linalg.inv(D)
-    kept = D_inv - D_inv @ W.T @ np.linalg.solve(W @ D_inv @ W.T, W @ D_inv)
+    kept, J_h = appendix_a.joint_mobility(q), appendix_a.J_h(q)
     caused = J_h @ kept @ J_contact.T @ force
     Lambda_inv = J_h @ kept @ J_h.T
     F_env = five.y["F_env"]
@@ -238,9 +199,9 @@ def test_geometry_found_by_the_graphics_block_gives_the_same_forces_at_its_pose(
         "disc": (Disc(center=(0.03, -0.0125), radius=0.01),),
         "polygon": (Polygon(corners=((0.01, 0.035), (0.03, 0.02), (0.03, 0.05))),),
     }
-    here = block(shaped(), obstacles | {"margin": 0.1})
-    held = block(shaped(), obstacles | {"detection": "graphics", "margin": 0.1})
-    contacts = Contacts(**obstacles, margin=0.1)
+    obstacles["margin"] = 0.1
+    here, held = (running(shaped(), obstacles | {"detection": d}) for d in ("haptics", "graphics"))
+    contacts = Contacts(**obstacles)
     copy = Running(virtual_environment(shaped(), GraphicsCopy(), Directions(), contacts))
     for side in (here, held):
         side.put(q=copy.state["q"])

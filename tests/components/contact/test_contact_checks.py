@@ -10,12 +10,12 @@ from hapticlink.components.contact.depth import depths, middle, overlaps
 from hapticlink.components.contact.stiffness import STABLE, poles, sticking_poles
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import Body
-from tests.blocks import advance
+from tests.blocks import advance, running
 from tests.components.contact import test_moving_bodies as moving
-from tests.components.contact.test_contact import FLOOR, R, block, loose
+from tests.components.contact.test_contact import FLOOR, POINT, R, loose
 from tests.components.contact.test_moving_bodies import disc, free
 
-BALL = loose(((0.0, 0.0),))  # 2 kg
+BALL = loose(POINT)  # 2 kg
 
 
 def test_depths_and_the_middle_of_shapes():
@@ -60,7 +60,7 @@ def test_energy_rises_in_a_tick_only_where_the_poles_are_too_fast(damping, rises
     contacts = {**FLOOR, "damping": damping}
     fastest = max(pole for _, pole in poles(BALL, Contacts(**contacts)))
     assert (fastest * 1e-3 > STABLE) == rises
-    ball, most = block(BALL, contacts), 0.0
+    ball, most = running(BALL, contacts), 0.0
     for share in np.linspace(0, 1, 8)[:-1]:
         ball.put(q=(0.0, R + 0.002 + share * 1e-3, 0.0), qd=(0.0, -1.0, 0.0))
         energies = [1.0]

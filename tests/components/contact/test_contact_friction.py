@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from hapticlink.components.specs.contacts import Contacts
-from hapticlink.components.specs.linkage import (
-    Body,
-    Directions,
-    GraphicsCopy,
-    Joint,
-    Linkage,
-    Mechanism,
-    OperationalPoint,
-)
-from tests.blocks import Running, advance, virtual_environment, virtual_mechanism
+from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
+from tests import blocks
+from tests.blocks import RATES, Running, advance, order, virtual_environment
 from tests.components.contact import piecewise
+from tests.mechanisms import one_body
 
 MASS, INERTIA, G, R, LENGTH, K = 2.0, 0.03, 9.81, 0.05, 0.4, 15000.0
 FLOOR = ((-50.0, 0.0), (50.0, 0.0), (50.0, 5.0), (-50.0, 5.0))
@@ -25,42 +19,30 @@ FLOOR = ((-50.0, 0.0), (50.0, 0.0), (50.0, 5.0), (-50.0, 5.0))
 def body(capsule, slope, inertia=INERTIA, speed=0.0):
     """A capsule in touch with a floor on which gravity acts at an angle."""
     center = tuple(np.mean(capsule, axis=0))
-    return Linkage(
-        body=(
-            Body(name="bar", mass=MASS, inertia=inertia, center=center, radius=R, capsule=capsule),
-        ),
-        joint=(Joint(name="float", type="free", child="bar"),),
-        operational_point=OperationalPoint(body="bar", at=center),
-        gravity=(G * math.sin(slope), -G * math.cos(slope)),
-        start={"float": (0.0, R, 0.0)},
-        start_velocity={"float": (speed, 0.0, 0.0)},
-    )
+    bar = Body(name="bar", mass=MASS, inertia=inertia, center=center, radius=R, capsule=capsule)
+    field = (G * math.sin(slope), -G * math.cos(slope))
+    start, rate = (0.0, R, 0.0), (speed, 0.0, 0.0)
+    return one_body(bar, at=center, start=start, rate=rate, gravity=field, type="free")
 
 
 BAR, DISC = ((0.0, 0.0), (LENGTH, 0.0)), ((0.0, 0.0),)
 
 
 def running(linkage, friction, events=1, integrator="rk4", **contacts):
-    contacts = {"detection": "haptics"} | contacts
-    contacts = Contacts(enclosure=FLOOR, friction=friction, **contacts)
-    mechanism = Mechanism(events=events, integrator=integrator)
-    return Running(virtual_mechanism(linkage, mechanism, None, contacts, step_s=2e-3))
+    contacts |= {"enclosure": FLOOR, "friction": friction}
+    return blocks.running(linkage, contacts, step_s=2e-3, events=events, integrator=integrator)
 
 
-def test_a_bar_below_the_friction_angle_stays_for_a_minute():
-    """tan(slope) = .42 against .5; once it has settled on its springs it does not creep."""
+def test_a_bar_below_the_friction_angle_stays_for_a_minute_and_is_felt():
+    """tan(slope) = .42 against .5: once it has settled on its springs it does not creep, and its
+    contacts bear the whole weight, along the floor too."""
     bar = advance(running(body(BAR, 0.4), 0.5), 5.0)
     before = bar.state["q"]
     assert bar.y["x"][1] == pytest.approx(R - MASS * G * math.cos(0.4) / (2 * K), abs=1e-9)
-    for _ in range(60):
-        assert np.abs(advance(bar, 1.0).state["q"] - before).max() < 1e-9
-
-
-def test_the_hand_feels_friction():
-    """Contacts at rest bear the whole weight, along the floor too."""
-    bar = advance(running(body(BAR, 0.4), 0.5), 5.0)
     weight = MASS * G * np.array([math.sin(0.4), -math.cos(0.4), 0.0])
     np.testing.assert_allclose(bar.y["F_env"], -weight, atol=1e-6)
+    for _ in range(60):
+        assert np.abs(advance(bar, 1.0).state["q"] - before).max() < 1e-9
 
 
 @pytest.mark.parametrize("integrator", ["rk4", "passive-midpoint"])
@@ -76,7 +58,7 @@ def test_a_bar_above_the_friction_angle_slides(integrator, slope, friction):
 def test_passive_midpoint_has_order_two_while_a_pressed_bar_slides():
     """A bar that sits deeper than at rest rocks on both ends while it slides, at no time out of
     touch or sticking, so that friction is a smooth function of the pressure."""
-    rates, mu, depth = (500, 1000, 2000, 4000), 0.4, MASS * G / (2 * K)
+    mu, depth = 0.4, MASS * G / (2 * K)
 
     def end(integrator, rate):
         bar = running(body(BAR, 0.3), mu, integrator=integrator, damping=60.0)
@@ -85,8 +67,7 @@ def test_passive_midpoint_has_order_two_while_a_pressed_bar_slides():
         return advance(bar, 0.05, rate).x[:6]
 
     exact = end("rk4", 16000)
-    errors = [np.abs(end("passive-midpoint", rate) - exact).max() for rate in rates]
-    assert -np.polyfit(np.log(rates), np.log(errors), 1)[0] > 1.8
+    assert order([np.abs(end("passive-midpoint", rate) - exact).max() for rate in RATES]) > 1.8
 
 
 @pytest.mark.parametrize(("friction", "slips"), [(0.5, False), (0.1, True)])
@@ -133,7 +114,7 @@ def test_geometry_of_the_graphics_block_gives_the_same_friction():
 def test_an_impact_with_friction_has_the_order_of_the_method():
     """A bar that bounces on its ends while it slides, against SciPy from event to event. Its ends
     let go .2 ms one after the other."""
-    mu, b, t_end, rates = 0.2, 60.0, 0.06, (500, 1000, 2000, 4000)
+    mu, b, t_end = 0.2, 60.0, 0.06
 
     def arm(theta, side):
         return side * LENGTH / 2 * np.array([math.cos(theta), math.sin(theta)])
@@ -157,12 +138,12 @@ def test_an_impact_with_friction_has_the_order_of_the_method():
     exact, events = piecewise.solve(rhs, [end(-1), end(1)], start, t_end)
     assert events == 4
     errors = []
-    for rate in rates:
+    for rate in RATES:
         bar = running(body(BAR, 0.0), mu, events=2, damping=b)
         bar.put(q=(0.0, R + 0.0123, 0.0), qd=start[3:])
         y = advance(bar, t_end, rate).y
         errors.append(np.abs(np.r_[y["x"], y["v"]] - exact).max())
-    assert -np.polyfit(np.log(rates), np.log(errors), 1)[0] > 3.5
+    assert order(errors) > 3.5
     assert errors[1] < 1e-4
 
 
@@ -171,21 +152,16 @@ def test_a_change_from_sliding_to_sticking_is_of_second_order():
     its spring is deflected by d = mu N/k, and goes on as m z'' + k tau z' + k z = 0, z(0) = d,
     z' = v. The force has no jump there, and such changes are not located."""
     N, mu, speed, t_end = 19.62, 0.3, 0.5, 0.25
-    joint = Joint(name="rail", type="prismatic", axis=0.0, child="bar", at_parent=(0.0, R - N / K))
-    block = Linkage(
-        body=(Body(name="bar", mass=MASS, inertia=1.0, radius=R),),
-        joint=(joint,),
-        operational_point=OperationalPoint(body="bar"),
-        start_velocity={"rail": speed},
-    )
+    body = Body(name="bar", mass=MASS, inertia=1.0, radius=R)
+    block = one_body(body, rate=speed, type="prismatic", axis=0.0, at_parent=(0.0, R - N / K))
     t = t_end - speed * MASS / (mu * N)
     omega, d, tau = math.sqrt(K / MASS), mu * N / K, 4 * 2e-3  # of steps of 2 ms (`running`)
     zeta = tau * omega / 2
     damped = omega * math.sqrt(1 - zeta**2)
     exact = -d * omega**2 / damped * math.exp(-zeta * omega * t) * math.sin(damped * t)
-    rates = (500, 1000, 2000, 4000, 8000)
+    rates = (*RATES, 8000)
     errors = [
         abs(advance(running(block, mu), t_end, rate).state["qd"][0] - exact) for rate in rates
     ]
-    assert 1.7 < -np.polyfit(np.log(rates), np.log(errors), 1)[0] < 2.5
+    assert 1.7 < order(errors, rates) < 2.5
     assert errors[1] < 5e-6

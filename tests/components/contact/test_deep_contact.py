@@ -8,16 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
-from hapticlink.components.specs.linkage import (
-    Body,
-    Directions,
-    GraphicsCopy,
-    Joint,
-    Linkage,
-    Mechanism,
-    OperationalPoint,
-)
-from tests.blocks import Running, virtual_environment, virtual_mechanism
+from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
+from tests.blocks import Running, running, virtual_environment
+from tests.mechanisms import one_body
 
 R, LENGTH, MASS, INERTIA = 0.05, 0.4, 2.0, 0.03
 SQUARE = ((0.1, -0.3), (0.7, -0.1), (0.5, 0.5), (0.0, 0.3))
@@ -29,14 +22,8 @@ def loose(corners, **law):
     shape = ((0.0, 0.0), (LENGTH, 0.0))
     middle = (LENGTH / 2, 0.0) if law else None
     bar = Body(name="bar", mass=MASS, inertia=INERTIA, center=middle, radius=R, capsule=shape)
-    linkage = Linkage(
-        body=(bar,),
-        joint=(Joint(name="float", type="free", child="bar"),),
-        operational_point=OperationalPoint(body="bar"),
-    )
-    law |= {"damping": 0.0, "detection": "haptics"}
-    contacts = Contacts(polygon=(Polygon(corners=corners),), **law)
-    return Running(virtual_mechanism(linkage, Mechanism(), None, contacts, step_s=1e-3))
+    contacts = {"polygon": (Polygon(corners=corners),), "damping": 0.0} | law
+    return running(one_body(bar, type="free"), contacts)
 
 
 BY_SQUARE, BY_SPIKE = loose(SQUARE), loose(SPIKE)
@@ -79,26 +66,20 @@ def test_a_corner_pushes_out_a_bar_that_sank_in_past_its_axis(share, angle, heig
 def dropped(obstacle, detection, speed):
     """A bar of 1 kg and r = 5 mm that slides down onto the obstacle 20 mm under its axis."""
     bar = Body(name="bar", mass=1.0, inertia=0.01, radius=0.005, capsule=((-0.1, 0.0), (0.1, 0.0)))
-    linkage = Linkage(
-        body=(bar,),
-        joint=(Joint(name="slide", type="prismatic", axis=-math.pi / 2, child="bar"),),
-        operational_point=OperationalPoint(body="bar"),
-        start_velocity={"slide": speed},
-    )
-    contacts = Contacts(**obstacle, damping=0.0, detection=detection, margin=0.1)
-    held = detection == "graphics"
-    copy = virtual_environment(linkage, GraphicsCopy(), Directions(), contacts) if held else None
-    return (
-        Running(virtual_mechanism(linkage, Mechanism(), None, contacts, step_s=1e-4)),
-        copy and Running(copy),
-    )
+    linkage = one_body(bar, rate=speed, type="prismatic", axis=-math.pi / 2)
+    contacts = obstacle | {"damping": 0.0, "detection": detection, "margin": 0.1}
+    falling = running(linkage, contacts, step_s=1e-4)
+    if detection == "haptics":
+        return falling, None
+    copy = virtual_environment(linkage, GraphicsCopy(), Directions(), Contacts(**contacts))
+    return falling, Running(copy)
 
 
+WEDGE = ((-0.02, -0.1), (0.02, -0.1), (0.0, -0.02))
+TABLE = ((-0.2, -0.1), (0.2, -0.1), (0.2, -0.02), (-0.2, -0.02))
 OBSTACLES = {
-    "corner": {"polygon": (Polygon(corners=((-0.02, -0.1), (0.02, -0.1), (0.0, -0.02))),)},
-    "edge": {
-        "polygon": (Polygon(corners=((-0.2, -0.1), (0.2, -0.1), (0.2, -0.02), (-0.2, -0.02))),)
-    },
+    "corner": {"polygon": (Polygon(corners=WEDGE),)},
+    "edge": {"polygon": (Polygon(corners=TABLE),)},
     "disc": {"disc": (Disc(center=(0.0, -0.06), radius=0.04),)},
 }
 

@@ -7,34 +7,17 @@ import numpy as np
 import pytest
 
 from hapticlink.components.contact.joint_limits import damping_ratio
-from hapticlink.components.specs.linkage import (
-    Body,
-    Joint,
-    Limits,
-    Linkage,
-    Mechanism,
-    OperationalPoint,
-)
+from hapticlink.components.specs.linkage import Body, Limits
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, state_after, virtual_mechanism
+from tests.blocks import RATES, errors, order, running, state_after
 from tests.components import appendix_a
 from tests.components.contact import piecewise
-from tests.mechanisms import TABLE_6_1, five_bar
+from tests.mechanisms import five_bar, one_body, rod
 
 
-def running(linkage, **settings):
-    return Running(virtual_mechanism(linkage, Mechanism(**settings), step_s=1e-3))
-
-
-def arm(limits, **linkage):
+def arm(limits, rate=2.0, **linkage):
     """A uniform rod of 1 m and 1 kg on a pivot that turns at 2 rad/s."""
-    return Linkage(
-        body=(Body(name="rod", mass=1.0, inertia=1 / 12, center=(0.5, 0.0)),),
-        joint=(Joint(name="pivot", child="rod", limits=limits),),
-        operational_point=OperationalPoint(body="rod", at=(1.0, 0.0)),
-        start_velocity={"pivot": 2.0},
-        **linkage,
-    )
+    return one_body(rod("rod", 1.0), at=(1.0, 0.0), rate=rate, limits=limits, **linkage)
 
 
 @pytest.mark.parametrize("restitution", [0.01, 0.1, math.exp(-2), 0.3, 0.7, 0.99, 1.0])
@@ -73,22 +56,20 @@ def test_a_damping_that_is_given_acts_as_that_of_its_restitution():
 @pytest.mark.parametrize("integrator", ["heun", "rk4"])
 def test_a_turn_at_a_limit_has_the_order_of_the_method(integrator):
     limits = Limits(upper=0.3, stiffness=2000.0, restitution=0.6)
-    rates, errors = (500, 1000, 2000, 4000), []
-    block = running(arm(limits), integrator=integrator)
-    for rate in rates:
+    block, largest = running(arm(limits), integrator=integrator), []
+    for rate in RATES:
         found = []
         for share in np.linspace(0, 1, 5)[:-1]:
             block.put(q=0.1 + 2.0 * share / rate, qd=2.0)
             found.append(state_after(block, rate, 0.25)[1] + 1.2)
-        errors.append(np.abs(found).max())
-    order = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
-    assert order > {"heun": 1.7, "rk4": 3.7}[integrator]
+        largest.append(np.abs(found).max())
+    assert order(largest) > {"heun": 1.7, "rk4": 3.7}[integrator]
 
 
 def test_a_joint_comes_to_rest_on_its_limit():
     """m g l/2 = k (c_lower - c) for a rod that leans on its lower limit, horizontal."""
     limits = Limits(lower=0.0, stiffness=500.0, restitution=0.3)
-    block = running(replace(arm(limits, gravity=(0.0, -9.81)), start_velocity={}))
+    block = running(arm(limits, rate=0.0, gravity=(0.0, -9.81)))
     q, qd = state_after(block, 500, 3.0)
     assert q == pytest.approx(-9.81 * 0.5 * math.cos(q) / 500.0, abs=1e-9)
     assert abs(qd) < 1e-9
@@ -98,49 +79,39 @@ def test_a_joint_comes_to_rest_on_its_limit():
     )
 
 
-M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
 WRENCH = np.array([-3.0, 2.0, 0.0])
 WAYS = {"elbow1": np.array([0.0, 1.0, 0.0, 0.0]), "cut": np.array([1.0, 1.0, -1.0, -1.0])}
 
 
+def limited(joint, limits):
+    """The five-bar with limits on a joint, or on its cut joint."""
+    linkage = five_bar()
+    if joint == "cut":
+        return replace(linkage, loop=(replace(linkage.loop[0], limits=limits),))
+    joints = [replace(j, limits=limits) if j.name == joint else j for j in linkage.joint]
+    return replace(linkage, joint=tuple(joints))
+
+
 def closed_inertia(q, way):
     """1/(c D^-1 (1 - W' (W D^-1 W')^-1 W D^-1) c') of Appendix A."""
-    D_inv, W = np.linalg.inv(appendix_a.D(q, M, L, J, F)), appendix_a.W(q, L)
-    kept = D_inv - D_inv @ W.T @ np.linalg.solve(W @ D_inv @ W.T, W @ D_inv)
-    return 1 / (way @ kept @ way)
-
-
-def by_hand(y, effort):
-    q, qd = y[:4], y[4:]
-    D, W = appendix_a.D(q, M, L, J, F), appendix_a.W(q, L)
-    Q = appendix_a.J_h(q, L, F).T @ WRENCH + effort
-    right = [Q - appendix_a.C(q, qd, M, L, F) @ qd, -appendix_a.w(q, qd, L)]
-    matrix = np.block([[D, -W.T], [W, np.zeros((2, 2))]])
-    return np.concatenate([qd, np.linalg.solve(matrix, np.concatenate(right))[:4]])
+    return 1 / (way @ appendix_a.joint_mobility(q) @ way)
 
 
 def kinetic(y):
-    return 0.5 * y[4:] @ appendix_a.D(y[:4], M, L, J, F) @ y[4:]
+    return 0.5 * y[4:] @ appendix_a.D(y[:4]) @ y[4:]
 
 
 @pytest.mark.parametrize("joint", ["elbow1", "cut"])
 def test_limits_in_a_loop_against_appendix_a(joint):
     """On a joint of the tree, and on the cut joint that closes the loop."""
-    linkage, way = five_bar(), WAYS[joint]
-    start = Running(virtual_mechanism(linkage, Mechanism(), step_s=1e-3)).state["q"]
-    free = running(linkage)
+    way, free = WAYS[joint], running(five_bar())
+    start = free.state["q"]
     free.set(F_hand=WRENCH)
     state_after(free, 1000, 0.08)
     limit, up = way @ free.state["q"], way @ free.state["qd"] > 0
     stiffness, restitution = 60.0, 0.5
-    limits = Limits(
-        **{"upper" if up else "lower": limit}, stiffness=stiffness, restitution=restitution
-    )
-    if joint == "cut":
-        linkage = replace(linkage, loop=(replace(linkage.loop[0], limits=limits),))
-    else:
-        joints = [replace(j, limits=limits) if j.name == joint else j for j in linkage.joint]
-        linkage = replace(linkage, joint=tuple(joints))
+    law = {"upper" if up else "lower": limit, "stiffness": stiffness, "restitution": restitution}
+    linkage = limited(joint, Limits(**law))
     sign = -1 if up else 1
     z = damping_ratio(restitution)
 
@@ -148,29 +119,23 @@ def test_limits_in_a_loop_against_appendix_a(joint):
         b = 2 * z * math.sqrt(stiffness * closed_inertia(y[:4], way))
         return sign * (way @ y[:4] - limit), sign * (way @ y[4:]), stiffness, b
 
-    exact, events = piecewise.solve(
-        lambda y, F: by_hand(y, sign * way * F[0]), [side], np.r_[start, np.zeros(4)], 0.16
-    )
+    def rhs(y, F):
+        Q = appendix_a.J_h(y[:4]).T @ WRENCH + sign * way * F[0]
+        return np.r_[y[4:], appendix_a.solution(y[:4], y[4:], Q)[0]]
+
+    exact, events = piecewise.solve(rhs, [side], np.r_[start, np.zeros(4)], 0.16)
     assert events == 2
-    errors = []
-    for rate in (1000, 2000):
-        block = running(linkage)
-        block.set(F_hand=WRENCH)
-        errors.append(np.abs(state_after(block, rate, 0.16) - exact).max())
-    assert errors[0] < 1e-4
-    assert errors[0] / errors[1] > 12  # order 4
+    coarse, fine = errors(lambda: running(linkage).set(F_hand=WRENCH), exact, 0.16, (1000, 2000))
+    assert coarse < 1e-4
+    assert coarse / fine > 12  # order 4
 
 
 def test_an_impact_takes_from_a_loop_the_energy_that_its_restitution_says():
     """(1 - e^2) m c'^2/2 for an impact that is short."""
     e, way = 0.5, WAYS["elbow1"]
-    start = Running(virtual_mechanism(five_bar(), Mechanism(), step_s=1e-3))
-    q = start.state["q"]
-    linkage = five_bar()
-    limits = Limits(upper=q[1] + 1e-4, stiffness=1e6, restitution=e)
-    joints = [replace(j, limits=limits) if j.name == "elbow1" else j for j in linkage.joint]
-    linkage = replace(linkage, joint=tuple(joints), start_velocity={"elbow1": 3.0})
-    block = running(linkage)
+    q = running(five_bar()).state["q"]
+    linkage = limited("elbow1", Limits(upper=q[1] + 1e-4, stiffness=1e6, restitution=e))
+    block = running(replace(linkage, start_velocity={"elbow1": 3.0}))
     before = np.concatenate([block.state["q"], block.state["qd"]])
     after = state_after(block, 200_000, 4e-4)
     lost = 0.5 * (1 - e**2) * closed_inertia(q, way) * before[5] ** 2
@@ -193,10 +158,6 @@ def test_a_slot_ends_at_its_limit():
 
 
 def test_limits_of_a_free_joint_are_refused():
-    linkage = Linkage(
-        body=(Body(name="b", mass=1, inertia=1),),
-        joint=(Joint(name="j", type="free", child="b", limits=Limits(lower=0.0, stiffness=1.0)),),
-        operational_point=OperationalPoint(body="b"),
-    )
+    body, limits = Body(name="b", mass=1, inertia=1), Limits(lower=0.0, stiffness=1.0)
     with pytest.raises(ValueError, match="limits act on one coordinate"):
-        running(linkage)
+        running(one_body(body, type="free", limits=limits))

@@ -2,35 +2,22 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from hapticlink.components.blocks import mechanism_steps
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.specs.contacts import Contacts, Disc
-from hapticlink.components.specs.linkage import (
-    Mechanism,
-)
-from tests.blocks import Running, state_after, virtual_mechanism
+from hapticlink.components.specs.contacts import Disc
+from tests.blocks import RATES, errors, order, running, state_after
 from tests.components import appendix_a
+from tests.components.appendix_a import L
 from tests.components.contact import piecewise
-from tests.components.contact.test_contact import BAR, FLOOR, LENGTH, R, link4, loose, shaped
-from tests.mechanisms import TABLE_6_1
+from tests.components.contact.test_contact import BAR, FLOOR, LENGTH, POINT, R, link4, loose, shaped
 
 K, B, MASS, INERTIA = 15000.0, 300.0, 2.0, 0.03
 LIGHT, LANDED = 60.0, 0.07  # damping of the bar's contacts, and when both have ended
-RATES = (500, 1000, 2000, 4000)
-
-
-def block(linkage, contacts, **settings):
-    contacts = Contacts(**{"detection": "haptics", "stiffness": K, "damping": B, **contacts})
-    return Running(virtual_mechanism(linkage, Mechanism(**settings), None, contacts, step_s=1e-3))
-
-
-def order(errors):
-    """The slope of log error over log step."""
-    return -np.polyfit(np.log(RATES[: len(errors)]), np.log(errors), 1)[0]
 
 
 def restitution(mass):
@@ -46,16 +33,16 @@ def restitution(mass):
 )
 def test_speed_after_a_damped_impact_has_the_order_of_the_method(method, worst):
     """A ball at 1 m/s on a damped wall, which it meets at any part of a step."""
-    ball, exact = block(loose(((0.0, 0.0),)), FLOOR, integrator=method), restitution(MASS)
-    errors = []
-    for rate in RATES[:2] if method == "dormand-prince-8" else RATES:
+    ball, exact = running(loose(POINT), FLOOR, integrator=method), restitution(MASS)
+    rates, largest = RATES[:2] if method == "dormand-prince-8" else RATES, []
+    for rate in rates:
         found = []
         for share in np.linspace(0, 1, 8)[:-1]:
             ball.put(q=(0.0, R + 0.02 + share / rate, 0.3), qd=(0.0, -1.0, 0.0))
             found.append(state_after(ball, rate, 0.1)[4] - exact)
-        errors.append(np.abs(found).max())
-    assert order(errors) > METHODS[method].order - 0.3
-    assert errors[1] < worst
+        largest.append(np.abs(found).max())
+    assert order(largest, rates) > METHODS[method].order - 0.3
+    assert largest[1] < worst
 
 
 def bar(y, F):
@@ -65,10 +52,8 @@ def bar(y, F):
     alpha = arms @ F / INERTIA
     lift = F.sum() / MASS - 9.81
     # of the left end: centre minus c (cos, sin)
-    along, across = (
-        np.array([math.cos(theta), math.sin(theta)]),
-        np.array([-math.sin(theta), math.cos(theta)]),
-    )
+    along = np.array([math.cos(theta), math.sin(theta)])
+    across = np.array([-math.sin(theta), math.cos(theta)])
     a = np.array([0.0, lift]) - c * (alpha * across - omega**2 * along)
     return np.concatenate([y[3:], a, [alpha]])
 
@@ -85,14 +70,9 @@ ENDS = [end(0.0), end(LENGTH)]
 
 
 def landing(tilt, **settings):
-    linkage = loose(
-        BAR,
-        gravity=(0.0, -9.81),
-        start=(0.0, R + 0.02, tilt),
-        velocity=(0.0, -1.0, 0.0),
-        center=(LENGTH / 2, 0.0),
-    )
-    return block(linkage, FLOOR | {"damping": LIGHT}, **settings)
+    start, rate = (0.0, R + 0.02, tilt), (0.0, -1.0, 0.0)
+    linkage = loose(BAR, start, rate, center=(LENGTH / 2, 0.0), gravity=(0.0, -9.81))
+    return running(linkage, FLOOR | {"damping": LIGHT}, **settings)
 
 
 def landed(tilt):
@@ -105,9 +85,9 @@ def test_a_bar_that_lands_on_both_ends(tilt):
     """At once, and one after the other."""
     exact, events = landed(tilt)
     assert events == 4
-    errors = [np.abs(state_after(landing(tilt), rate, LANDED) - exact)[3:].max() for rate in RATES]
-    assert order(errors) > 3.5
-    assert errors[1] < 1e-4
+    found = errors(lambda: landing(tilt), exact, LANDED, of=slice(3, None))
+    assert order(found) > 3.5
+    assert found[1] < 1e-4
 
 
 def test_more_events_in_a_step_than_are_located():
@@ -115,12 +95,11 @@ def test_more_events_in_a_step_than_are_located():
     tilt = 4e-4 / LENGTH
     exact, _ = landed(tilt)
     for events, least, most in ((0, 1e-3, 0.1), (1, 2e-4, 0.1), (2, 0.0, 1e-4)):
-        bar = landing(tilt, events=events)
-        error = np.abs(state_after(bar, 1000, LANDED) - exact)[3:].max()
+        bar = partial(landing, tilt, events=events)
+        (error,) = errors(bar, exact, LANDED, [1000], slice(3, None))
         assert least < error < most, events
 
 
-M, L, J, F = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"], (0.5,) * 4
 SOFT, LOSSY = 8000.0, 40.0
 
 
@@ -141,7 +120,7 @@ def test_a_linkage_with_a_loop_that_is_thrown_on_a_disc():
     linkage = shaped()
     bare = [replace(b, radius=None) for b in linkage.body[:3]]
     linkage = replace(linkage, body=(*bare, linkage.body[3]))
-    q0 = Running(virtual_mechanism(linkage, Mechanism(), step_s=1e-3)).state["q"]
+    q0 = running(linkage).state["q"]
     angle = q0[2] + q0[3]
     side = np.array([-math.sin(angle), math.cos(angle)])
     center = link4(q0, 0.5) - (0.013 + 0.002) * side
@@ -149,11 +128,8 @@ def test_a_linkage_with_a_loop_that_is_thrown_on_a_disc():
 
     def rhs(y, force):
         q, qd = y[:4], y[4:]
-        W = appendix_a.W(q, L)
-        Q = appendix_a.J_h(q, L, F).T @ wrench + gradient(q, center) * force[0]
-        matrix = np.block([[appendix_a.D(q, M, L, J, F), -W.T], [W, np.zeros((2, 2))]])
-        right = [Q - appendix_a.C(q, qd, M, L, F) @ qd, -appendix_a.w(q, qd, L)]
-        return np.concatenate([qd, np.linalg.solve(matrix, np.concatenate(right))[:4]])
+        Q = appendix_a.J_h(q).T @ wrench + gradient(q, center) * force[0]
+        return np.concatenate([qd, appendix_a.solution(q, qd, Q)[0]])
 
     def gap(y):
         return height(y[:4], center) - 0.013, gradient(y[:4], center) @ y[4:], SOFT, LOSSY
@@ -163,27 +139,20 @@ def test_a_linkage_with_a_loop_that_is_thrown_on_a_disc():
     assert events >= 2
     contacts = {"disc": (Disc(center=tuple(center), radius=0.01),)}
     contacts |= {"stiffness": SOFT, "damping": LOSSY}
-    errors = []
-    for rate in RATES:
-        five = block(linkage, contacts)
-        five.set(F_hand=wrench)
-        errors.append(np.abs(state_after(five, rate, t_end) - exact).max())
-    assert order(errors) > 3.5
+    found = errors(lambda: running(linkage, contacts).set(F_hand=wrench), exact, t_end)
+    assert order(found) > 3.5
 
 
 def test_a_scene_without_contacts_pays_nothing():
-    linkage = loose(BAR)
-    built = [
-        virtual_mechanism(linkage, Mechanism(events=events), step_s=1e-3).step for events in (0, 1)
-    ]
-    assert built[0].n_instructions() == built[1].n_instructions()
+    steps = [running(loose(BAR), events=events).component.step for events in (0, 1)]
+    assert steps[0].n_instructions() == steps[1].n_instructions()
 
 
 def test_steps_of_many_operations_are_told_before_they_are_built(monkeypatch, caplog):
     monkeypatch.setattr(mechanism_steps, "MANY", 100)
-    block(loose(((0.0, 0.0),)), FLOOR, integrator="heun", events=2)
+    running(loose(POINT), FLOOR, integrator="heun", events=2)
     assert "1 bodies with 2 places" in caplog.text
     assert "`mechanism.integrator` = 'heun' and `mechanism.events` = 2 (5 steps" in caplog.text
     monkeypatch.setattr(mechanism_steps, "MOST", 100)
     with pytest.raises(ValueError, match=r"more than 100; fewer: `mechanism\.events` = 0"):
-        block(loose(((0.0, 0.0),)), FLOOR, integrator="heun", events=3)
+        running(loose(POINT), FLOOR, integrator="heun", events=3)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,14 +13,16 @@ import pytest
 from hapticlink.components.dynamics.assembly import AssemblyError
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, virtual_environment, virtual_mechanism
+from tests.blocks import Running, running, virtual_environment
 
 
-def moving(name: str, **rates: float) -> tuple[Linkage, Running]:
-    scene = open_scene.load(name)
-    assert scene.linkage
-    linkage = replace(scene.linkage, start_velocity=rates)
-    return linkage, Running(virtual_mechanism(linkage, scene.mechanism, step_s=1 / 512))
+def moving(name: str, **given: Any) -> tuple[Linkage, Running]:
+    """A shipped linkage with rates of joints, or another start."""
+    linkage = open_scene.load(name).linkage
+    assert linkage
+    start = given.pop("start", linkage.start)
+    linkage = replace(linkage, start=start, start_velocity=given)
+    return linkage, running(linkage)
 
 
 def test_a_given_crank_moves_a_four_bar_as_its_velocity_loop_says() -> None:
@@ -51,32 +55,29 @@ def test_a_slider_crank_takes_the_rate_of_either_end(joint: str, rate: float) ->
 def test_what_the_loops_leave_free_changes_least() -> None:
     """The five-bar has two: of all rates with the given one, the shortest."""
     linkage, block = moving("five-bar", shoulder1=1.5)
-    still = Running(block.component)
-    free = []
-    for name in ("shoulder2", "elbow1"):
-        rates = {"shoulder1": 0.0, name: 1.0}
-        free.append(moving("five-bar", **rates)[1].y["qd"])
-    base = moving("five-bar", shoulder1=1.5, shoulder2=0.0)[1].y["qd"]
-    along = np.array(free[0])
-    np.testing.assert_allclose(free[1] / free[1][2], along, rtol=1e-10)  # one direction is left
+    along, other, base = (
+        moving("five-bar", **rates)[1].y["qd"]
+        for rates in (
+            {"shoulder1": 0.0, "shoulder2": 1.0},
+            {"shoulder1": 0.0, "elbow1": 1.0},
+            {"shoulder1": 1.5, "shoulder2": 0.0},
+        )
+    )
+    np.testing.assert_allclose(other / other[2], along, rtol=1e-10)  # one direction is left
     shortest = base - along * (along @ base) / (along @ along)
     np.testing.assert_allclose(block.y["qd"], shortest, rtol=1e-9)
-    np.testing.assert_array_equal(still.y["qd"], block.y["qd"])
+    np.testing.assert_array_equal(Running(block.component).y["qd"], block.y["qd"])
     assert linkage.start_velocity == {"shoulder1": 1.5}
 
 
 def test_too_many_rates_are_refused_with_the_nearest_that_fit() -> None:
-    with pytest.raises(AssemblyError, match=r"gives crank = 2, rocker = 0, .* nearest, ") as told:
+    with pytest.raises(AssemblyError, match=r"gives crank = 2, rocker = 0, .* nearest, ") as error:
         moving("four-bar", crank=2.0, rocker=0.0)
-    nearest = {}
-    for part in str(told.value).split("nearest, ")[1].split(", "):
-        name, value = part.split(" = ")
-        nearest[name] = float(value)
-    linkage, block = moving("four-bar", crank=nearest["crank"])
+    pairs = re.findall(r"(\w+) = ([^,]+)", str(error.value).split("nearest, ")[1])
+    nearest = {name: float(value) for name, value in pairs}
+    _, block = moving("four-bar", crank=nearest["crank"])
     assert block.y["qd"][2] == pytest.approx(nearest["rocker"], rel=1e-8)
-    twice = replace(linkage, start_velocity=nearest)
-    again = Running(virtual_mechanism(twice, open_scene.load("four-bar").mechanism, step_s=1e-3))
-    np.testing.assert_allclose(again.y["qd"], block.y["qd"], rtol=1e-8)
+    np.testing.assert_allclose(moving("four-bar", **nearest)[1].y["qd"], block.y["qd"], rtol=1e-8)
 
 
 def test_a_copy_starts_with_the_same_rates() -> None:
@@ -86,12 +87,8 @@ def test_a_copy_starts_with_the_same_rates() -> None:
 
 
 def test_a_piston_at_its_dead_centre_has_no_rate() -> None:
-    scene = open_scene.load("slider-crank")
-    assert scene.linkage
     dead = {"crank": 0.0, "big_end": 0.0, "cylinder": 0.2}
-    stuck = replace(scene.linkage, start=dead, start_velocity={"cylinder": 0.1})
     with pytest.raises(AssemblyError, match=r"cylinder = 0\.1"):
-        virtual_mechanism(stuck, scene.mechanism, step_s=1e-3)
-    turning = replace(scene.linkage, start=dead, start_velocity={"crank": 4.0})
-    block = Running(virtual_mechanism(turning, scene.mechanism, step_s=1e-3))
+        moving("slider-crank", start=dead, cylinder=0.1)
+    _, block = moving("slider-crank", start=dead, crank=4.0)
     np.testing.assert_allclose(block.y["qd"], [4.0, -4.0 * (1 + 0.05 / 0.15), 0.0], atol=1e-12)

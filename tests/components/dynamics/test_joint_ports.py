@@ -8,13 +8,13 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import Running, advance, virtual_mechanism
 from tests.orchestrator.foreign_fmus import python_fmu_of
 
 SERVO = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
-class {name}(Fmi2Slave):
+class Servo(Fmi2Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.angle = self.rate = self.torque = 0.0
@@ -23,44 +23,25 @@ class {name}(Fmi2Slave):
         self.register_variable(Real("torque", causality=Fmi2Causality.output))
 
     def do_step(self, time, size):
-        self.torque = {law}
+        self.torque = 20.0 * (1.3 - self.angle) - 0.4 * self.rate
         return True
 """
 ACTIVE = """
 extends = "slider-crank"
 title = "A motor outside"
-duration = {duration}
-haptics.rate = {rate}
-
-[[fmu]]
-name = "motor"
-path = "{path}"
-timing = "sampled"
-
-[[connection]]
-from = "virtual_mechanism.crank.position"
-to = "motor.angle"
-
-[[connection]]
-from = "virtual_mechanism.crank.velocity"
-to = "motor.rate"
-
-[[connection]]
-from = "motor.torque"
-to = "virtual_mechanism.crank.effort"
+duration = 1.0
+haptics.rate = 512
+fmu = [{ name = "motor", path = "PATH", timing = "sampled" }]
+connection = [
+  { from = "virtual_mechanism.crank.position", to = "motor.angle" },
+  { from = "virtual_mechanism.crank.velocity", to = "motor.rate" },
+  { from = "motor.torque", to = "virtual_mechanism.crank.effort" },
+]
 """
 PORTS = {
     "linkage.joint.0.ports": ["effort", "position", "velocity"],
     "linkage.joint.0.drive": {"type": "profile", "table": [[0.0, 0.0]]},
 }
-
-
-def active(folder: Path, law: str, duration: float = 0.5) -> hl.Run:
-    """The slider-crank with a motor in an FMU of its own."""
-    fmu = python_fmu_of(folder, SERVO.format(name="Servo", law=law), f"servo_{folder.name}")
-    path = folder / "active.toml"
-    path.write_text(ACTIVE.format(path=fmu.as_posix(), rate=512, duration=duration))
-    return hl.run(path, PORTS)
 
 
 def test_a_constant_effort_from_outside_is_that_of_a_drive() -> None:
@@ -74,19 +55,18 @@ def test_a_constant_effort_from_outside_is_that_of_a_drive() -> None:
     outside = Running(
         virtual_mechanism(ported, scene.mechanism, step_s=1 / 512), {"crank.effort": 0.08}
     )
-    for _ in range(256):
-        inside.step(1 / 512)
-        outside.step(1 / 512)
-    y = outside.y
+    drive, y = (advance(block, 0.5, 512).y for block in (inside, outside))
     assert y["q"][0] > 2
-    assert np.array_equal(y["q"], inside.y["q"])
+    assert np.array_equal(y["q"], drive["q"])
     assert (y["crank.position"], y["crank.velocity"]) == (y["q"][0], y["qd"][0])
 
 
 def test_a_controller_outside_turns_a_joint_and_its_work_is_booked(tmp_path: Path) -> None:
     """The work of the held torque, by its own sum over the recorded steps."""
-    law = "20.0 * (1.3 - self.angle) - 0.4 * self.rate"
-    run = active(tmp_path, law, duration=1.0)
+    fmu = python_fmu_of(tmp_path, SERVO, f"servo_{tmp_path.name}")
+    path = tmp_path / "active.toml"
+    path.write_text(ACTIVE.replace("PATH", fmu.as_posix()))
+    run = hl.run(path, PORTS)
     angle, torque = run["virtual_mechanism.crank.position"], run["motor.torque"]
     assert angle[-1] == pytest.approx(1.3, abs=0.02)
     booked = run.run["energies_within_a_rate"]["motor.torque -> virtual_mechanism.crank.effort"]

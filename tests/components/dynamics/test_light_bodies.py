@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,23 +10,19 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import tests.components.dynamics.extended_precision as exact
-from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.massless_bodies import MasslessError
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.variables import parameters
-from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.specs.bodies import Body
 from hapticlink.components.specs.linkage import (
+    Body,
     Directions,
     GraphicsCopy,
     Joint,
     Linkage,
     Loop,
-    Mechanism,
     OperationalPoint,
 )
-from tests.blocks import Running, virtual_environment, virtual_mechanism
-from tests.mechanisms import five_bar, linkages
+from tests.blocks import Running, advance, running, virtual_environment
+from tests.mechanisms import evaluated, five_bar, four_bar, linkages, rod
 
 G, RATE = 9.81, 1000
 
@@ -40,7 +35,7 @@ def trammel(sliders, turn=0.0, start=math.pi / 3):
     return Linkage(
         body=(
             Body(name="slider_x", **slider),
-            Body(name="rod", mass=1.0, inertia=1 / 12, center=(0.5, 0.0)),
+            rod("rod", 1.0),
             Body(name="slider_y", **slider),
         ),
         joint=(
@@ -70,7 +65,7 @@ def pendulum(sliders, t_end, start=math.pi / 3):
     [(1.0, 0.5), (1e-2, 0.5), (1e-4, 0.5), (1e-7, 0.5), (1e-12, 0.5), (0.0, 0.5), (0.0, 0.0)],
 )
 def test_trammel_with_sliders_of_any_mass(sliders, turn):
-    block = Running(virtual_mechanism(trammel(sliders, turn), Mechanism(), step_s=1 / RATE))
+    block = running(trammel(sliders, turn))
     begin, change = block.y["energy"], 0.0
     for k in range(3 * RATE):
         block.step(1 / RATE)
@@ -92,7 +87,7 @@ def test_trammel_with_sliders_of_any_mass(sliders, turn):
 
 def test_massless_sliders_leave_the_mobility_of_a_rod_on_its_circle():
     """Lambda^-1 = J J'/(m/4 + I) with the one column of motion of the rod's middle."""
-    block = Running(virtual_mechanism(trammel(0.0), Mechanism(), Directions(), step_s=1 / RATE))
+    block = running(trammel(0.0), directions=Directions())
     motion = np.array([-0.5 * math.sin(math.pi / 3), 0.5 * math.cos(math.pi / 3), -1.0])
     mobility = np.outer(motion, motion) / (1 / 4 + 1 / 12)
     np.testing.assert_allclose(block.y["Lambda_inv"], mobility, atol=1e-13)
@@ -102,8 +97,7 @@ def test_massless_sliders_leave_the_mobility_of_a_rod_on_its_circle():
 def test_the_graphics_copy_has_massless_bodies_too():
     copy = virtual_environment(trammel(0.0), GraphicsCopy(), Directions(), local_model=True)
     block = Running(copy)
-    held = Running(virtual_mechanism(trammel(0.0), Mechanism(), step_s=1 / RATE, frame_s=1 / 30))
-    own = Running(virtual_mechanism(trammel(0.0), Mechanism(), step_s=1 / RATE))
+    held, own = running(trammel(0.0), frame_s=1 / 30), running(trammel(0.0))
     held.set(**{name: block.y[name] for name in ("D", "W", "w", "J_h")})
     for name in ("qdd", "lambda", "a_bias"):
         np.testing.assert_allclose(held.y[name], own.y[name], rtol=1e-10, atol=1e-10)
@@ -132,56 +126,25 @@ def test_random_linkages_are_as_exact_as_their_last_digits(drawn):
     given_numbers = exact.numbers(linkage, q, qd, F)
     solution = exact.solution(linkage, given_numbers)
     near = [exact.solution(linkage, exact.disturbed(given_numbers, rng)) for _ in range(3)]
-    for k, mine in enumerate(ours(linkage, q, qd, F)):
+
+    def ours(model, F):
+        space = OperationalSpace(model)
+        return *space.motion(model.J_h.T @ F), space.Lambda_inv
+
+    for k, mine in enumerate(evaluated(linkage, ours, (3,))(q, qd, F)):
         right = solution[k]
         error = np.abs(mine.reshape(right.shape) - right).max(initial=0)
         inherent = max(np.abs(other[k] - right).max(initial=0) for other in near)
         assert error <= 1000 * inherent + 1e-11 * np.abs(right).max(initial=0)
 
 
-def ours(linkage, q, qd, F):
-    variables = parameters(linkage)
-    p, n = Signals("p", variables), len(q)
-    symbols = ca.SX.sym("q", n), ca.SX.sym("qd", n)
-    model = LinkageModel(linkage, p, *symbols)
-    space = OperationalSpace(model)
-    found = [*space.motion(model.J_h.T @ ca.DM(F)), space.Lambda_inv]
-    f = ca.Function("f", [*symbols, p.vector], found)
-    return [np.array(v) for v in f(q, qd, [s for v in variables for s in v.starts])]
-
-
-def four_bar(*masses):
-    """Crank .2, coupler .5, rocker .4, ground .5 m, uniform rods under gravity."""
-    lengths = {"crank": 0.2, "coupler": 0.5, "rocker": 0.4}
-    return Linkage(
-        body=tuple(
-            Body(name=name, mass=m, inertia=m * x**2 / 12, center=(x / 2, 0.0))
-            for m, (name, x) in zip(masses, lengths.items(), strict=True)
-        ),
-        joint=(
-            Joint(name="crank", child="crank"),
-            Joint(name="elbow", parent="crank", child="coupler", at_parent=(0.2, 0.0)),
-            Joint(name="rocker", child="rocker", at_parent=(0.5, 0.0)),
-        ),
-        loop=(Loop(bodies=("coupler", "rocker"), at=((0.5, 0.0), (0.4, 0.0))),),
-        gravity=(0.0, -G),
-        operational_point=OperationalPoint(body="coupler", at=(0.25, 0.0)),
-        start={"crank": 1.0, "elbow": -0.6, "rocker": 1.5},
-        start_velocity={"crank": 3.0},
-    )
-
-
 def test_massless_coupler_is_the_limit_of_light_ones():
-    ends = []
-    for coupler in (0.0, 1e-13):
-        mechanism = Mechanism(integrator="dormand-prince-8")
-        linkage = replace(four_bar(1.0, coupler, 1.0), start_velocity={})
-        block = Running(virtual_mechanism(linkage, mechanism, step_s=1 / RATE))
-        for _ in range(RATE // 2):
-            block.step(1 / RATE)
-        ends.append(block.x)
-    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
-    assert block.y["closure_error"] < 1e-14
+    massless, light = (
+        advance(running(four_bar((1.0, mass, 1.0)), integrator="dormand-prince-8"), 0.5, RATE)
+        for mass in (0.0, 1e-13)
+    )
+    np.testing.assert_allclose(massless.x, light.x, rtol=0, atol=1e-9)
+    assert light.y["closure_error"] < 1e-14
 
 
 @pytest.mark.parametrize("loops", [True, False])
@@ -190,19 +153,18 @@ def test_a_massless_body_that_is_free_is_refused_by_name(loops):
     linkage = (
         five_bar(m=(1, 0, 0, 0), I=(1e-4, 0, 0, 0))
         if loops
-        else replace(four_bar(1.0, 0.0, 1.0), loop=())
+        else replace(four_bar((1.0, 0.0, 1.0)), loop=())
     )
     name = "link[234]" if loops else "coupler"
     with pytest.raises(MasslessError, match=f"body `{name}` has mass and inertia 0"):
-        virtual_mechanism(linkage, Mechanism(), step_s=1 / RATE)
+        running(linkage)
 
 
 def test_a_dead_centre_that_nothing_with_mass_carries_ends_the_run_by_name():
     """The rocker comes to its end with speed, the massless crank would have to turn infinitely
     fast: energy is kept until then, and a state of the crank or coupler is no number after."""
-    component = virtual_mechanism(four_bar(0.0, 0.0, 1.0), Mechanism(), step_s=1 / RATE)
-    assert "massless body `crank`" in component.state_texts[0]
-    block = Running(component)
+    block = running(four_bar((0.0, 0.0, 1.0), rate=3.0))
+    assert "massless body `crank`" in block.component.state_texts[0]
     begin = block.y["energy"]
     while np.isfinite(block.x).all():
         assert block.y["energy"] == pytest.approx(begin, abs=0.1)

@@ -11,12 +11,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.specs.linkage import Mechanism
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import Running, advance, running
 from tests.mechanisms import five_bar
 
 RATE = 512
-GRAVITY = (0.0, -9.81)
 
 
 def second(linkage):
@@ -35,21 +33,19 @@ def second(linkage):
     }
 
 
-def mechanism(linkage):
-    return virtual_mechanism(replace(linkage, gravity=GRAVITY), Mechanism(), step_s=1 / RATE)
-
-
-ONE = five_bar()
+ONE = replace(five_bar(), gravity=(0.0, -9.81))
 START = {**ONE.start, **{f"other_{k}": v for k, v in ONE.start.items()}}
 OTHER = second(ONE)
-ALONE = mechanism(ONE)
-PAIR = mechanism(replace(ONE, start=START, **{k: (*getattr(ONE, k), *v) for k, v in OTHER.items()}))
+ALONE = running(ONE).component
+PAIR = running(
+    replace(ONE, start=START, **{k: (*getattr(ONE, k), *v) for k, v in OTHER.items()})
+).component
 MASSES = [(b.name, b.mass, b.inertia) for b in ONE.body]
 
 
 def masses(prefix, factor):
-    found = {f"{prefix}{name}.mass": m * factor for name, m, _ in MASSES}
-    return found | {f"{prefix}{name}.inertia": inertia * factor for name, _, inertia in MASSES}
+    each = {f"{prefix}{name}.mass": m * factor for name, m, _ in MASSES}
+    return each | {f"{prefix}{name}.inertia": inertia * factor for name, _, inertia in MASSES}
 
 
 @settings(max_examples=15, deadline=None)
@@ -59,10 +55,7 @@ def test_two_linkages_move_as_each_alone(first, other):
     alone = Running(ALONE)
     pair = Running(PAIR, parameters=masses("", s[0]) | masses("other_", s[1]))
     start = pair.y["energy"]
-    for _ in range(RATE // 4):
-        alone.step(1 / RATE)
-        pair.step(1 / RATE)
-    y, one = pair.y, alone.y
+    y, one = (advance(block, 0.25, RATE).y for block in (pair, alone))
     for k, half in enumerate((slice(0, 4), slice(4, 8))):
         for name in ("q", "qd", "qdd"):
             size = np.abs(one[name]).max()

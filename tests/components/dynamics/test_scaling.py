@@ -7,16 +7,12 @@ slide do, are times s. Dimensional analysis.
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.operational_space import OperationalSpace
-from hapticlink.components.dynamics.variables import parameters
-from hapticlink.components.linkage.model import LinkageModel
-from tests.mechanisms import linkages
+from tests.mechanisms import evaluated, linkages
 
 
 def scaled(linkage, s):
@@ -40,20 +36,10 @@ def scaled(linkage, s):
     )
 
 
-def terms(linkage):
-    """(qdd, lambda, Lambda^-1) of a linkage of this structure, at (linkage, q, qd, F)."""
-    p, n = Signals("p", parameters(linkage)), len(linkage.joint)
-    q, qd, F = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("F", 3)
-    model = LinkageModel(linkage, p, q, qd)
+def solution(model, F):
+    """(qdd, lambda, Lambda^-1) under a wrench of the hand."""
     space = OperationalSpace(model)
-    qdd, multipliers = space.motion(model.J_h.T @ F)
-    f = ca.Function("f", [p.vector, q, qd, F], [qdd, multipliers, space.Lambda_inv])
-
-    def at(linkage, *state):
-        values = [s for v in parameters(linkage) for s in v.starts]
-        return [np.array(v) for v in f.call([ca.DM(v) for v in (values, *state)])]
-
-    return at
+    return *space.motion(model.J_h.T @ F), space.Lambda_inv
 
 
 @settings(max_examples=40, deadline=None)
@@ -62,9 +48,9 @@ def test_units_of_length_do_not_matter(drawn, exponent, seed):
     linkage, q, qd = drawn
     s, F = 10.0**exponent, np.random.default_rng(seed).normal(size=3)
     unit = np.array([s if j.type == "prismatic" else 1.0 for j in linkage.joint])
-    at = terms(linkage)
-    qdd, multipliers, mobility = at(linkage, q, qd, F)
-    there = at(scaled(linkage, s), unit * q, unit * qd, F * (s, s, s**2))
+    at = evaluated(linkage, solution, (3,))
+    qdd, multipliers, mobility = at(q, qd, F)
+    there = at(unit * q, unit * qd, F * (s, s, s**2), of=scaled(linkage, s))
     S = np.diag([1, 1, s])
     tight = {"rtol": 0, "atol": 1e-10}
     size = np.abs(qdd).max(initial=1.0)

@@ -15,31 +15,28 @@ from hapticlink.components.specs.linkage import (
     Joint,
     Linkage,
     Loop,
-    Mechanism,
     OperationalPoint,
 )
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, advance, virtual_mechanism
-from tests.mechanisms import five_bar
+from tests import blocks
+from tests.blocks import RATES, advance, order
+from tests.mechanisms import five_bar, one_body
 
 MASS, G, SLOPE = 2.0, 9.81, 0.4
 WEIGHT = MASS * G * math.sin(SLOPE)  # along the slope
+ALONG = np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
 
 
 def block(speed=0.0, start=0.0, gravity=(0.0, -G), **joint):
     """A block on a slope."""
-    return Linkage(
-        body=(Body(name="block", mass=MASS, inertia=0.1),),
-        joint=(Joint(name="slope", type="prismatic", child="block", axis=-SLOPE, **joint),),
-        operational_point=OperationalPoint(body="block"),
-        gravity=gravity,
-        start={"slope": start},
-        start_velocity={"slope": speed},
+    body = Body(name="block", mass=MASS, inertia=0.1)
+    return one_body(
+        body, start=start, rate=speed, gravity=gravity, type="prismatic", axis=-SLOPE, **joint
     )
 
 
 def running(linkage, step_s=2e-3, **mechanism):
-    return Running(virtual_mechanism(linkage, Mechanism(**mechanism), step_s=step_s))
+    return blocks.running(linkage, step_s=step_s, **mechanism)
 
 
 @pytest.mark.parametrize("integrator", ["semi-implicit-euler", "rk4", "linearly-implicit"])
@@ -56,9 +53,9 @@ def test_a_block_below_the_friction_angle_stays_for_a_minute(integrator):
 def test_a_push_below_the_friction_leaves_no_trace():
     """Pushed back and forth for a minute, by up to what friction holds beyond the weight."""
     pushed = running(block(friction=1.5 * WEIGHT))
-    rng, along = np.random.default_rng(0), np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
+    rng = np.random.default_rng(0)
     for _ in range(600):
-        pushed.set(F_hand=rng.uniform(-0.3, 0.2) * WEIGHT * along)
+        pushed.set(F_hand=rng.uniform(-0.3, 0.2) * WEIGHT * ALONG)
         advance(pushed, 0.1)
     pushed.set(F_hand=np.zeros(3))
     advance(pushed, 2.0)
@@ -88,17 +85,8 @@ def test_a_block_that_is_thrown_stops_where_its_energy_is_spent(speed):
 def test_a_spring_with_friction_rests_where_coulomb_says():
     """x_n = (-1)^n (x_0 - 2 n f/k) at the n-th turn; it stays where k |x_n| < f."""
     k, f, start = 200.0, 3.0, 0.1
-    sprung = running(
-        block(
-            start=start,
-            stiffness=k,
-            gravity=None,
-            friction=f,
-            friction_deflection=1e-5,
-            friction_speed=5e-3,
-        ),
-        5e-4,
-    )
+    rubs = {"friction": f, "friction_deflection": 1e-5, "friction_speed": 5e-3}
+    sprung = running(block(start=start, gravity=None, stiffness=k, **rubs), 5e-4)
     turns = math.ceil((k * start / f - 1) / 2)
     rest = (-1) ** turns * (start - 2 * turns * f / k)
     assert advance(sprung, 5.0, 2000).state["q"][0] == pytest.approx(rest, abs=3e-5)
@@ -115,28 +103,18 @@ def test_stick_slip_against_scipy():
         return [y[1], (pull - f * e / d) / MASS, (e - y[2]) * v_f / d]
 
     exact = solve_ivp(rhs, (0, 4), np.zeros(3), "DOP853", rtol=1e-12, atol=1e-15, max_step=1e-3)
+    rubs = {"friction": f, "friction_deflection": d, "friction_speed": v_f}
     errors = []
-    for rate in (500, 1000, 2000, 4000):
-        pulled = running(
-            block(
-                gravity=None,
-                stiffness=k,
-                damping=b,
-                friction=f,
-                friction_deflection=d,
-                friction_speed=v_f,
-            )
-        )
-        along = np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
+    for rate in RATES:
+        pulled = running(block(gravity=None, stiffness=k, damping=b, **rubs))
         for i in range(4 * rate):
             # the mean of the pull over a step, to O(h^4) of the motion's error O(h^2)
             a, c = 3 * i / rate, 3 * (i + 1) / rate
             mean = (math.cos(a) - math.cos(c)) / (c - a)
-            pulled.set(F_hand=k * 0.02 * mean * along)
+            pulled.set(F_hand=k * 0.02 * mean * ALONG)
             pulled.step(1 / rate)
         errors.append(abs(pulled.state["q"][0] - exact.y[0, -1]))
-    order = -np.polyfit(np.log([500, 1000, 2000, 4000]), np.log(errors), 1)[0]
-    assert order > 1.7
+    assert order(errors) > 1.7
     assert errors[1] < 1e-6
 
 
@@ -198,15 +176,12 @@ def test_what_a_step_cannot_integrate_is_refused(key, value):
 @settings(max_examples=20)
 def test_friction_dissipates(friction, deflection, seed):
     """E never grows by more than the hand puts in."""
-    rubbed = running(
-        block(friction=friction, friction_deflection=deflection, friction_speed=200 * deflection),
-        5e-4,
-    )
-    rng, along = np.random.default_rng(seed), np.array([math.cos(SLOPE), -math.sin(SLOPE), 0.0])
+    law = {"friction_deflection": deflection, "friction_speed": 200 * deflection}
+    rubbed, rng = running(block(friction=friction, **law), 5e-4), np.random.default_rng(seed)
     spare = rubbed.y["energy"]
     for _ in range(30):
         push = rng.uniform(-40, 40)
-        rubbed.set(F_hand=push * along)
+        rubbed.set(F_hand=push * ALONG)
         for _ in range(10):
             q = rubbed.state["q"][0]
             rubbed.step(5e-4)
@@ -276,8 +251,7 @@ def test_a_linkage_with_a_loop_slides_and_sticks():
     """The five-bar under a wrench, and once it is gone."""
     linkage = five_bar()
     linkage = replace(linkage, joint=tuple(replace(j, friction=5e-3) for j in linkage.joint))
-    five = running(linkage)
-    five.set(F_hand=(-0.5, 0.3, 0.0))
+    five = running(linkage).set(F_hand=(-0.5, 0.3, 0.0))
     advance(five, 0.2, 2000)
     assert np.abs(five.state["qd"]).max() > 0.5
     five.set(F_hand=(0.0, 0.0, 0.0))

@@ -12,8 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.specs.linkage import Mechanism
-from tests.blocks import Running, virtual_mechanism
+from tests.blocks import Running, advance, running
 from tests.mechanisms import WRENCH, five_bar
 
 RATE = 512
@@ -21,8 +20,8 @@ TAYLOR = {"heun": (1, 1, 1 / 2), "rk4": (1, 1, 1 / 2, 1 / 6, 1 / 24)}
 
 
 def mechanism(method, stabilization="baumgarte", **settings):
-    settings = Mechanism(integrator=method, stabilization=stabilization, **settings)
-    return virtual_mechanism(five_bar(), settings, step_s=1 / RATE)
+    settings |= {"integrator": method, "stabilization": stabilization}
+    return running(five_bar(), step_s=1 / RATE, **settings).component
 
 
 def limit(method, beta):
@@ -47,9 +46,7 @@ def closure_after(component, steps):
     block = Running(component)
     block.put(q=block.state["q"] + (1e-6, 0, 0, 0))
     with np.errstate(all="ignore"):
-        for _ in range(steps):
-            block.step(1 / RATE)
-        return block.y["closure_error"]
+        return advance(block, steps / RATE, RATE).y["closure_error"]
 
 
 @pytest.mark.parametrize("beta", [0.5, 1.0])
@@ -62,12 +59,12 @@ def test_limit(method, beta, side):
 
 
 def test_dormand_prince_8_has_its_limit_at_6_4():
-    left = [
+    below, above = (
         closure_after(mechanism("dormand-prince-8", alpha=alpha_T * RATE, beta=1.0), 400)
         for alpha_T in (6.2, 6.6)
-    ]
-    assert left[0] < 1e-9
-    assert not left[1] < 1e-6
+    )
+    assert below < 1e-9
+    assert not above < 1e-6
 
 
 @pytest.mark.parametrize("alpha_T", [5.0, 50.0])

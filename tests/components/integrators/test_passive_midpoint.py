@@ -15,19 +15,17 @@ from hapticlink.components.integrators import METHODS
 from hapticlink.components.integrators.base import Integrator
 from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
 from hapticlink.components.specs.drives import ConstantDrive, ProfileDrive
-from hapticlink.components.specs.linkage import (
-    Body,
-    Joint,
-    Linkage,
-    Mechanism,
-    OperationalPoint,
-    Spring,
-)
+from hapticlink.components.specs.linkage import Body, Spring
 from hapticlink.orchestrator.open_scene import load
-from tests.blocks import Running, virtual_mechanism
-from tests.mechanisms import five_bar, linkages, terms
+from tests import blocks
+from tests.blocks import Running, advance
+from tests.mechanisms import five_bar, linkages, one_body, terms
 
-PASSIVE = Mechanism(integrator="passive-midpoint")
+
+def running(linkage, **settings):
+    return blocks.running(
+        linkage, **({"integrator": "passive-midpoint", "step_s": None} | settings)
+    )
 
 
 def gains(block, rng, steps, size=1.0, longest=0.2):
@@ -78,7 +76,7 @@ def with_forces(draw):
 @given(with_forces())
 def test_no_step_makes_energy(made):
     linkage, rng = made
-    block = Running(virtual_mechanism(linkage, PASSIVE))
+    block = running(linkage)
     gained, scale = gains(block, rng, 60)
     assert np.isfinite(block.x).all()
     assert (gained <= 1e-11 * (scale + scale.max() * 1e-3)).all()
@@ -88,8 +86,8 @@ def test_no_step_makes_energy(made):
 def test_neither_do_contacts_limits_and_further_hands(scene):
     """Contacts of the shipped scenes at the rates of a graphics loop, with a wrench that varies."""
     read = load(scene)
-    block = Running(virtual_mechanism(read.linkage, PASSIVE, None, read.contacts))
-    rng = np.random.default_rng(3)
+    contacts = read.contacts and vars(read.contacts)
+    block, rng = running(read.linkage, contacts=contacts), np.random.default_rng(3)
     gained, scale = gains(block, rng, 300, np.array([0.3, 0.3, 0.01]), longest=0.1)
     assert (gained <= 1e-11 * (scale + scale.max() * 1e-3)).all()
     assert block.y.get("closure_error", 0.0) < 1e-3
@@ -100,15 +98,8 @@ def test_neither_do_contacts_limits_and_further_hands(scene):
 )
 def test_a_drive_may_put_energy_in(drive):
     """A constant torque on an axle: its work, and no more."""
-    axle = Joint(name="axle", child="disc", drive=drive)
-    linkage = Linkage(
-        body=(Body(name="disc", mass=1.0, inertia=0.5),),
-        joint=(axle,),
-        operational_point=OperationalPoint(body="disc"),
-    )
-    block = Running(virtual_mechanism(linkage, PASSIVE))
-    for _ in range(20):
-        block.step(0.05)
+    block = running(one_body(Body(name="disc", mass=1.0, inertia=0.5), drive=drive))
+    advance(block, 1.0, 20)
     assert block.y["energy"] == pytest.approx(0.5 * 0.5 * 4.0**2, rel=1e-12)  # w = 2 t/.5, t = 1
 
 
@@ -140,7 +131,7 @@ def test_order_two(closed, varying):
         joint=tuple(replace(j, stiffness=0.02, damping=2e-4) for j in linkage.joint),
         start_velocity={"shoulder1": 4.0, "shoulder2": -2.0},
     )
-    component = virtual_mechanism(linkage, PASSIVE)
+    component = running(linkage).component
     start = Running(component).x[:8]
     exact = solve_ivp(accelerations(linkage), (0, 0.5), start, "DOP853", rtol=1e-11, atol=1e-13)
 
@@ -159,14 +150,8 @@ def test_order_two(closed, varying):
 def test_a_stiff_spring_keeps_its_energy():
     """A spring of 1e8 N.m/rad at 30 Hz, where an explicit step of it has no stable size: the
     linearly implicit midpoint conserves a linear spring's energy to rounding."""
-    axle = Joint(name="axle", child="disc", stiffness=1e8)
-    linkage = Linkage(
-        body=(Body(name="disc", mass=1.0, inertia=1.0),),
-        joint=(axle,),
-        operational_point=OperationalPoint(body="disc"),
-        start={"axle": 0.1},
-    )
-    block = Running(virtual_mechanism(linkage, PASSIVE))
+    disc = Body(name="disc", mass=1.0, inertia=1.0)
+    block = running(one_body(disc, start=0.1, stiffness=1e8))
     for h in np.random.default_rng(1).uniform(0.01, 0.05, 300):
         block.step(h)
     assert block.y["energy"] == pytest.approx(0.5e6, rel=1e-9)
@@ -189,25 +174,18 @@ class Counting(Integrator):
 def test_any_method_may_use_the_terms_of_a_mechanism_and_count(monkeypatch):
     monkeypatch.setitem(METHODS, "counting", Counting())
     linkage = replace(five_bar(), start_velocity={"shoulder1": 4.0, "shoulder2": -2.0})
-    own, counting = (
-        Running(virtual_mechanism(linkage, Mechanism(integrator=name)))
-        for name in ("passive-midpoint", "counting")
-    )
-    for _ in range(20):
-        own.step(0.01)
-        counting.step(0.01)
+    own, counting = running(linkage), running(linkage, integrator="counting")
+    for block in (own, counting):
+        advance(block, 0.2, 100)
     assert counting.y["steps"] == counting.state["steps"] == 20
     assert np.abs(own.state["qd"]).max() > 1
     np.testing.assert_array_equal(counting.x[:8], own.x[:8])
 
 
 @pytest.mark.parametrize(
-    ("settings", "held", "told"),
-    [
-        ({"stabilization": "baumgarte"}, None, "projection"),
-        ({}, 1 / 30, "local_model"),
-    ],
+    ("settings", "message"),
+    [({"stabilization": "baumgarte"}, "projection"), ({"frame_s": 1 / 30}, "local_model")],
 )
-def test_what_does_not_fit_is_refused(settings, held, told):
-    with pytest.raises(ValueError, match=told):
-        virtual_mechanism(five_bar(), replace(PASSIVE, **settings), frame_s=held)
+def test_what_does_not_fit_is_refused(settings, message):
+    with pytest.raises(ValueError, match=message):
+        running(five_bar(), **settings)

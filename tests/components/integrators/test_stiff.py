@@ -6,23 +6,17 @@ import pytest
 
 from hapticlink.components.integrators import step
 from hapticlink.components.integrators.linearly_implicit import GAMMA
-from hapticlink.components.specs.linkage import Body, Joint, Linkage, Mechanism, OperationalPoint
-from tests.blocks import Running, virtual_mechanism
+from hapticlink.components.specs.linkage import Body
+from tests.blocks import advance, running
+from tests.mechanisms import one_body
 
 
 def after(integrator, steps, stiffness, damping):
     """Angle of a 1 kg m2 disc, from 0.1 rad towards its rest at 0.2, at 512 Hz."""
-    linkage = Linkage(
-        body=(Body(name="disc", mass=1.0, inertia=1.0),),
-        joint=(Joint(name="axle", child="disc", stiffness=stiffness, damping=damping, rest=0.2),),
-        operational_point=OperationalPoint(body="disc"),
-        start={"axle": 0.1},
-    )
-    block = Running(virtual_mechanism(linkage, Mechanism(integrator=integrator), step_s=1 / 512))
+    spring = {"stiffness": stiffness, "damping": damping, "rest": 0.2}
+    linkage = one_body(Body(name="disc", mass=1.0, inertia=1.0), start=0.1, **spring)
     with np.errstate(all="ignore"):
-        for _ in range(steps):
-            block.step(1 / 512)
-    return block.state["q"][0]
+        return advance(running(linkage, integrator=integrator), steps / 512, 512).state["q"][0]
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(1e10, None), (1e8, 1e5), (1e6, 1e9)])
@@ -38,25 +32,17 @@ def test_explicit_methods_do_not_hold_it():
     assert not abs(after("rk4", 40, 1e8, 1e5)) < 1
 
 
-def slipping(n):
-    """(x, u, p, t) -> x' of two masses that n springs which slip hold, as friction of contacts."""
-    x, u, p, t = (
-        ca.SX.sym(name, size) for name, size in (("x", 4 + n), ("u", 0), ("p", 0), ("t", 1))
-    )
+def stepped(n):
+    """(x, u, p, t) -> x' of two masses that n springs which slip hold, as friction of contacts, and
+    a step of it."""
+    sizes = {"x": 4 + n, "u": 0, "p": 0, "t": 1, "h": 1}
+    x, u, p, t, _ = arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
     q, v, z = x[:2], x[2:4], x[4:]
     rates = [v[i % 2] * ca.cos(q[0]) - (1 + i) * z[i] * v[1] ** 2 for i in range(n)]
     pulls = [-sum((40 * z[i] for i in range(k, n, 2)), start=30 * ca.sin(q[k])) for k in range(2)]
-    return ca.Function("f", [x, u, p, t], [ca.vertcat(v, *pulls, *rates)])
-
-
-def stepped(n):
-    f = slipping(n)
-    x, u, p, t, h = (
-        ca.SX.sym(name, size)
-        for name, size in (("x", 4 + n), ("u", 0), ("p", 0), ("t", 1), ("h", 1))
-    )
-    after = step("linearly-implicit", f, x, u, p, t, h, range(2))
-    return f, ca.Function("after", [x, u, p, t, h], [after], {"cse": True})
+    f = ca.Function("f", [x, u, p, t], [ca.vertcat(v, *pulls, *rates)])
+    after = step("linearly-implicit", f, *arguments, range(2))
+    return f, ca.Function("after", arguments, [after], {"cse": True})
 
 
 def test_a_step_is_the_formula_of_its_reference_with_the_whole_matrix():

@@ -3,19 +3,15 @@
 from collections import Counter
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.articulated_body import TreeInertia
-from hapticlink.components.dynamics.variables import parameters
-from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, OperationalPoint
 from tests.components import appendix_a
-from tests.mechanisms import TABLE_6_1, five_bar, linkages, terms
+from tests.mechanisms import evaluated, five_bar, linkages, one_body, terms
 
 F_CM = (0.3, 0.6, 0.45, 0.7)
 
@@ -23,19 +19,19 @@ F_CM = (0.3, 0.6, 0.45, 0.7)
 @pytest.mark.parametrize("seed", range(5))
 def test_terms_meet_appendix_a(seed):
     rng = np.random.default_rng(seed)
-    m, l, J = TABLE_6_1["m"], TABLE_6_1["l"], TABLE_6_1["I"]  # noqa: E741
-    at = terms(five_bar(f=F_CM), "D", "C_qd", "W", "w", "h", "x_h", "J_h")
     q, qd = rng.uniform(-3, 3, 4), rng.uniform(-5, 5, 4)
-    D, C_qd, W, w, h, x_h, J_h = at(q, qd)
+    D, C_qd, W, w, h, x_h, J_h = terms(five_bar(f=F_CM), "D", "C_qd", "W", "w", "h", "x_h", "J_h")(
+        q, qd
+    )
     tight = {"rtol": 1e-13, "atol": 1e-15}
-    np.testing.assert_allclose(D, appendix_a.D(q, m, l, J, F_CM), **tight)
-    C = appendix_a.C(q, qd, m, l, F_CM)
+    np.testing.assert_allclose(D, appendix_a.D(q, f=F_CM), **tight)
+    C = appendix_a.C(q, qd, f=F_CM)
     np.testing.assert_allclose(C_qd.ravel(), C @ qd, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(W, appendix_a.W(q, l), **tight)
-    np.testing.assert_allclose(w.ravel(), appendix_a.w(q, qd, l), rtol=1e-13, atol=1e-14)
-    np.testing.assert_allclose(h.ravel(), appendix_a.h(q, l), **tight)
-    np.testing.assert_allclose(x_h.ravel(), appendix_a.r_h(q, l, F_CM), **tight)
-    np.testing.assert_allclose(J_h, appendix_a.J_h(q, l, F_CM), **tight)
+    np.testing.assert_allclose(W, appendix_a.W(q), **tight)
+    np.testing.assert_allclose(w.ravel(), appendix_a.w(q, qd), rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(h.ravel(), appendix_a.h(q), **tight)
+    np.testing.assert_allclose(x_h.ravel(), appendix_a.r_h(q, f=F_CM), **tight)
+    np.testing.assert_allclose(J_h, appendix_a.J_h(q, f=F_CM), **tight)
 
 
 def test_random_linkages_have_loops_of_every_number():
@@ -76,11 +72,8 @@ def test_laws_of_any_linkage(drawn):
 
 
 def test_free_body_is_its_own_inertia():
-    linkage = Linkage(
-        body=(Body(name="b", mass=2.0, inertia=0.1, center=(0.3, -0.2)),),
-        joint=(Joint(name="j", type="free", child="b"),),
-        operational_point=OperationalPoint(body="b", at=(0.3, -0.2)),
-    )
+    body = Body(name="b", mass=2.0, inertia=0.1, center=(0.3, -0.2))
+    linkage = one_body(body, at=body.center, type="free")
     q, qd = np.array([0.1, -0.2, 0.7]), np.array([1.0, 2.0, 3.0])
     D, J_h, T = terms(linkage, "D", "J_h", "kinetic_energy")(q, qd)
     v = J_h @ qd
@@ -89,7 +82,7 @@ def test_free_body_is_its_own_inertia():
 
 
 def test_mean_link_length_of_the_five_bar():
-    assert mean_link_length(five_bar()) == pytest.approx(np.mean(TABLE_6_1["l"]), rel=1e-15)
+    assert mean_link_length(five_bar()) == pytest.approx(np.mean(appendix_a.L), rel=1e-15)
 
 
 def test_a_tree_without_a_root_is_refused():
@@ -111,12 +104,12 @@ def test_tree_recursion_is_D_and_its_inverse(drawn):
     body = Body(name="extra", mass=0.7, inertia=0.02, center=(0.1, -0.2))
     linkage = replace(linkage, body=(*linkage.body, body), joint=(*linkage.joint, free))
     q, qd = np.r_[q, 0.2, -0.1, 0.5], np.r_[qd, 1, 2, 3]
-    variables = parameters(linkage)
-    p, symbol = Signals("p", variables), ca.SX.sym("q", len(q))
-    model = LinkageModel(linkage, p, symbol, ca.SX.sym("qd", len(q)))
-    tree, right = TreeInertia(model), ca.SX.sym("b", len(q), 2)
-    f = ca.Function("f", [symbol, p.vector, right], [model.D, tree.apply(right), tree.solve(right)])
+
+    def both(model, right):
+        tree = TreeInertia(model)
+        return model.D, tree.apply(right), tree.solve(right)
+
     b = np.random.default_rng(0).normal(size=(len(q), 2))
-    D, applied, solved = map(np.array, f(q, [s for v in variables for s in v.starts], b))
+    D, applied, solved = evaluated(linkage, both, b.shape)(q, qd, b)
     np.testing.assert_allclose(applied, D @ b, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(solved, np.linalg.solve(D, b), rtol=1e-8, atol=1e-8)
