@@ -78,7 +78,7 @@ def stability(
     For example:
 
         hapticlink stability closed-loop
-        hapticlink stability closed-loop --grid 4
+        hapticlink stability closed-loop --grid 6
         hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
         hapticlink stability virtual-wall --port
         hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
