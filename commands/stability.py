@@ -28,6 +28,10 @@ Equilibrium = Annotated[
 ]
 Figure = Annotated[bool, Parameter(negative="", help="Draw the verdict: stability.png in OUT.")]
 Poses = Annotated[int, Parameter(help="Poses of the scene's run that are judged.")]
+Grid = Annotated[
+    int,
+    Parameter(help="Judge the workspace around the run, too, at as many places along each side."),
+]
 Drift = Annotated[
     tuple[float, float],
     Parameter(help="Frequency (Hz) and growth rate (1/s) below which a growing mode is a drift."),
@@ -50,6 +54,7 @@ def stability(
     out: Out = None,
     changes: Changes = UNCHANGED,
     poses: Poses = 3,
+    grid: Grid = 0,
     drift: Drift = (1.0, 0.2),
     figure: Figure = False,
     equilibrium: Equilibrium = False,
@@ -73,6 +78,7 @@ def stability(
     For example:
 
         hapticlink stability closed-loop
+        hapticlink stability closed-loop --grid 6
         hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
         hapticlink stability virtual-wall --port
         hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
@@ -100,7 +106,9 @@ def stability(
         if equilibrium:
             judged = hl.equilibrium_stability(scene, given, bounds=bounds, progress=progress)
         else:
-            judged = hl.stability(scene, given, poses=poses, bounds=bounds, progress=progress)
+            judged = hl.stability(
+                scene, given, poses=poses, grid=grid, bounds=bounds, progress=progress
+            )
     record, lines = judged.record(), [*judged.lines()]
     if passivity:
         record |= {"port": passivity.record()}

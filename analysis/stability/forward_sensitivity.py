@@ -1,8 +1,8 @@
-"""Perturbations of a co-simulation, carried along with it from operation to operation.
+"""The slopes of the operations of a co-simulation at rest.
 
 Each operation changes few numbers: a doStep those of one FMU, the evaluation of a hold those of one
-connection. With the slopes J of what it writes with respect to what it reads, perturbations M, a
-column each, and their errors D follow
+connection. With the slopes J of what it writes with respect to what it reads, and their errors E,
+perturbations M, a column each, and their errors D follow (linear_period.py)
 
     M <- J M,   D <- J D + E M
 
@@ -53,8 +53,6 @@ from hapticlink.orchestrator.run.bind_operations import Instruction
 from hapticlink.orchestrator.run.parallel_steps import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 
-Columns = dict[str, Matrix]
-"""Perturbations by owner, a column each."""
 STEP = 1e-6
 KINK = 1e-3
 """Difference of slopes, relative to the largest of a column, above which there is none."""
@@ -181,38 +179,6 @@ class ForwardSensitivity:
             apart = self._apart.get(fmu, frozenset())
             if apart is not None:
                 self._apart[fmu] = None if found.apart is None else apart | found.apart
-
-    def carry(
-        self,
-        tick: int,
-        operation: Instruction,
-        call: Call,
-        M: Columns,
-        D: Columns,
-        same: float = SAME,
-    ) -> None:
-        """Carries out an operation, and perturbations with it, with slopes at numbers that differ
-        by up to `same` max(1, |z|)."""
-        if isinstance(operation, Finish):
-            return
-        call = self._alone(operation, call)
-        reach = self._of(operation)
-        if reach is None:
-            call(tick)
-            return
-        found, sizes = self._slopes(tick, operation, call, reach, same)
-        self._tell(operation, reach, found)
-        J, E = found.J, found.E
-        owners = [o for o in reach.state.owners if o != SIGNALS]
-        before = [np.vstack([*(X[o] for o in owners), X[SIGNALS][reach.reads]]) for X in (M, D)]
-        m, d = before
-        for X, Y in ((M, J @ m), (D, J @ d + E @ m)):
-            at = 0
-            for owner, size in zip(owners, sizes, strict=True):
-                X[owner] = Y[at : at + size]
-                at += size
-            X[SIGNALS] = X[SIGNALS].copy()
-            X[SIGNALS][reach.writes] = Y[at:]
 
     def _awaited(self, fmu: str, step: Call) -> Call:
         """A doStep of an FMU in a process of its own, whose end is waited for."""

@@ -1,13 +1,10 @@
 """The hands in which a scene is judged, from soft to firm.
 
-A grip is soft or firm by how the fingers are squeezed: their stiffness and damping grow with the
-force, while their mass stays (Hajian, Howe, J. Biomechanical Engineering 119 (1997), 109: a finger
-of some 6 g with 2 to 7 N.s/m and 200 to 1000 N/m); a spring and damper without a mass is the limit
-that moves with the handle. An arm adds its mass behind the grip, the five parameters of Speich,
-Shao, Goldfarb (Mechatronics 15 (2005), 1127): that at rest of Yokokohji, Yoshikawa (IEEE Trans.
-Robotics and Automation 10 (1994), 605), 2 kg with 2 N.s/m and 10 N/m, and one that keeps its
-posture, with the hundreds of N/m of Mussa-Ivaldi, Hogan, Bizzi (J. Neuroscience 5 (1985), 2732).
-Rotational values are assumed: LEVER times those of translation.
+The form is that of Speich, Shao, Goldfarb (Mechatronics 15 (2005), 1127): a mass on spring and
+damper behind the spring and damper of a grip; a massless grip alone is the limit that moves with
+the handle. Which numbers are computed from published ones, and which are a choice within or beyond
+a published range, docs/equilibrium.md says one by one. Rotational values are assumed: LEVER times
+those of translation.
 """
 
 from __future__ import annotations

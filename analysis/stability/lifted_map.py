@@ -15,17 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.closure_directions import Closures
-from hapticlink.analysis.stability.forward_sensitivity import (
-    SAME,
-    Applied,
-    Columns,
-    ForwardSensitivity,
-    Instruction,
-)
+from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
 from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
 from hapticlink.orchestrator.base import interrupt, temporary_folders
-from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
@@ -120,40 +114,6 @@ class LiftedMap:
         interrupt.check()
         return self._numbers()
 
-    def slopes(
-        self,
-        point: Vector,
-        V: Matrix,
-        same: float = SAME,
-        after: Callable[[Instruction, Columns], None] | None = None,
-    ) -> tuple[Vector, Matrix, Matrix]:
-        """F(point), its derivatives along the columns of V, and their errors; slopes of operations
-        are shared by numbers that differ by up to `same`, relative. `after` each operation is
-        called with the perturbations, which it may change."""
-        state = self._state
-        state.put(self._template, point)
-        ends = np.cumsum([len(part) for part in state.parts(self._template)])[:-1]
-        M = dict(zip(state.owners, np.split(V, ends), strict=True))
-        D = {owner: np.zeros_like(rows) for owner, rows in M.items()}
-        alive = np.arange(V.shape[1])
-        self._sensitivity.begin()
-        for tick, event in self._moments:
-            for instruction, call in self._instructions(event):
-                self._sensitivity.carry(tick, instruction, call, M, D, same)
-                if after:
-                    after(instruction, M)
-            if not after:  # a column that is zero once remains so
-                kept = np.any([X.any(axis=0) for Y in (M, D) for X in Y.values()], axis=0)
-                alive = alive[kept]
-                for Y in (M, D):
-                    Y.update({owner: X[:, kept] for owner, X in Y.items()})
-            interrupt.check()
-        image, found = self._numbers(), []
-        for Y in (M, D):
-            found.append(np.zeros((len(image), V.shape[1])))
-            found[-1][:, alive] = np.vstack([Y[owner] for owner in state.owners])
-        return image, found[0], found[1]
-
     def recorded(self, point: Vector) -> tuple[float, list[list[Applied]]]:
         """What each event of the period does to perturbations of a state at rest, and the largest
         change of a state or input of an FMU within PINNED events, relative to max(1, |z|). The FMUs
@@ -170,6 +130,7 @@ class LiftedMap:
                 change = np.abs(numbers[moving] - point[moving])
                 moved = max(moved, (change / np.maximum(1.0, np.abs(point[moving]))).max(initial=0))
                 self._pin(point)
+        self._numbers()
         interrupt.check()
         return float(moved), events
 

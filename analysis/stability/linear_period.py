@@ -13,10 +13,10 @@ matrices of its own doStep and get: one recorded period serves every hand.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,6 +130,18 @@ class LinearPeriod:
         point = np.zeros(len(V))
         point[self.order] = self.point
         return Linearisation(point, point, V, A, D)
+
+    def carried(
+        self, X: Matrix, after: Callable[[type, str, Matrix], None] = lambda kind, fmu, X: None
+    ) -> Matrix:
+        """Perturbations X (rows, k) at the begin of the period, at its end. `after` each doStep,
+        get and set of an FMU is called with them, and may change them."""
+        X = X.copy()
+        for act in chain.from_iterable(self.events):
+            X[act.into] = act.J @ X[act.of]
+            if act in self.sources:
+                after(*self.sources[act], X)
+        return X
 
     def traced(self, mode: Mode) -> Mode:
         """A mode with its frequency beyond the argument of its eigenvalue, from the phase of the

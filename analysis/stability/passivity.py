@@ -36,8 +36,8 @@ import numpy as np
 from hapticlink.analysis.stability import two_port
 from hapticlink.analysis.stability.absolute_stability import damping_shortage, least
 from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
-from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
-from hapticlink.analysis.stability.linearisation import Linearisation
+from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
+from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.port_response import (
     LARGEST,
     HandPort,
@@ -144,7 +144,7 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
             f"graphics rate, such as --set graphics.rate={float(read.haptics.rate) / 16:g}"
         )
     with in_own_hand(scene, given) as (place, _):
-        found = of(read.title, place.map, place.period({}).in_map, hand, mechanism, place.T)
+        found = of(read.title, place.period({}), hand, mechanism, place.T)
     return replace(found, rounded=said)
 
 
@@ -160,28 +160,24 @@ def _ports(
 
 
 def of(
-    title: str,
-    map_: LiftedMap,
-    linear: Linearisation,
-    hand: HandPort,
-    mechanism: MechanismPort | None,
-    T: float,
+    title: str, period: LinearPeriod, hand: HandPort, mechanism: MechanismPort | None, T: float
 ) -> Passivity:
-    """The passivity of a map linearised at its equilibrium; T (s) is the haptic period. Raises
-    InputFault where the handle does not take one force each haptic period."""
-    whole, device = (response(map_, linear, hand, alone=alone) for alone in (False, True))
-    if whole.forces != whole.m * round(map_.period / T):
+    """The passivity of a period at its equilibrium; T (s) is the haptic period. Raises InputFault
+    where the handle does not take one force each haptic period."""
+    whole, device = (response(period, hand, alone=alone) for alone in (False, True))
+    P = period.map_.period
+    if whole.forces != whole.m * round(P / T):
         raise InputFault(
             f"user's port: {hand.handle} takes {whole.forces // whole.m} forces in "
-            f"{map_.period / T:.4g} haptic periods"
+            f"{P / T:.4g} haptic periods"
         )
-    port = _UserPort(whole, device, T, map_.period)
+    port = _UserPort(whole, device, T, P)
     angles = port.grid(np.union1d(_angles(port.N), port.scale.resonances(whole)))
     angles = with_worst(angles, lambda angle: max(port.necessary(angle)))
     curve = [pair for angle in angles for pair in port.curve(angle)]
     frequency, at_least = max(curve, key=lambda pair: pair[1])
     own, sufficient = zip(*map(port.own_and_sufficient, angles), strict=True)
-    if frequency == hertz(angles[0], 0, port.N, map_.period):
+    if frequency == hertz(angles[0], 0, port.N, P):
         at_least = at_zero(lambda angle: port.necessary(angle)[0], angles[0])
         frequency = 0.0
         curve.append((frequency, at_least))
@@ -196,7 +192,7 @@ def of(
         own=min(own),
         frequency=frequency,
         curve=tuple(sorted(curve)),
-        two_port=_between(map_, linear, hand, mechanism, port, angles) if mechanism else None,
+        two_port=_between(period, hand, mechanism, port, angles) if mechanism else None,
     )
 
 
@@ -265,16 +261,15 @@ class _UserPort:
 
 
 def _between(
-    map_: LiftedMap,
-    linear: Linearisation,
+    period: LinearPeriod,
     hand: HandPort,
     mechanism: MechanismPort,
     port: _UserPort,
     angles: Vector,
 ) -> TwoPort:
     """The rendering between the hand and the mechanism, at `angles` and those of its resonances."""
-    cut, scale = response(map_, linear, hand, mechanism), port.scale
-    H = map_.period * len(mechanism.moved) / (len(cut.D) - cut.forces)
+    cut, scale, P = response(period, hand, mechanism), port.scale, period.map_.period
+    H = P * len(mechanism.moved) / (len(cut.D) - cut.forces)
 
     def two_port_at(angle: float) -> Hybrid:
         return scale.at(cut, angle, H, scale.moving)
@@ -282,7 +277,7 @@ def _between(
     angles = port.within(np.union1d(angles, scale.resonances(cut)))
     angles = with_worst(angles, lambda angle: two_port.largest_shortage(two_port_at(angle)))
     ports = [(angle, two_port_at(angle)) for angle in angles]
-    return two_port.judged(ports, map_.period, scale.turns, cut.radius, mechanism.kept)
+    return two_port.judged(ports, P, scale.turns, cut.radius, mechanism.kept)
 
 
 def _angles(N: int) -> Vector:

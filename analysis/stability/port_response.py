@@ -8,7 +8,7 @@ of the mechanism stacked,
 
 x are the poses of the handle at the beginning of each haptic period, f the wrenches that the
 mechanism puts on the rendering over its steps. Perturbations are carried through the operations of
-a period as for the lifted map (forward_sensitivity.py); what the hand sends is set to u, and where
+a period as for the lifted map (linear_period.py); what the hand sends is set to u, and where
 the mechanism is cut off, its pose to y_{j+1} = y_j + d_j and its velocity to d_j/H, the mean over
 the step that ends there, of length H. Its other outputs stay as at the equilibrium. A velocity of
 the handle that is read directly is then the mean over the period before, too: a passive hand or
@@ -22,9 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hapticlink.analysis.stability.forward_sensitivity import Columns, Instruction
 from hapticlink.analysis.stability.lifted_map import LiftedMap
-from hapticlink.analysis.stability.linearisation import Linearisation
+from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.state_vector import SIGNALS
 from hapticlink.orchestrator.base.arrays import Complex, Matrix
 from hapticlink.orchestrator.base.faults import InputFault
@@ -165,20 +164,16 @@ def forces(map_: LiftedMap, hand: HandPort, mechanism: MechanismPort | None) -> 
 
 
 def response(
-    map_: LiftedMap,
-    linear: Linearisation,
+    period: LinearPeriod,
     hand: HandPort,
     mechanism: MechanismPort | None = None,
     *,
     alone: bool = False,
 ) -> Response:
-    """The response of the co-simulation cut open at the hand's port, and at the mechanism's one;
-    `alone`: of the handle's FMU with its other inputs held."""
-    N = map_.count(Set, hand.handle)
-    n = map_.count(Step, mechanism.fmu) if mechanism else 0
-    cut = _Cut(map_, linear, hand, mechanism, N, n, alone)
-    _, M, _ = map_.slopes(linear.point, cut.start, after=cut)
-    return cut.response(M)
+    """The response of a co-simulation at rest, cut open at the hand's port, and at the mechanism's
+    one; `alone`: of the handle's FMU with its other inputs held."""
+    cut = _Cut(period, hand, mechanism, alone)
+    return cut.response(period.carried(cut.start, cut))
 
 
 class _Cut:
@@ -188,36 +183,41 @@ class _Cut:
 
     def __init__(
         self,
-        map_: LiftedMap,
-        linear: Linearisation,
+        period: LinearPeriod,
         hand: HandPort,
         mechanism: MechanismPort | None,
-        N: int,
-        n: int,
         alone: bool,
     ) -> None:
-        self._hand, self._mechanism, self._alone, self._linear = hand, mechanism, alone, linear
-        self._m, self._N, self._n = len(hand.moved), N, n
+        self._hand, self._mechanism, self._alone = hand, mechanism, alone
+        map_, first, self._V = period.map_, period.first, period.linear.V
+        self._m, self._N = len(hand.moved), map_.count(Set, hand.handle)
         self._p = p = len(mechanism.moved) if mechanism else 0
-        self._T, self._H = map_.period / N, map_.period / n if n else 1.0
-        self._k = k = linear.V.shape[1]
+        self._n = n = map_.count(Step, mechanism.fmu) if mechanism else 0
+        self._T, self._H = map_.period / self._N, map_.period / n if n else 1.0
+        self._k = k = self._V.shape[1]
         self._u = k + (self._m if p else 0) + 2 * p
-        self._d = self._u + self._m * N
+        self._d = self._u + self._m * self._N
         self._x: list[Matrix] = []
         self._f: list[Matrix] = []
-        self._rows: dict[str, dict[str, int]] = {}
-        self._inputs: dict[str, set[str]] = {}
-        for fmu in {hand.handle, *((mechanism.fmu,) if mechanism else ())}:
-            listed = (c for c in map_.coordinates if (c.kind, c.owner) == ("fmu", fmu))
-            self._rows[fmu] = {c.variable: i for i, c in enumerate(listed)}
-            self._inputs[fmu] = {s.name for c in map_.system.into(fmu) for s in c.inputs}
-        self._outputs = {fmu: map_.outputs(fmu) for fmu in self._rows}
-        self.start = np.hstack([linear.V, np.zeros((len(linear.V), self._d + p * n - k))])
+        self._signals = slice(first[SIGNALS], first[SIGNALS] + map_.sizes()[SIGNALS])
+        self._outputs = {fmu: map_.outputs(fmu) for fmu in first if fmu in map_.system.fmu}
+        self._row = {
+            (c.owner, c.variable): int(row)
+            for c, row in zip(map_.coordinates, period.order, strict=True)
+            if c.kind == "fmu"
+        }
+        self._inputs = {
+            fmu: [self._row[fmu, s.name] for c in map_.system.into(fmu) for s in c.inputs]
+            for fmu in self._outputs
+        }
+        self._own = {
+            fmu: [row for (owner, _), row in self._row.items() if owner == fmu]
+            for fmu in self._outputs
+        }
+        self.start = np.hstack([self._V, np.zeros((len(self._V), self._d + p * n - k))])
         if mechanism:
-            own = [i for i, c in enumerate(map_.coordinates) if c.owner == mechanism.fmu]
-            self.start[own] = 0.0
-            first = next(i for i, c in enumerate(map_.coordinates) if c.kind == "signal")
-            self._pose(self.start[first:])
+            self.start[self._own[mechanism.fmu]] = 0.0
+            self._pose(self.start[self._signals])
 
     def _column(self, j: int) -> slice:
         """The columns of the displacement of step j, -1 the one before the period."""
@@ -246,49 +246,36 @@ class _Cut:
                 if np.abs(signals[i] - row).max() <= near:
                     signals[i] = new
 
-    def __call__(self, operation: Instruction, M: Columns) -> None:
-        hand, mechanism = self._hand, self._mechanism
-        match operation:
-            case Get(hand.hand) if len(self._x) < self._N and not self._alone:
-                self._push(M, SIGNALS, list(hand.forces))
-            case Set(hand.handle):
-                inputs = M[hand.handle] = M[hand.handle].copy()
-                rows = self._rows[hand.handle]
-                if self._alone:
-                    inputs[[rows[name] for name in self._inputs[hand.handle]]] = 0.0
-                self._push(M, hand.handle, [rows[name] for name in hand.inputs])
-                self._x.append(M[SIGNALS][list(hand.moved)].copy())
-        if mechanism is None:
-            return
-        match operation:
-            case Get(hand.handle):
-                M[SIGNALS] = M[SIGNALS].copy()
-                self._velocity(M[SIGNALS])
-            case Step(mechanism.fmu):
-                rows = self._rows[mechanism.fmu]
-                own = M[mechanism.fmu]
-                each = [sum(s * own[rows[e]] for e, s in terms) for terms in mechanism.wrench]
-                self._f.append(-np.stack(each))
-                kept = [rows[name] for name in self._inputs[mechanism.fmu]]
-                M[mechanism.fmu] = np.zeros_like(own)
-                M[mechanism.fmu][kept] = own[kept]
-            case Get(mechanism.fmu):
-                M[SIGNALS] = M[SIGNALS].copy()
-                self._pose(M[SIGNALS])
+    def __call__(self, kind: type, fmu: str, X: Matrix) -> None:
+        hand, mechanism, signals = self._hand, self._mechanism, X[self._signals]
+        if (kind, fmu) == (Get, hand.hand) and len(self._x) < self._N and not self._alone:
+            self._push(signals, list(hand.forces))
+        elif (kind, fmu) == (Set, hand.handle):
+            if self._alone:
+                X[self._inputs[fmu]] = 0.0
+            self._push(X, [self._row[fmu, name] for name in hand.inputs])
+            self._x.append(signals[list(hand.moved)].copy())
+        elif mechanism and (kind, fmu) == (Get, hand.handle):
+            self._velocity(signals)
+        elif mechanism and (kind, fmu) == (Step, mechanism.fmu):
+            terms = [[(s, self._row[fmu, e]) for e, s in entry] for entry in mechanism.wrench]
+            self._f.append(-np.stack([sum(s * X[row] for s, row in entry) for entry in terms]))
+            X[[*{*self._own[fmu]} - {*self._inputs[fmu]}]] = 0.0
+        elif mechanism and (kind, fmu) == (Get, mechanism.fmu):
+            self._pose(signals)
 
-    def _push(self, M: Columns, owner: str, rows: list[int]) -> None:
+    def _push(self, X: Matrix, rows: list[int]) -> None:
         """Sets the force of this period."""
         first = self._u + len(self._x) * self._m
-        M[owner] = M[owner].copy()
-        M[owner][rows] = 0.0
-        M[owner][rows, first : first + self._m] = np.eye(self._m)
+        X[rows] = 0.0
+        X[rows, first : first + self._m] = np.eye(self._m)
 
-    def response(self, M: Matrix) -> Response:
+    def response(self, X: Matrix) -> Response:
         if (len(self._x), len(self._f)) != (self._N, self._n):
             raise AssertionError("operations of a period that were not counted")
-        ends = [self._linear.V.T @ M]
+        ends = [self._V.T @ X]
         if self._mechanism:
-            pose = np.zeros((self._p, M.shape[1]))
+            pose = np.zeros((self._p, X.shape[1]))
             pose[:, self._u - 2 * self._p : self._u - self._p] = np.eye(self._p)
             for j in range(self._n):
                 pose[:, self._column(j)] = np.eye(self._p)

@@ -20,7 +20,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.faults import Fault, FmuFault, InputFault
 from hapticlink.orchestrator.base.loop_names import (
     ENVIRONMENT_WRENCH,
     HAND,
@@ -181,28 +181,31 @@ def in_own_hand(
     with a constant wrench where that leads. In these it is held by a spring in whose place the hand
     that is given, too, is to be put. Raises InputFault or FmuFault where there is no
     equilibrium."""
-    read = open_scene.load(scene, given)
-    hand, linkage = read.hand, read.linkage
     with ExitStack() as stack:
-        if linkage is None or hand is None or replaced(read):
-            yield stack.enter_context(resting(scene, given)), None
-            return
-        poses = []
-        if presses(read):
-            poses = settled(scene, given, linkage)
-        else:
+        found, last = None, Fault()
+        for options, hand in _own_equilibria(scene, given):
             try:
-                place = stack.enter_context(resting(scene, given))
-            except (InputFault, FmuFault):
-                poses = [rest(scene, given, linkage)]
-            else:
-                yield place, None
-                return
-        try:
-            place = stack.enter_context(resting(scene, poses[0].options(given)))
-        except (InputFault, FmuFault):
-            place = stack.enter_context(resting(scene, poses[-1].options(given)))
-        yield place, own_hand(hand)
+                found = stack.enter_context(resting(scene, options)), hand
+                break
+            except (InputFault, FmuFault) as fault:
+                last = fault
+        if found is None:
+            raise last
+        yield found
+
+
+def _own_equilibria(
+    scene: str | Path | Scene, given: Sequence[str]
+) -> Iterator[tuple[tuple[str, ...], Hand | None]]:
+    """The options of `in_own_hand` and its hand, in the order in which they are tried."""
+    read = open_scene.load(scene, given)
+    if not presses(read):
+        yield tuple(given), None
+    if read.linkage is None or read.hand is None or replaced(read):
+        return
+    leads = settled if presses(read) else lambda *scene: [rest(*scene)]
+    for pose in leads(scene, given, read.linkage):
+        yield pose.options(given), own_hand(read.hand)
 
 
 def presses(read: Scene) -> bool:
@@ -215,6 +218,13 @@ def replaced(read: Scene) -> bool:
     return any(f.replaces == HAND for f in read.fmu)
 
 
+def visited(run: Results) -> tuple[Matrix, Matrix]:
+    """The poses of the operational point, (k, 3), and the joint coordinates, (k, n), of a run.
+    Raises InputFault as `evenly_spaced`."""
+    table = _recorded(run)
+    return table[POINT_POSE], table[JOINT_COORDINATES]
+
+
 def _average(run: Results, linkage: Linkage, since: float) -> Pose:
     """The mean pose over the part of a run from `since` (0 to 1) of it on. Raises InputFault as
     `evenly_spaced`."""
@@ -224,7 +234,7 @@ def _average(run: Results, linkage: Linkage, since: float) -> Pose:
     end = _pose(run, linkage, n - 1)
     return replace(
         end,
-        joints=_by_joint(linkage, table[JOINT_COORDINATES][part].mean(axis=0)),
+        joints=by_joint(linkage, table[JOINT_COORDINATES][part].mean(axis=0)),
         point=tuple(table[POINT_POSE][part].mean(axis=0).tolist()),
     )
 
@@ -248,7 +258,7 @@ def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
     users = [user for user in run.record.scene.get("devices", {}) if _point(user) in table]
     return Pose(
         float(table["time"][i]),
-        _by_joint(linkage, table[JOINT_COORDINATES][i]),
+        by_joint(linkage, table[JOINT_COORDINATES][i]),
         tuple(table[POINT_POSE][i].tolist()),
         tuple((0.0 - _force(table)[i]).tolist()),
         {user: tuple(table[_point(user)][i].tolist()) for user in users},
@@ -319,12 +329,13 @@ def _point(user: str) -> str:
     return signal_of_user(POINT_POSE, user)
 
 
-def _by_joint(linkage: Linkage, q: Vector) -> dict[str, float | list[float]]:
-    by_joint: dict[str, float | list[float]] = {}
+def by_joint(linkage: Linkage, q: Vector) -> dict[str, float | list[float]]:
+    """Joint coordinates as `linkage.start` has them."""
+    joints: dict[str, float | list[float]] = {}
     first = 0
     for joint in linkage.joint:
         size = COORDINATES[joint.type]
-        values = [float(v) for v in q[first : first + size]]
-        by_joint[joint.name] = values if size > 1 else values[0]
+        values = q[first : first + size].tolist()
+        joints[joint.name] = values if size > 1 else values[0]
         first += size
-    return by_joint
+    return joints

@@ -116,10 +116,10 @@ class RestingScene:
         """The compliance (3, 3) of the handle at a frequency. Raises InputFault where it has no
         equilibrium with these gains."""
         try:
-            linear = self.period(scales).in_map
+            period = self.period(scales)
         except FmuFault as fault:
             raise InputFault(str(fault)) from None
-        return response(self.map, linear, hand_port(self.map.system)).compliance(hertz, self.T)
+        return response(period, hand_port(self.map.system)).compliance(hertz, self.T)
 
     def period(self, scales: Scales) -> LinearPeriod:
         """The period at the equilibrium with these gains, searched from `equilibrium`, so that the

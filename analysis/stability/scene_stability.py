@@ -35,6 +35,7 @@ from hapticlink.analysis.stability.rates import short
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
+from hapticlink.analysis.stability.workspace_grid import grid_poses
 from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
@@ -47,6 +48,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 
 POSES, SPAN = 3, 3.0
 """Poses, evenly spaced in the first seconds of the scene's run."""
+GRID = 32
+"""Most places along each side of a grid."""
 Progress = Callable[[str, int, int], object]
 Hands = Mapping[str, Hand | None]
 
@@ -56,17 +59,20 @@ def stability(
     options: Options = (),
     *,
     poses: int = POSES,
+    grid: int = 0,
     bounds: Bounds = DRIFT,
     progress: Progress | None = None,
 ) -> Stability:
     """The stability of a scene, changed by `options` (see `scene`), in a number of `poses` of its
-    run and in hands from soft to firm.
+    run and in hands from soft to firm; with a `grid`, also at as many times as many places of the
+    workspace around the run, as far as linkage and device reach them.
 
     `progress` is called with what is judged, and the numbers of finished and of all steps. `bounds`
     are those of a drift. Raises InputFault for a scene without linkage, one whose run or map has no
     period (rates and latencies that vary), and one without equilibrium in any pose.
     """
     poses = int(require("poses", poses, Annotated[int, Quantity("1", ge=1)]))
+    grid = int(require("grid", grid, Annotated[int, Quantity("1", ge=0, le=GRID)]))
     _require_bounds(bounds)
     given = overrides.written(options)
     read = open_scene.load(scene, given)
@@ -88,6 +94,8 @@ def stability(
         if presses(read):
             with suppress(InputFault):
                 visited += settled(scene, given, read.linkage)
+        if grid:
+            visited += grid_poses(run, read, read.linkage, grid)
         return _judged(scene, given, visited, hands_of(read.hand), bounds, progress, rounded)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.lifted_map import behind_start, lifted_map
+from hapticlink.analysis.stability.linear_period import linear_period
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.switching import (
     Edge,
@@ -163,8 +164,10 @@ def edges_of(scene: Scene | None, system: System, place: int, lengths: list[int]
 
         def frame(before: int, length: int, further: int | None = None) -> Matrix:
             other = alternating(system, place, before, length, further)
-            view = map_.over(other, window(other, place))
-            return V.T @ view.slopes(point, V)[1]
+            period = linear_period(map_.over(other, window(other, place)), point)
+            X = np.zeros((period.rows, V.shape[1]))
+            X[period.order] = V
+            return V.T @ period.carried(X)[period.order]
 
         low, high = lengths[0], lengths[-1]
         remembers = not _close(frame(low, middle), frame(high, middle))

@@ -184,8 +184,7 @@ def at_pose(scene: str | Path | Scene, options: Sequence[str], name: str) -> Tra
 
 
 def _felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
-    linear = place.period(scales).in_map
-    cut = response(place.map, linear, hand_port(place.map.system))
+    cut = response(place.period(scales), hand_port(place.map.system))
     X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
     return of(read.title, name, X, mobility(place), mean_link_length(_linkage(read)))
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import hapticlink as hl
-from hapticlink.analysis.stability.forward_sensitivity import SAME
+from hapticlink.analysis.stability.forward_sensitivity import STEP
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linearisation import Linearisation, constant
@@ -50,11 +50,16 @@ class OwnHand:
         return verdict(self.radius, self.first.uncertainty)
 
 
-def linearised(map_: LiftedMap, point: np.ndarray, same: float = SAME) -> Linearisation:
-    """The Jacobian of a map at a point by another road than that of linear_period.py: by
-    perturbations of all numbers, carried through each operation in its turn."""
+def linearised(map_: LiftedMap, point: np.ndarray) -> Linearisation:
+    """The Jacobian of a map at a point by another road than that of linear_period.py: by central
+    differences of the whole of F, carried out by the FMUs over a period for each number."""
     V = np.stack(list(map_.directions(point)), axis=1)
-    image, M, D = map_.slopes(point, V, same)
+    image = map_.image(point)
+    M, D = np.zeros((2, len(image), V.shape[1]))
+    for j, v in enumerate(V.T):
+        d = STEP * max(1.0, float(np.abs(point[v != 0.0]).max()))
+        ahead, behind = (map_.image(point + way * v) for way in (d, -d))
+        M[:, j], D[:, j] = (ahead - behind) / (2 * d), (ahead - 2 * image + behind) / (2 * d)
     taken = M.any(axis=0) | D.any(axis=0)
     V, M, D = V[:, taken], M[:, taken], D[:, taken]
     A, E = V.T @ M, V.T @ D

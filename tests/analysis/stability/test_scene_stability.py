@@ -44,7 +44,7 @@ def leading(period: LinearPeriod) -> list[complex]:
 def test_events_that_repeat_have_the_map_that_is_carried_through_the_period(
     place: RestingScene,
 ) -> None:
-    """By another road: perturbations of all coordinates through each operation in its turn."""
+    """By another road: differences of the whole map, for all coordinates in their turn."""
     period = place.period({})
     whole = linearised(place.map, period.point)
     expected = [mode.z for mode in modes(whole, place.map.period)[:LEADING]]
@@ -60,7 +60,7 @@ def test_a_hand_in_place_of_another_has_the_map_of_its_own_fmu(place: RestingSce
         linearisable("closed-loop-direct", options) as (read, system, _),
         lifted_map(long_enough(read, system), read) as map_,
     ):
-        loaded = modes(linearised(map_, map_.start, 1e-3), map_.period)[:LEADING]
+        loaded = modes(linearised(map_, map_.start), map_.period)[:LEADING]
     assert leading(in_arm) == pytest.approx([mode.z for mode in loaded], abs=1e-4)
 
 

@@ -101,7 +101,7 @@ def judged(folder: Path, rate: int) -> Passivity:
         "mechanism", ((("F", -1.0),),), (place("mechanism", "x"),), (place("mechanism", "v"),)
     )
     with lifted_map(made) as map_:
-        return passivity.of("two masses", map_, equilibrium(map_, map_.start).in_map, hand, port, T)
+        return passivity.of("two masses", equilibrium(map_, map_.start), hand, port, T)
 
 
 DECAY = np.exp(-DAMPING * T / MASS)

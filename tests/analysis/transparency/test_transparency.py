@@ -90,7 +90,7 @@ def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
     pose = start.tables["haptics"]["virtual_mechanism.x"][0].tolist()
     held = written(options | {"hand": spring(pose, (0.0, 0.0, 0.0), 1000.0)})
     with resting("closed-loop", held) as place:
-        cut = response(place.map, place.period({}).in_map, hand_port(place.map.system))
+        cut = response(place.period({}), hand_port(place.map.system))
     S = np.diag([1.0, 1.0, LENGTH])
     for hertz, axis in ((2.0, 0), (8.0, 1), (24.0, 0), (50.0, 1)):
         amplitude = [0.0, 0.0, 0.0]
