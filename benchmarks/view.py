@@ -86,8 +86,9 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], co
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     scene = viewed(SCENE, [f"haptics.rate={RATE}"])
     told(f"{SCENE}, dragged", 0, seconds)
-    with temporary_folders.room() as room, Link(SERVER, "127.0.0.1", "0", "bench") as link:
-        url = f"http://127.0.0.1:{link.first['port']}/bench/"
+    arguments = "127.0.0.1", "0", "bench", "", ""  # no second run
+    with temporary_folders.room() as room, Link(SERVER, *arguments) as link:
+        url = f"http://127.0.0.1:{link.first()['port']}/bench/"
         log = Path(room, "log.json")
         with log.open("w") as out:
             dragging = [sys.executable, "-m", "benchmarks.dragging", url, str(seconds)]
