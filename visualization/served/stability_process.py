@@ -16,19 +16,15 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.faults import Interrupted
-from hapticlink.visualization.interactive.viewed_scene import unpacked
 from hapticlink.visualization.served.server_pipe import Link, read, to_caller
 
 REST, LOOK = 0.3, 0.02
 """Times (s) for which nothing was changed before the verdict is computed, and between two looks for
 an answer."""
-NICE = 10
-"""Its priority: all others get ten times its share; with 19 it would not end beside busy ones."""
 
 
 class StabilityProcess:
@@ -78,7 +74,7 @@ class StabilityProcess:
 def main() -> None:
     """Answer what is asked by the standard input: the number of the question with each answer, and
     with None behind the last."""
-    _yield_to_others()
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the other processor is for the haptic loop
     out, questions = to_caller(), queue.SimpleQueue[Any]()
     signal.signal(signal.SIGINT, lambda *_: None)
     read(sys.stdin.buffer)  # the arguments, of which there are none
@@ -93,6 +89,7 @@ def main() -> None:
 
     threading.Thread(target=receive, daemon=True).start()
     from hapticlink.visualization.interactive.prediction import verdicts
+    from hapticlink.visualization.interactive.viewed_scene import unpacked
 
     while True:
         number, scene, *changes = questions.get()
@@ -105,15 +102,6 @@ def main() -> None:
 def _send(out: Any, message: Any) -> None:
     pickle.dump(message, out)
     out.flush()
-
-
-def _yield_to_others() -> None:
-    """Take a low priority, and one processor."""
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    if sys.platform != "win32":
-        os.nice(NICE)
-    with suppress(OSError):  # where Linux groups sessions, `nice` counts within one only
-        Path("/proc/self/autogroup").write_text(str(NICE))
 
 
 if __name__ == "__main__":
