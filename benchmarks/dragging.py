@@ -4,6 +4,7 @@ SECONDS`, in a process of its own. Prints JSON with times of the wall clock (s):
 sent    [x, y (m), time of the mouse event] of each pull that the page sent
 shown   [simulated time of the frame, time at which the page had drawn it, time of the next
          refresh of the screen, requestAnimationFrame]
+judged  by what was changed, seconds from the change to the first stability verdict and to the last
 """
 
 from __future__ import annotations
@@ -39,6 +40,27 @@ NOTE = """() => {
 }"""
 """Notes the times, and returns the operational point on the screen (px) and px to a metre."""
 
+CHANGES = {
+    "rate": ("[data-control=rate]", 12),
+    "hold": ("select[data-control]", "foh"),
+    "gain": ("[data-control='controller.K_pc']", 0.1),
+}
+"""By name, the control and its new value."""
+JUDGED = """([selector, value]) => new Promise((resolve) => {
+  const control = document.querySelector(selector), begun = performance.now(), before = view.map;
+  let first = null;
+  control.value = value;
+  control.dispatchEvent(new Event(control.tagName === "SELECT" ? "change" : "input"));
+  const look = () => {
+    const { map } = view, now = (performance.now() - begun) / 1e3;
+    if (map !== before && map.said !== "computing") first ??= now;
+    if (first !== null && !map.said.endsWith("so far")) resolve([first, now]);
+    else setTimeout(look, 5);
+  };
+  look();
+})"""
+"""Sets a control, and returns the times (s) until there is a verdict, so far and of all hands."""
+
 
 def dragged(page: Any, seconds: float) -> dict[str, Any]:
     """Drag around a circle."""
@@ -52,9 +74,10 @@ def dragged(page: Any, seconds: float) -> dict[str, Any]:
         dx, dy = RADIUS * (math.cos(angle) - 1), RADIUS * math.sin(angle)
         page.mouse.move(x + scale * dx, y - scale * dy)
         time.sleep(max(0.0, start + now + EVERY - time.monotonic()))
+    judged = {name: page.evaluate(JUDGED, [*change]) for name, change in CHANGES.items()}
     page.mouse.up()
-    found: dict[str, Any] = page.evaluate("() => window.log")
-    return found
+    log: dict[str, Any] = page.evaluate("() => window.log")
+    return log | {"judged": judged}
 
 
 def main() -> None:

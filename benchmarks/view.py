@@ -1,5 +1,5 @@
 """The page in use: 60 s of scripted dragging at 512 Hz, with the deadlines that the haptic loop
-missed and the latencies of what a person feels and sees.
+missed, the latencies of what a person feels and sees, and how long the stability verdict takes.
 
     mouse to force    from the mouse event in the browser to the step of the hand that takes the
                       pull, whose force acts from that instant on
@@ -86,8 +86,9 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], co
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     scene = viewed(SCENE, [f"haptics.rate={RATE}"])
     told(f"{SCENE}, dragged", 0, seconds)
-    with temporary_folders.room() as room, Link(SERVER, "127.0.0.1", "0", "bench") as link:
-        url = f"http://127.0.0.1:{link.first['port']}/bench/"
+    arguments = "127.0.0.1", "0", "bench", "", ""  # no second run
+    with temporary_folders.room() as room, Link(SERVER, *arguments) as link:
+        url = f"http://127.0.0.1:{link.first()['port']}/bench/"
         log = Path(room, "log.json")
         with log.open("w") as out:
             dragging = [sys.executable, "-m", "benchmarks.dragging", url, str(seconds)]
@@ -131,13 +132,14 @@ def page(session: Measured, found: dict[str, Any], seconds: int, load: float, co
     if missing := [name for name, values in rows.items() if not values]:
         raise InputFault(f"nothing was measured of {', '.join(missing)}: is the machine busy?")
     felt, shown = (1e3 * float(np.median(rows[k])) for k in ("mouse to force", "step to screen"))
-    taken = len(rows["mouse to force"])
+    taken, judged = len(rows["mouse to force"]), found["judged"]
     lines = [
         "# The page in use",
         "",
         f"In {seconds} s of dragging at {RATE} Hz the haptic loop of `{SCENE}` missed {missed} of "
         f"{ticks} deadlines; a pull of the mouse is felt after {short(felt)} ms, and a step is on "
-        f"the screen after {short(shown)} ms (medians).",
+        f"the screen after {short(shown)} ms (medians). A stability verdict stands "
+        f"{short(max(first for first, _ in judged.values()))} s after a change.",
         "",
         f"Made by `{command}`, on {platform.system()} with {os.cpu_count()} "
         f"cores, shared with a headless Chromium that draws in software, and a load average of "
@@ -152,6 +154,13 @@ def page(session: Measured, found: dict[str, Any], seconds: int, load: float, co
         *(f"| {name} | {' | '.join(_row(values))} |" for name, values in rows.items()),
         f"| step time of the haptic loop, since its start | {_times(after['step_time'])} |",
         f"| lateness of the haptic loop, since its start | {_times(after['lateness'])} |",
+        "",
+        "Seconds from a change on the page, with the handle held, to the stability verdict on the "
+        "first hands and on all:",
+        "",
+        "| changed | so far | all hands |",
+        "|---|--:|--:|",
+        *(f"| {name} | {' | '.join(map(short, times))} |" for name, times in judged.items()),
         "",
     ]
     return "\n".join(lines)

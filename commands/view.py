@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import secrets
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -108,8 +109,9 @@ def view(
     default = default_folder("runs", scene)
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
-    with _served(host, port, token) as link:
-        page_address.show(read.title, host, link.first["port"], token, browser)
+    second_run = "hapticlink.commands.compared_run", f"{root}-b"
+    with _served(host, port, token, *second_run) as (link, served_port):
+        page_address.show(read.title, host, served_port, token, browser)
         say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
         session = Session(read, link, root, hl.RealTime)
         with suppress(Interrupted, hl.RunInterrupted):
@@ -139,18 +141,20 @@ def _is_scene(name: str) -> bool:
     return name in hl.shipped() and not (Path(name) / "run.json").exists()
 
 
-def _served(host: str, port: int | None, token: str) -> Link:
-    """The server, on the port asked for. Raises InputFault where it cannot start."""
+@contextmanager
+def _served(host: str, port: int | None, *arguments: str) -> Iterator[tuple[Link, int]]:
+    """The server, and the port that it listens on. Raises InputFault where it cannot start."""
     if not find_spec("websockets"):
         raise InputFault(f"the page needs the package websockets: {install_command('view')}")
     from hapticlink.visualization.served.server_pipe import Link
 
-    module = "hapticlink.visualization.served.server"
-    made = Link(module, host, str(page_address.PORT if port is None else port), token)
-    if port is None and made.first and "error" in made.first:
-        made = Link(module, host, "0", token)
-    if made.first is None:
-        raise Fault("the page's server does not start")
-    if "error" in made.first:
-        raise InputFault(page_address.refused(host, port, made.first["error"]))
-    return made
+    module, error = "hapticlink.visualization.served.server", ""
+    for tried in (page_address.PORT, 0) if port is None else (port,):
+        with Link(module, host, str(tried), *arguments) as link:
+            if (first := link.first()) is None:
+                raise Fault("the page's server does not start")
+            if "error" not in first:
+                yield link, first["port"]
+                return
+            error = first["error"]
+    raise InputFault(page_address.refused(host, port, error))

@@ -3,7 +3,7 @@ page, where the handles are at the start, held by the mouse and by hands from so
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,10 +26,12 @@ from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.interactive.offered_controls import Settings
 from hapticlink.visualization.interactive.viewed_scene import DAMPING, STIFFNESS
 
-MAX_COST = {"native": 1e8, "python": 1e7}
+MAX_COST = {"native": 2e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
-is computed, by the packaging of the FMUs; 1e7 take about 2 s of processor time with native ones."""
+is computed, by the packaging of the FMUs: some 2 s of processor time."""
 MOUSE = "the mouse"
+SO_FAR = 3
+"""Hands after which there is a first verdict: the mouse, a light touch and a firm grip."""
 RATES = range(1, 201)
 """Graphics rates (Hz) that may be suggested in place of a slow one."""
 
@@ -40,21 +42,36 @@ Parameters = Mapping[str, Sequence[float]]
 def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
     """`verdict` ("" where there is none), `said`, which is its one line on the page, and `why`, its
     tooltip."""
+    *_, last = verdicts(scene, settings, parameters)
+    return last
+
+
+def verdicts(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[dict[str, str]]:
+    """As `predicted`, of the first hands so far, and then of all."""
+    cases: list[Case] = []
     try:
-        cases = judged(scene, settings, parameters)
-        worst = max(cases, key=lambda case: case.severity)
+        for case in judged(scene, settings, parameters):
+            cases.append(case)
+            if len(cases) == SO_FAR:
+                yield _verdict(cases, ", so far")
     except Fault as fault:
         short = str(fault).partition(";")[0].partition("\n")[0]
-        return {"verdict": "", "said": f"not computed: {short}", "why": str(fault)}
+        yield {"verdict": "", "said": f"not computed: {short}", "why": str(fault)}
+    else:
+        yield _verdict(cases)
+
+
+def _verdict(cases: Sequence[Case], so_far: str = "") -> dict[str, str]:
+    worst = max(cases, key=lambda case: case.severity)
     verdict = "marginal" if worst.drifts else worst.verdict
     lines = (
         f"{case.hand}: {case.verdict}, growth rate {case.growth:.4g} 1/s, {case.hertz:.3g} Hz"
         for case in cases
     )
-    return {"verdict": verdict, "said": _summary(worst), "why": "\n".join(lines)}
+    return {"verdict": verdict, "said": _summary(worst) + so_far, "why": "\n".join(lines)}
 
 
-def judged(scene: Scene, settings: Settings, parameters: Parameters) -> list[Case]:
+def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[Case]:
     """The cases of the run, a hand each. Raises InputFault where its computation would take long,
     and as `stability` does."""
     if settings.jitter:
@@ -80,7 +97,9 @@ def judged(scene: Scene, settings: Settings, parameters: Parameters) -> list[Cas
         hands = {MOUSE: SpringHand(stiffness=STIFFNESS, damping=DAMPING), **HANDS}
         without, _ = frozen_nonlinearities.without(system)
         with resting_system(changed, without) as place:
-            return InHands(place).cases("the start", hands, DRIFT)
+            in_hands = InHands(place)
+            for name, hand in hands.items():
+                yield from in_hands.cases("the start", {name: hand}, DRIFT)
 
 
 def _at_rate(scene: Scene, rate: float | None) -> Scene:

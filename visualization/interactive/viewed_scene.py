@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
+
+from hapticlink.components import registry
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.base.loop_names import HAND, block_of_user
 from hapticlink.orchestrator.scene.overrides import Options, written
@@ -41,3 +45,16 @@ def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scen
     if read.stop_when is None and read.ends_when:
         changes["stop_when"] = ""
     return open_scene.load(read, changes)
+
+
+def packed(scene: Scene) -> bytes:
+    """A scene for another process, with the plugins that it needs."""
+    return pickle.dumps((tuple(registry.origins()), pickle.dumps(scene)))
+
+
+def unpacked(content: bytes) -> Scene:
+    """The scene that was `packed`."""
+    modules, pickled = pickle.loads(content)
+    plugins.load(modules)
+    scene: Scene = pickle.loads(pickled)
+    return scene

@@ -17,18 +17,19 @@ const $ = (id) => document.getElementById(id);
 const stage = new Stage($("scene"), $("legend"), (at, user) => {
   $("door").hidden = true;
   ending.hide();
-  send({ type: "hand", at, user });
+  run.send({ type: "hand", at, user });
 });
 const ending = new Ending($("ended"), () => act("reset"));
 const charts = new Charts($("charts"));
-const controls = new Controls($("controls"), (message) => { choose(null); send(message); });
+const controls = new Controls($("controls"), (message) => { choose(null); change(message); });
 const view = { frame: null, levels: [], state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
 let refusedUntil = 0, energies = [], sound = null;
 let start = null, shown = null, acts_on_b = false; // controls at the start, and as they are
 let address = "", later = null;
 
-function send(message) { run.send(acts_on_b ? { ...message, b: true } : message); }
+// Sends a change to the run on which the controls act.
+function change(message) { run.send(acts_on_b ? { ...message, b: true } : message); }
 
 const HANDLERS = {
   scene(message) {
@@ -42,7 +43,7 @@ const HANDLERS = {
     view.frame = null;
     view.levels = [];
     view.marks = message.marks;
-    view.sound = sound ??= new Sound(run.listen, message.haptics);
+    if (run.listen) view.sound = sound ??= new Sound(run.listen, message.haptics);
   },
   controls(message) {
     const begins = !start;
@@ -80,7 +81,7 @@ const HANDLERS = {
       charts.add(frame, i);
     });
     if (message.light) show({ energy: message.light });
-    if (sound.signal) sound.feel(loudness(sound.signal, message));
+    if (sound?.signal) sound.feel(loudness(sound.signal, message));
   },
   map: (message) => show({ map: { ...message, since: performance.now() } }),
   building({ said }) { view.building = said; note(); },
@@ -130,7 +131,7 @@ function offer() {
     const button = document.createElement("button"), small = document.createElement("small");
     button.append(name, small);
     small.textContent = about;
-    button.onclick = () => { restore(); messages.forEach(send); choose(button); };
+    button.onclick = () => { restore(); messages.forEach(change); choose(button); };
     return button;
   }));
 }
@@ -138,13 +139,13 @@ function offer() {
 // Marks the preset that was pressed, until something else is changed.
 function choose(preset) { for (const button of $("presets").children) button.ariaPressed = button === preset; }
 
-function restore() { choose(null); restored(acts_on_b ? shown.b : shown, start).forEach(send); }
+function restore() { choose(null); restored(acts_on_b ? shown.b : shown, start).forEach(change); }
 
 // Does what the page's address asks for, of run A and, where it has settings of B, of both.
 function follow() {
   const { "": a, "b.": b, why } = asked(location.hash, start);
   for (const message of a) run.send(message);
-  if (b.length && run.compare) {
+  if (b.length) {
     run.compare(true);
     for (const message of b) run.send({ ...message, b: true });
   }
@@ -164,7 +165,7 @@ function note_address() {
 window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== address) follow(); });
 
 const PULLS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const act = (what) => send({ type: "time", do: what });
+const act = (what) => run.send({ type: "time", do: what });
 $("pause").onclick = () => act(view.state.paused ? "resume" : "pause");
 for (const what of ["step", "reset", "record"]) $(what).onclick = () => act(what);
 $("restore").onclick = restore;
@@ -206,5 +207,5 @@ function draw() {
 }
 // The run is in this file, as its program, or behind the server that the page is from.
 const run = ($("program") ? started : connected)({ received, opened: note, lost });
-for (const id of ["compare", "hear"]) $(id).hidden = !run.compare;
+$("hear").hidden = !run.listen;
 draw();

@@ -13,5 +13,6 @@ export function connected({ received, opened, lost }) {
     };
   };
   connect();
-  return { send: (message) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); } };
+  const send = (message) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); };
+  return { send, compare: (on) => send({ type: "compare", on }) };
 }

@@ -28,59 +28,61 @@ class Hand:
     """The point whose handle it is, "" for that of the first user."""
 
 
-@dataclass(frozen=True)
-class Rate:
-    """The graphics rate (Hz)."""
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """A change of the run, or of the second of two (`b`)."""
 
     __pydantic_config__ = STRICT
+    b: bool = False
+
+
+@dataclass(frozen=True)
+class Rate(Change):
+    """The graphics rate (Hz)."""
+
     type: Literal["rate"]
     value: Annotated[Number, Field(ge=0.01, le=1e4)]
 
 
 @dataclass(frozen=True)
-class Jitter:
+class Jitter(Change):
     """Share of the graphics period by which each may be shorter or longer."""
 
-    __pydantic_config__ = STRICT
     type: Literal["jitter"]
     value: Annotated[Number, Field(ge=0, le=0.9)]
 
 
 @dataclass(frozen=True)
-class Hold:
+class Hold(Change):
     """Another hold of a connection."""
 
-    __pydantic_config__ = STRICT
     type: Literal["hold"]
     connection: Name
     hold: Name
 
 
 @dataclass(frozen=True)
-class Delay:
+class Delay(Change):
     """The latency (s) of a connection."""
 
-    __pydantic_config__ = STRICT
     type: Literal["delay"]
     connection: Name
     value: Annotated[Number, Field(ge=0, le=1)]
 
 
 @dataclass(frozen=True)
-class Gain:
+class Gain(Change):
     """A parameter as a multiple of its value in the scene."""
 
-    __pydantic_config__ = STRICT
     type: Literal["gain"]
     name: Name
     factor: Annotated[Number, Field(ge=0, le=100)]
 
 
 @dataclass(frozen=True)
-class Topology:
+class Topology(Change):
     """The topology controller, on or off."""
 
-    __pydantic_config__ = STRICT
     type: Literal["topology"]
     on: bool
 
@@ -95,7 +97,17 @@ class Time:
     do: Literal["pause", "resume", "step", "reset", "record"]
 
 
-Message = Hand | Rate | Jitter | Hold | Delay | Gain | Topology | Time
+@dataclass(frozen=True)
+class Compare:
+    """A second run beside the first, under the same hands, which begins with the settings of the
+    first; or the first alone again."""
+
+    __pydantic_config__ = STRICT
+    type: Literal["compare"]
+    on: bool
+
+
+Message = Hand | Rate | Jitter | Hold | Delay | Gain | Topology | Time | Compare
 ADDRESSES = ("user", "connection", "name")
 """Fields that name what a message of its type is about."""
 _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Discriminator("type")])

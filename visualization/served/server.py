@@ -1,8 +1,9 @@
 """Serves the page on localhost, in a process of its own: files, and a websocket to each window.
 
 Pickled messages come from the haptic loop by the standard input, whose end ends the process: first
-host, port (0: a free one) and token, as text, which no other process can read there. Those of the
-pages leave by the standard output.
+host, port (0: a free one), token, and of the process of a second run its module and where it
+records, as text, which no other process can read there. Those of the pages leave by the standard
+output.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ import json
 import logging
 import os
 import pickle
-import signal
 import sys
 import threading
+from collections.abc import Sequence
 from http import HTTPStatus
 from pathlib import Path
 from typing import IO, Any
@@ -28,7 +29,7 @@ from hapticlink.visualization.interactive import scene_message
 from hapticlink.visualization.mechanism.picture import Picture
 from hapticlink.visualization.page.one_file import PAGE
 from hapticlink.visualization.served import messages
-from hapticlink.visualization.served.server_pipe import read
+from hapticlink.visualization.served.server_pipe import Link, read, to_caller
 from hapticlink.visualization.served.stability_process import StabilityProcess
 
 TYPES = {
@@ -50,40 +51,83 @@ HEADERS = {
 
 
 class Pages:
-    """All windows: each sees the same run; one at a time has hold of a user's handle."""
+    """All windows: each sees the same run, or the same two; one at a time has hold of a user's
+    handle. second_run: the module of the second run's process, and where that one records."""
 
-    def __init__(self, token: str, out: IO[bytes]) -> None:
-        self._token, self._out = token, out
+    def __init__(self, token: str, second_run: Sequence[str], out: IO[bytes]) -> None:
+        self._token, self._second_run, self._out = token, second_run, out
         self._windows: set[ServerConnection] = set()
         self._holding: dict[str, ServerConnection | None] = {"": None}
         self._picture: Picture | None = None
-        self._kept: dict[str, str] = {}
-        self._map = StabilityProcess(self.show)
+        self._newest: dict[str, dict[str, Any]] = {}
+        self._second: Link | None = None
+        self._newest_of_second: dict[str, dict[str, Any]] = {}
+        self._stability = StabilityProcess(self.show)
         self._files = {p.name: p for p in PAGE.iterdir() if p.suffix in TYPES}
 
-    # --- from the haptic loop -----------------------------------------------------------------
+    # --- from the runs ------------------------------------------------------------------------
 
     def show(self, message: dict[str, Any]) -> None:
-        """Send a message of the loop to all windows."""
+        """Send a message of the first run to all windows."""
         kind = message["type"]
-        if kind == "map" and "asked" in message:
-            self._map.ask(message["asked"])
+        if kind == "settings":
+            self._newest[kind] = message
+            self._stability.ask(message["scene"], message["settings"], message["parameters"])
             return
         if kind == "scene":
             self._picture = Picture(*message.pop("picture"))
-            message |= scene_message.drawn(self._picture)
+            message |= scene_message.drawn(self._picture) | {"runs": 2 if self._second else 1}
             self._holding = {user: self._holding.get(user) for user in message["users"]}
         elif kind == "frame" and self._picture:
+            self._take_second(self._picture)
             message = self._picture.drawn(message)
-        text = json.dumps(message)
         if kind != "refused":
-            self._kept[kind] = text
-        ready = [w for w in self._windows if w.transport.get_write_buffer_size() < BEHIND]
-        broadcast(ready if kind == "frame" else self._windows, text)
+            self._newest[kind] = message
+        self._broadcast(kind, message)
 
-    async def end(self) -> None:
-        """End what is being computed."""
-        await self._map.end()
+    def _broadcast(self, kind: str, message: dict[str, Any]) -> None:
+        ready = [w for w in self._windows if w.transport.get_write_buffer_size() < BEHIND]
+        broadcast(ready if kind == "frame" else self._windows, self._text(kind, message))
+
+    def _text(self, kind: str, message: dict[str, Any]) -> str:
+        """A message as windows get it: what changes in a run with that of the second one."""
+        second = self._newest_of_second.get(kind) if kind in ("controls", "frame") else None
+        return json.dumps(message | {"b": second} if second else message)
+
+    def _take_second(self, picture: Picture) -> None:
+        """Take what the second run has sent; both begin anew when it is there."""
+        messages_of_second = self._second.received() if self._second else []
+        for message in messages_of_second:
+            kind = message["type"]
+            if kind == "scene" and kind not in self._newest_of_second:
+                if self._newest["state"]["paused"]:
+                    self._tell(messages.Time("time", "pause"))
+                self._tell(messages.Time("time", "reset"))
+            self._newest_of_second[kind] = picture.drawn(message) if kind == "frame" else message
+            if kind == "controls":
+                self._broadcast(kind, self._newest[kind])
+            elif kind == "refused" or (kind == "state" and message["ended"]):
+                self._broadcast(kind, message)
+        if self._second and not self._second.alive:
+            self._compare(False)
+            self._broadcast("refused", {"type": "refused", "why": "the second run has ended"})
+
+    def _compare(self, on: bool) -> None:
+        """Begin a second run with the settings of the first, or end it."""
+        if on and not self._second and (first := self._newest.get("settings")):
+            module, root = self._second_run
+            self._second = Link(module, root, first["scene"], first["settings"])
+            self._broadcast("refused", {"type": "refused", "why": "the second run begins"})
+        elif not on and self._second:
+            asyncio.get_running_loop().run_in_executor(None, self._second.end)
+            self._second, self._newest_of_second = None, {}
+            self._tell(messages.Time("time", "reset"))
+
+    def end(self) -> None:
+        """End the processes below this one."""
+        self._stability.end()
+        if self._second:
+            self._second.end()
 
     # --- from the windows ---------------------------------------------------------------------
 
@@ -104,8 +148,8 @@ class Pages:
     async def window(self, connection: ServerConnection) -> None:
         """Serve a window until it is closed."""
         for kind in ("building", "scene", "controls", "state", "map"):
-            if kind in self._kept:
-                await connection.send(self._kept[kind])
+            if message := self._newest.get(kind):
+                await connection.send(self._text(kind, message))
         self._windows.add(connection)
         try:
             async for text in connection:
@@ -128,11 +172,19 @@ class Pages:
             if self._holding[message.user] not in (None, connection):
                 raise ValueError("another window has hold of this handle")
             self._holding[message.user] = connection if message.at else None
-        self._tell(message)
+        if isinstance(message, messages.Compare):
+            self._compare(message.on)
+        else:
+            self._tell(message)
 
     def _tell(self, message: messages.Message) -> None:
-        pickle.dump(message, self._out)
-        self._out.flush()
+        """Tell the run that a change is of, or both of a hand and a button."""
+        of_second = isinstance(message, messages.Change) and message.b and self._second
+        if not of_second:
+            pickle.dump(message, self._out)
+            self._out.flush()
+        if self._second and (of_second or not isinstance(message, messages.Change)):
+            self._second.send(message)
 
 
 def _response(status: HTTPStatus, file: Path | None = None) -> Response:
@@ -150,10 +202,12 @@ async def _bound(pages: Pages, host: str, port: int) -> Server:
     )  # fmt: skip
 
 
-async def _served(host: str, port: int, token: str, out: IO[bytes]) -> None:
-    pages = Pages(token, out)
+async def _served(
+    host: str, port: str, token: str, second_run: Sequence[str], out: IO[bytes]
+) -> None:
+    pages = Pages(token, second_run, out)
     try:
-        server = await _bound(pages, host, port)
+        server = await _bound(pages, host, int(port))
     except OSError as error:
         pickle.dump({"error": error.strerror or str(error)}, out)
         out.flush()
@@ -176,20 +230,18 @@ async def _served(host: str, port: int, token: str, out: IO[bytes]) -> None:
     threading.Thread(target=receive, daemon=True).start()
     async with server:
         await ended.wait()
-        await pages.end()
+        pages.end()
 
 
 def main() -> None:
     """Serve until the standard input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever prints must not get between the messages
+    out = to_caller()
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # connections that fail are no news
     if (arguments := read(sys.stdin.buffer)) is None:
         return
-    host, port, token = arguments
+    host, port, token, *second_run = arguments
     try:
-        asyncio.run(_served(host, int(port), token, out))
+        asyncio.run(_served(host, port, token, second_run, out))
     except BrokenPipeError:  # nobody is left to be told
         os._exit(1)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import pickle
 import time
 from collections.abc import Callable
 from itertools import count
@@ -19,10 +18,11 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.visualization.interactive import scene_message
 from hapticlink.visualization.interactive.offered_controls import Settings, target
+from hapticlink.visualization.interactive.viewed_scene import packed
 from hapticlink.visualization.served import messages
 from hapticlink.visualization.served.controls import Controls
 from hapticlink.visualization.served.frames import Frames
-from hapticlink.visualization.served.server_pipe import Link
+from hapticlink.visualization.served.server_pipe import Pipe
 
 TURN, FRAME = 0.0035, 0.015
 """Times (s) between two looks at the messages while the scene runs, every other tick at 512 Hz,
@@ -34,7 +34,7 @@ WAIT = 0.02
 class Building(logging.Handler):
     """Tells the page which block is being built."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Pipe) -> None:
         super().__init__()
         self._link = link
         fmu_files.LOG.addHandler(self)
@@ -48,15 +48,21 @@ class Building(logging.Handler):
 class Session:
     """The runs of a scene behind a page. `recordings` get folders `<root>-1`, `<root>-2`, ...
 
-    real_time: `hl.RealTime`, which runs a scene and writes its folder as `hl.run` does.
+    real_time: `hl.RealTime`, which runs a scene and writes its folder as `hl.run` does. settings:
+    those with which the first run begins.
     """
 
     def __init__(
-        self, scene: Scene, link: Link, root: Path, real_time: Callable[[Scene], Any]
+        self,
+        scene: Scene,
+        link: Pipe,
+        root: Path,
+        real_time: Callable[[Scene], Any],
+        settings: Settings | None = None,
     ) -> None:
         self._scene, self._link, self._root, self._real_time = scene, link, root, real_time
         self._controls: Controls | None = None
-        self._settings = Settings()
+        self._settings = settings or Settings()
         self._shown = 0.0
         self._state: dict[str, Any] = {"paused": False, "recording": None, "ended": None}
         self.recordings: list[Path] = []
@@ -126,7 +132,7 @@ class Session:
         self._controls.restore()
         scene = self._scene
         self._held = {target(user): at for user, at in self._frames.handles(live).items()}
-        self._pickled = pickle.dumps(scene)
+        self._packed = packed(scene)
         drawing = (scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
         message = scene_message.running(scene, live.system, live.energies())
         self._link.send(message | {"picture": drawing})
@@ -176,8 +182,9 @@ class Session:
     def _tell_controls(self) -> None:
         assert self._controls
         self._link.send({"type": "controls"} | self._controls.described())
-        changes = pickle.dumps((self._settings, self._controls.parameters() | self._held))
-        self._link.send({"type": "map", "asked": self._pickled + changes})
+        parameters = self._controls.parameters() | self._held
+        settings = {"settings": self._settings, "parameters": parameters}
+        self._link.send({"type": "settings", "scene": self._packed} | settings)
 
     def _tell(self, **state: Any) -> None:
         self._state |= state

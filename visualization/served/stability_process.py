@@ -1,109 +1,107 @@
 """The stability verdict of the run behind a page, in a process of its own below the page's server:
 neither the haptic loop nor the server waits for it.
 
-The process gets two pickles by its standard input, the end of which ends it: the scene, and what
-was changed of it. Its answer is JSON (`prediction.predicted`).
+The process stays, since loading the analysis takes longer than most verdicts. A newer question
+ends what it computes; it ends with its standard input.
 """
 
 from __future__ import annotations
 
 import asyncio
-import json
 import os
 import pickle
+import queue
+import signal
 import sys
 import threading
-from asyncio.subprocess import PIPE
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
-from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.fmi.worker_process import OWN_GROUP
+from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.faults import Interrupted
+from hapticlink.visualization.served.server_pipe import Link, read, to_caller
 
-REST = 1.0
-"""Time (s) for which nothing was changed before the verdict is computed."""
-ENDING = 1.0
-"""Time (s) that the process may take to end."""
-NICE = 10
-"""Its priority: all others get ten times its share; with 19 it would not end beside busy ones."""
+REST, LOOK = 0.3, 0.02
+"""Times (s) for which nothing was changed before the verdict is computed, and between two looks for
+an answer."""
 
 
 class StabilityProcess:
-    """Computes the verdict on the newest request, and hands its messages to `tell`."""
+    """Computes the verdict on the newest question, and hands its messages to `tell`."""
 
     def __init__(self, tell: Callable[[dict[str, Any]], None]) -> None:
-        self._tell, self._asked = tell, b""
+        self._tell = tell
+        self._asked: tuple[Any, ...] = ()
+        self._number = 0
+        self._link: Link | None = None
         self._answering: asyncio.Task[None] | None = None
 
-    def ask(self, asked: bytes) -> None:
-        """Compute the verdict on a run, instead of that which is being computed."""
+    def ask(self, *asked: Any) -> None:
+        """Compute the verdict on a run, instead of that which is being computed. asked: its packed
+        scene, and the other arguments of `verdicts`."""
         if asked == self._asked:
             return
-        self._asked = asked
+        self._asked, self._number = asked, self._number + 1
         if self._answering:
             self._answering.cancel()
         self._tell({"type": "map", "verdict": "", "said": "computing", "why": ""})
-        self._answering = asyncio.get_running_loop().create_task(self._answer(asked))
+        self._answering = asyncio.get_running_loop().create_task(self._answer(self._number))
 
-    async def end(self) -> None:
-        """End the computation."""
+    def end(self) -> None:
+        """End the process."""
         if self._answering:
             self._answering.cancel()
-            await asyncio.wait([self._answering])
+        if self._link:
+            self._link.end()
 
-    async def _answer(self, asked: bytes) -> None:
+    async def _answer(self, number: int) -> None:
         await asyncio.sleep(REST)
-        command = (sys.executable, "-P", "-m", __name__)
-        process = await asyncio.create_subprocess_exec(
-            *command, stdin=PIPE, stdout=PIPE, **OWN_GROUP
-        )
-        assert process.stdin
-        assert process.stdout
-        try:
-            process.stdin.write(asked)
-            answer = await process.stdout.read()
-        finally:
-            process.stdin.close()
-            try:
-                await asyncio.wait_for(process.wait(), ENDING)
-            except TimeoutError:
-                process.kill()
-        if not answer:
-            why = f"not computed: its process ended with exit status {process.returncode}"
-            answer = json.dumps({"verdict": "", "said": why, "why": ""}).encode()
-        self._tell({"type": "map"} | json.loads(answer))
+        if not self._link or not self._link.alive:
+            self._link = Link(__name__)
+        self._link.send((number, *self._asked))
+        while self._link.alive:
+            for of, answer in self._link.received():
+                if of == number and answer is None:
+                    return
+                if of == number:
+                    self._tell({"type": "map"} | answer)
+            await asyncio.sleep(LOOK)
+        why = "not computed: its process has ended"
+        self._tell({"type": "map", "verdict": "", "said": why, "why": ""})
 
 
 def main() -> None:
-    """Answer what is asked by the standard input."""
-    _yield_to_others()
-    from hapticlink.visualization.interactive import prediction
+    """Answer what is asked by the standard input: the number of the question with each answer, and
+    with None behind the last."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the other processor is for the haptic loop
+    out, questions = to_caller(), queue.SimpleQueue[Any]()
+    signal.signal(signal.SIGINT, lambda *_: None)
+    read(sys.stdin.buffer)  # the arguments, of which there are none
 
-    out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever prints must not get between the answer
-    with suppress(EOFError):
-        scene, changes = pickle.load(sys.stdin.buffer), pickle.load(sys.stdin.buffer)
-        threading.Thread(target=_end_with_caller, daemon=True).start()
-        out.write(json.dumps(prediction.predicted(scene, *changes)).encode())
-        out.flush()
+    def receive() -> None:
+        while (question := read(sys.stdin.buffer)) is not None:
+            questions.put(question)
+            if not interrupt.came():
+                signal.raise_signal(signal.SIGINT)  # ends what is being computed
+        temporary_folders.clear(os.getpid())
+        os._exit(1)
+
+    threading.Thread(target=receive, daemon=True).start()
+    from hapticlink.visualization.interactive.prediction import verdicts
+    from hapticlink.visualization.interactive.viewed_scene import unpacked
+
+    while True:
+        number, scene, *changes = questions.get()
+        with suppress(Interrupted):
+            for answer in verdicts(unpacked(scene), *changes):
+                _send(out, (number, answer))
+            _send(out, (number, None))
 
 
-def _yield_to_others() -> None:
-    """Take a low priority, and one processor."""
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    if sys.platform != "win32":
-        os.nice(NICE)
-    with suppress(OSError):  # where Linux groups sessions, `nice` counts within one only
-        Path("/proc/self/autogroup").write_text(str(NICE))
-
-
-def _end_with_caller() -> None:
-    """End the process when nobody waits for its answer any more."""
-    sys.stdin.buffer.read()
-    temporary_folders.clear(os.getpid())
-    os._exit(1)
+def _send(out: Any, message: Any) -> None:
+    pickle.dump(message, out)
+    out.flush()
 
 
 if __name__ == "__main__":

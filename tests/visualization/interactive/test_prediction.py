@@ -13,7 +13,7 @@ import pytest
 
 from hapticlink.visualization.interactive.offered_controls import Settings
 from hapticlink.visualization.interactive.prediction import predicted
-from hapticlink.visualization.interactive.viewed_scene import viewed
+from hapticlink.visualization.interactive.viewed_scene import STIFFNESS, viewed
 from tests.analysis.stability.own_hand import own_hand
 from tests.visualization.page.chromium import Page, chromium
 from tests.visualization.page.served_page import Served
@@ -70,7 +70,27 @@ def test_what_would_take_long_is_refused(settings: Settings, said: str) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
-@pytest.mark.parametrize("end", ["overtaken", "ctrl-c", "server", "loop"])
+def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
+    """Once the new rate is shown, every verdict is on it, and one process computes all."""
+    with page.window() as window:
+        window.until(lambda new: "controls" in new)
+        window.send(type="rate", value=31)
+        server = _children(page.process.pid, "served.server")[0]
+        (computing,) = _until(lambda: _children(server, "served.stability_process"))
+        window.until(lambda new: new["controls"]["rate"]["value"] == 31)
+        window.send(type="rate", value=12.8)
+        window.until(lambda new: new["controls"]["rate"]["value"] == 12.8)
+        window.newest.pop("map", None)
+        found = window.until(lambda new: new.get("map", {}).get("verdict"), QUICK)["map"]
+        assert _children(server, "served.stability_process") == [computing]
+        handle = window.until(lambda new: True)["frame"]["handle"]
+    parameters = {"hand.stiffness": [*STIFFNESS], "hand.target": handle}
+    mouse = predicted(viewed(SCENE, OPTIONS), Settings(), parameters)["why"].partition("\n")[0]
+    assert found["why"].startswith(mouse)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
+@pytest.mark.parametrize("end", ["ctrl-c", "server", "loop"])
 def test_nothing_is_left_of_a_map_that_nobody_waits_for(page: Served, end: str) -> None:
     with page.window() as window:
         window.until(lambda new: "controls" in new)
@@ -78,8 +98,6 @@ def test_nothing_is_left_of_a_map_that_nobody_waits_for(page: Served, end: str) 
         server = _children(page.process.pid, "served.server")[0]
         computing = _until(lambda: _children(server, "served.stability_process"))
         match end:
-            case "overtaken":
-                window.send(type="rate", value=30)
             case "ctrl-c":
                 assert page.end()[0] == 0
             case "server":

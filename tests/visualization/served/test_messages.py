@@ -6,13 +6,14 @@ import json
 
 import pytest
 
-from hapticlink.visualization.served.messages import Gain, Hand, Time, newest, parse
+from hapticlink.visualization.served.messages import Gain, Hand, Rate, Time, newest, parse
 
 
 def test_a_pull_is_read() -> None:
     assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
     other = '{"type": "hand", "at": null, "user": "left"}'
     assert parse(other) == Hand("hand", None, "left")
+    assert parse('{"type": "rate", "value": 10, "b": true}') == Rate("rate", 10.0, b=True)
 
 
 @pytest.mark.parametrize(
@@ -42,6 +43,9 @@ def test_a_pull_is_read() -> None:
         '{"type": "gain", "name": "controller.K_pc", "factor": -1}',
         '{"type": "topology", "on": 1}',
         '{"type": "time", "do": "stop"}',
+        '{"type": "time", "do": "pause", "b": true}',
+        '{"type": "rate", "value": 10, "b": 1}',
+        '{"type": "compare", "on": 1}',
         json.dumps({"type": "hold", "connection": "x" * 201, "hold": "zoh"}),
         json.dumps({"type": "hold", "connection": "x", "hold": "z" * 5000}),
         b'{"type": "hand", "at": null}',

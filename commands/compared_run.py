@@ -1,0 +1,29 @@
+"""The process of the second of two runs under one mouse on the page of `hapticlink view`."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.visualization.interactive.viewed_scene import unpacked
+from hapticlink.visualization.served.server_pipe import Pipe, read, to_caller
+
+
+def main() -> None:
+    """Run the scene with the settings, which the caller sends first, until it has ended."""
+    out = to_caller()
+    if (arguments := read(sys.stdin.buffer)) is None:
+        return
+    link = Pipe(sys.stdin.buffer, out)
+    import hapticlink as hl
+    from hapticlink.visualization.served.session import Session
+
+    root, scene, settings = arguments
+    with suppress(Fault):  # the page's server has ended
+        Session(unpacked(scene), link, Path(root), hl.RealTime, settings).run()
+
+
+if __name__ == "__main__":
+    main()
