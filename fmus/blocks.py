@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, is_dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic_core import to_jsonable_python
 
 from hapticlink.components.blocks import BLOCKS
 from hapticlink.fmus import cache
@@ -69,7 +71,7 @@ def build_block(
 
     material: dict[str, Any] = {
         "block": name,
-        "settings": {k: asdict(v) if is_dataclass(v) else v for k, v in settings.items()},  # type: ignore[arg-type]
+        "settings": to_jsonable_python(dict(settings)),
         **experiment,
     }
     if engine:

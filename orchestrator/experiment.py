@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
-from contextlib import nullcontext
+from collections.abc import Mapping
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -19,9 +21,10 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.files import remove_rows
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.run_record import content
+from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
+from hapticlink.orchestrator.results.run_results import ResultsInMemory
 from hapticlink.orchestrator.results.tables import Results, Table
-from hapticlink.orchestrator.results.windows import opened
+from hapticlink.orchestrator.results.windows import WINDOW_BYTES, opened
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, beside
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
@@ -38,26 +41,38 @@ from hapticlink.orchestrator.system.system import System
 
 @dataclass(frozen=True)
 class Experiment:
-    """A finished run. `run` is the content of its run.json, which is in `folder` unless the run had
-    no row and results of an earlier run were kept there."""
+    """A finished run. `before` and `ending` are what its run.json says, which is in `folder` unless
+    the run had no row and results of an earlier run were kept there. `memory`: its results, where
+    they are in no file."""
 
     scene: Scene
     system: System
     outcome: Outcome
     folder: Path
-    run: dict[str, Any]
+    before: RunSetup
+    ending: RunEnding
+    memory: ResultsInMemory | None = None
+
+    @cached_property
+    def run(self) -> dict[str, Any]:
+        """The content of its run.json."""
+        return content(self.before) | content(self.ending)
 
     def remove_rows(self) -> None:
         """Remove the rows of which the CSVs are made, if they were kept for `results`."""
-        for name in self.run["files"] if self.outcome.published else ():
+        for name in self.before.files if self.outcome.published and not self.memory else ():
             if name.endswith(".csv") and (path := self.folder / name).exists():
                 remove_rows(path)
 
     @property
     def results(self) -> Results:
         """The results of the run, with empty tables if it had no row."""
-        if self.outcome.published:
+        if self.outcome.published and not self.memory:
             return opened(self.folder)
+        if self.outcome.published and self.memory:
+            results = Results(None, self.run, self.memory.tables())
+            results.__dict__["record"] = RunRecord(**vars(self.before), **vars(self.ending))
+            return results
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:
@@ -84,6 +99,13 @@ def _left_out(every: System, system: System) -> list[str]:
     return [*dict.fromkeys(left_out)]
 
 
+def _memory(system: System, columns: Mapping[str, list[str]]) -> ResultsInMemory | None:
+    """Room for the results of a run; None where their rows may be more than a window."""
+    counts = {c.name: len(c.starts) for c in system.timeline.clocks}
+    written = sum(counts[clock] * (1 + len(names)) for clock, names in columns.items())
+    return ResultsInMemory(counts) if 8 * written <= WINDOW_BYTES else None
+
+
 @interrupt.held()
 def simulate(
     scene: str | Path | Scene,
@@ -93,6 +115,7 @@ def simulate(
     csv: bool = True,
     real_time: RealTimeRun | None = None,
     keep_rows: bool = False,
+    in_memory: bool = False,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -100,11 +123,16 @@ def simulate(
     Interrupted for a signal before the run. A fault during the run is in the outcome, and its
     results up to then are kept. Results of an earlier run in `folder` are removed once the first
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
-    writes them, with `keep_rows` beside the CSVs, until `remove_rows`.
+    writes them, with `keep_rows` beside the CSVs, until `remove_rows`. `in_memory`: nothing is
+    written, unless the tables are more than a window (`results.windows`) or an FMU of others, which
+    may crash the process, runs in it.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
     read = open_scene.load(scene, options)
-    with folder_lock.held(folder), built(read) as every:
+    with ExitStack() as stack:
+        if not in_memory:
+            stack.enter_context(folder_lock.held(folder))
+        every = stack.enter_context(built(read))
         system = with_fetched(every)
         plan = Plan(system)
         plan.check()
@@ -120,8 +148,16 @@ def simulate(
                 warning = "%s offers %s, which is not used: its events act at ends of steps"
                 logging.getLogger(__name__).warning(warning, fmu.name, offered)
         alone = isolated(system.fmus)
-        csv = csv and read.record.format == "csv"
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
+        memory = _memory(system, columns) if in_memory and not foreign else None
+        if memory:
+            with interpreter_state.restored():
+                outcome = run(plan, memory, progress, real_time)
+            return Experiment(
+                read, system, outcome, folder, before, outcome.ending(build_time), memory
+            )
+        stack.enter_context(folder_lock.held(folder))
+        csv = csv and read.record.format == "csv"
         with RunFolder(folder, before, csv) as results:
             with (
                 crash_monitor.watched(folder) if foreign else nullcontext(),
@@ -137,8 +173,7 @@ def simulate(
                     outcome.reason = "fault"
                 results.end_in_place(outcome.ending(build_time))
             outcome.published = results.published
-    written = content(before) | content(outcome.ending(build_time))
-    ended = Experiment(read, system, outcome, folder, written)
+    ended = Experiment(read, system, outcome, folder, before, outcome.ending(build_time))
     if not keep_rows:
         ended.remove_rows()
     return ended

@@ -17,23 +17,29 @@ from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
 
 
-def load(scene: str | FilePath | Scene, options: Options = ()) -> Scene:
+def load(scene: str | FilePath | Scene | Source, options: Options = ()) -> Scene:
     """Find a scene, change it by `options` and check it.
 
-    scene: the name of a shipped one, the path of a TOML file or SSP, or a Scene. A Scene that was
-    read from a file is read again with its own options and the given ones; one that was created or
-    changed in Python is checked. Raises SceneFault with every finding, InputFault for a scene that
-    is not found and for an option that cannot be applied.
+    scene: the name of a shipped one, the path of a TOML file or SSP, a Scene, or a Source. A Scene
+    that was read from a file is read again with its own options and the given ones; one that was
+    created or changed in Python is checked. Raises SceneFault with every finding, InputFault for a
+    scene that is not found and for an option that cannot be applied.
     """
-    plugins.load_installed()
     further = overrides.written(options)
     if isinstance(scene, Scene) and scene.source and not further:
         return scene
-    source = _of(scene) if isinstance(scene, Scene) else _find(str(scene))
+    source = scene if isinstance(scene, Source) else source_of(scene)
     source = replace(source, options=(*source.options, *further))
     if source.name.endswith(".ssp"):
         _check_ssp(source)
     return from_source(source)
+
+
+def source_of(scene: str | FilePath | Scene) -> Source:
+    """The tables of a scene, unchecked: what many variants of it are read from, without reading
+    its files for each. Raises as `load` does."""
+    plugins.load_installed()
+    return _of(scene) if isinstance(scene, Scene) else _find(str(scene))
 
 
 def _find(scene: str) -> Source:

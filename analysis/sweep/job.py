@@ -23,6 +23,7 @@ from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.run_setup import PACKAGES
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_source import Source
 
 
 @dataclass(frozen=True)
@@ -42,18 +43,20 @@ def jobs(
 ) -> list[Job]:
     """The jobs of `points`, each of `scene` with the common `options` and those of its point.
 
-    A point without a valid scene is a refused job. Raises InputFault if all points are refused,
-    Interrupted for a signal.
+    A point without a valid scene is a refused job. Raises InputFault if all points are refused or
+    there is no such scene, Interrupted for a signal.
     """
-    checked = []
+    source, checked = open_scene.source_of(scene), []
     for point in points:
-        checked.append(job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point))
+        checked.append(job(source, [*options, *(f"{k}={v}" for k, v in point.items())], point))
     if checked and all(one.scene is None for one in checked):
         raise InputFault(checked[0].refusal)
     return checked
 
 
-def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, str]) -> Job:
+def job(
+    scene: str | Path | Scene | Source, options: Sequence[str], point: Mapping[str, str]
+) -> Job:
     """The job of `scene` with `options`, listed in the table as `point`. Raises Interrupted for a
     signal."""
     interrupt.check()  # 100,000 points take minutes
@@ -67,8 +70,8 @@ def job(scene: str | Path | Scene, options: Sequence[str], point: Mapping[str, s
 def key(scene: Scene) -> str:
     """SHA-256 of everything that a run depends on: the resolved scene, its FMU files, versions and
     sources, also those of plugins. Raises InputFault for an FMU file that cannot be read."""
-    computed_with = [*_computed_with(), plugins.loaded()]
-    whole: dict[str, Any] = {"scene": scene.tables(), "made_with": computed_with}
+    versions = [*computed_with(), plugins.loaded()]
+    whole: dict[str, Any] = {"scene": scene.plain(), "made_with": versions}
     try:
         paths = [Path(f.path) for f in scene.fmu if f.path]
         files = [sha256(path.read_bytes()).hexdigest() for path in paths]
@@ -78,7 +81,7 @@ def key(scene: Scene) -> str:
 
 
 @cache
-def _computed_with() -> list[str]:
+def computed_with() -> list[str]:
     """What computes a row: Python, packages and sources, in C too, but nothing that only draws."""
     code = sources(
         hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.analysis

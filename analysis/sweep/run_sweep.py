@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -31,8 +31,8 @@ class Unfinished(Fault):
 
 
 def work(job: Job, folder: Path | None = None, measure: Measure = measure) -> Row:
-    """Runs one job and returns its row; results are kept below `folder` (by default the machine's
-    one for temporary files) until they are measured."""
+    """Runs one job and returns its row; results that are not in memory are kept below `folder` (by
+    default the machine's one for temporary files) until they are measured."""
     assert job.scene is not None
     try:
         plugins.load(job.plugins)
@@ -40,10 +40,9 @@ def work(job: Job, folder: Path | None = None, measure: Measure = measure) -> Ro
         return failed(DIED, str(missing))
     if key(job.scene) != job.key:
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
-    temporary = tempfile.TemporaryDirectory(dir=folder) if folder else temporary_folders.room()
-    with temporary as results:
+    with _room(job, folder) as results:
         try:
-            experiment = simulate(job.scene, results, csv=False)
+            experiment = simulate(job.scene, results, csv=False, in_memory=True)
             row, fault = measure(experiment), experiment.outcome.fault
             return row if fault is None or _of_scene(fault) else row | {"end": _retried(fault)}
         except Fault as fault:
@@ -52,6 +51,20 @@ def work(job: Job, folder: Path | None = None, measure: Measure = measure) -> Ro
             return failed(DIED, f"{type(error).__name__}: {error}")
         finally:
             process_cache.trim()
+
+
+@contextmanager
+def _room(job: Job, folder: Path | None) -> Iterator[Path]:
+    """Where the results of a job are, if they are in files: a folder that is created by them."""
+    if folder is None:
+        with temporary_folders.room() as room:
+            yield room
+        return
+    room = folder / job.key
+    try:
+        yield room
+    finally:
+        shutil.rmtree(room, ignore_errors=True)
 
 
 def _of_scene(fault: Fault) -> bool:

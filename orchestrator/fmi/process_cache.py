@@ -39,7 +39,7 @@ def described(path: Path) -> Description:
     """The description of an FMU, read once as long as the file does not change. Raises InputFault
     as `describe` does."""
     try:
-        file = _file(path)
+        file = file_at(path)
     except OSError:
         return describe(path)  # which raises an InputFault with the reason
     return _described(file)
@@ -50,7 +50,8 @@ def _described(file: File) -> Description:
     return describe(file[0])
 
 
-def _file(path: Path) -> File:
+def file_at(path: Path) -> File:
+    """The file that is at a path now. Raises OSError where there is none."""
     stat = path.stat()
     return path, stat.st_mtime_ns, stat.st_size
 
@@ -80,7 +81,7 @@ def unpack(description: Description, folder: str) -> str:
     if folder or not own:
         return _extracted(description.path, folder, own)
     with _lock:
-        file = _file(description.path)
+        file = file_at(description.path)
         if (unpacked := _unpacked.pop(file, None)) is None:
             unpacked = Unpacked(_extracted(description.path, "", own))
         unpacked.instances += 1

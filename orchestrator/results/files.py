@@ -18,12 +18,12 @@ from hapticlink.orchestrator.results.tables import Vector
 
 
 class Recorder:
-    """Writes a table: `time` and the `values` at `places`, named by `columns`, of every `every`-th
-    row; no table without columns, whose rows are counted only. A context manager.
+    """Keeps the rows of a table in memory: `time` and the `values` at `places`, named by `columns`,
+    of every `every`-th row; without columns there is no table, and rows are counted only. A context
+    manager.
 
-    Rows are kept in a block, which a crash of the process leaves (`rows.Block`), and go to a file
-    of doubles beside it, of which `finish` makes the CSV. `first` is called after the first row and
-    has to call `publish`, which moves that file to its place, `target`.
+    block: the newest rows, `room` of them at most, which `flush` moves to `parts`. `first` is
+    called after the first row.
 
     `view` is `values` at `places` where these are side by side, else None. `due`: whether the next
     row is written. `room`: of the block, 0 until the first row is. `count`: rows so far, written or
@@ -32,49 +32,31 @@ class Recorder:
 
     def __init__(
         self,
-        path: Path,
         columns: Sequence[str] | None,
         values: Vector,
         places: Sequence[int],
         first: Callable[[], object],
         every: int = 1,
+        block: rows.Block | None = None,
     ) -> None:
-        self.path, self.target = path, path.with_suffix(rows.SUFFIX)
         self.values, self.places, self.every = values, np.array(places, np.int64), every
+        self.columns, self.parts = columns, list[Vector]()
         span = slice(places[0], places[-1] + 1) if len(places) else slice(0)
         beside = [*places] == [*range(len(values))[span]]
         self.view = values[span] if beside else None
         self._first = first
-        self._full: float | None = None
-        self._file: BinaryIO | None = None
         self.due, self.room, self.count = (ctypes.c_int64(n) for n in (1, 0, 0))
         self.reached = ctypes.c_double()
-        if columns is None:
-            return
-        self.block = rows.Block(path, 1 + len(places))
-        self._unfinished = self._beside(self.target)
-        self._file = self._unfinished.open("xb", buffering=0)  # never through a link
-        try:
-            self._write(rows.header(("time", *columns)))
-        except OSError:
-            self.__exit__()
-            raise
+        self.block = block
 
     @property
     def last(self) -> float | None:
-        """The time (s) of the newest row, None before the first: of the last one on the disk where
-        that is full."""
-        if self._full is not None:
-            return self._full
+        """The time (s) of the newest row, None before the first."""
         return self.reached.value if self.count.value else None
-
-    @property
-    def files(self) -> list[str]:
-        return [self.target.name, self.block.path.name] if self._file else []
 
     def row(self, time: float) -> None:
         """Write a row at `time` (s). Raises OSError, as on a full disk."""
-        if self.due.value and self._file:
+        if self.due.value and self.block:
             filled, rows = self.block.filled, self.block.rows
             if filled.value == len(rows):
                 self.flush()
@@ -86,7 +68,59 @@ class Recorder:
         self.due.value = self.count.value % self.every == 0
         if self.count.value == 1:
             self._first()
-            self.room.value = len(self.block.rows) if self._file else 1
+            self.room.value = len(self.block.rows) if self.block else 1
+
+    def flush(self) -> None:
+        """Make room in the block for further rows."""
+        if self.block and self.block.filled.value:
+            self.parts.append(self.block.rows[: self.block.filled.value].copy())
+            self.block.filled.value = 0
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing to close."""
+
+
+class FileRecorder(Recorder):
+    """Writes a table to files: rows are kept in a block, which a crash of the process leaves
+    (`rows.FileBlock`), and go to a file of doubles beside it, of which `finish` makes the CSV.
+    `first` has to call `publish`, which moves that file to its place, `target`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        columns: Sequence[str] | None,
+        values: Vector,
+        places: Sequence[int],
+        first: Callable[[], object],
+        every: int = 1,
+    ) -> None:
+        super().__init__(columns, values, places, first, every)
+        self.path, self.target = path, path.with_suffix(rows.SUFFIX)
+        self._full: float | None = None
+        self._file: BinaryIO | None = None
+        if columns is None:
+            return
+        self.block: rows.FileBlock = rows.FileBlock(path, 1 + len(places))
+        self._unfinished = self._beside(self.target)
+        self._file = self._unfinished.open("xb", buffering=0)  # never through a link
+        try:
+            self._write(rows.header(("time", *columns)))
+        except OSError:
+            self.__exit__()
+            raise
+
+    @property
+    def last(self) -> float | None:
+        """As of all recorders, of the last row on the disk where that is full."""
+        return super().last if self._full is None else self._full
+
+    @property
+    def files(self) -> list[str]:
+        return [self.target.name, self.block.path.name] if self._file else []
 
     def flush(self) -> None:
         """Write the rows of the block. Raises OSError, as on a full disk, after those that fit."""
@@ -139,9 +173,6 @@ class Recorder:
             with suppress(OSError):  # a device, such as /dev/full, has no length
                 self._file.truncate(whole)
             raise
-
-    def __enter__(self) -> Recorder:
-        return self
 
     def __exit__(self, *_: object) -> None:
         if self._file:

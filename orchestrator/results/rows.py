@@ -31,8 +31,15 @@ Rows = NDArray[np.float64]
 
 
 class Block:
-    """The newest rows of a table: `filled` of `rows`, in a file that shares their memory, so that
-    they outlive the process. Where the file system shares none they are in memory alone.
+    """The newest rows of a table, of `width` numbers: `filled` of `rows`."""
+
+    def __init__(self, room: int, width: int) -> None:
+        self.filled, self.rows = ctypes.c_int64(), np.empty((room, width))
+
+
+class FileBlock(Block):
+    """A block in a file that shares its memory, so that its rows outlive the process. Where the
+    file system shares none they are in memory alone.
 
     Raises OSError, as on a full disk.
     """

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.faults import InputFault, Interrupted
 from hapticlink.orchestrator.results import json_file, rows
-from hapticlink.orchestrator.results.files import Recorder, text, write, write_json, write_over
+from hapticlink.orchestrator.results.files import FileRecorder, text, write, write_json, write_over
 from hapticlink.orchestrator.results.run_record import (
     End,
     RecordedFault,
@@ -21,6 +21,7 @@ from hapticlink.orchestrator.results.run_record import (
     RunSetup,
     content,
 )
+from hapticlink.orchestrator.results.run_results import RunResults
 
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
@@ -29,7 +30,7 @@ MAX_HEADER_BYTES = 1 << 28
 """Of the names of a table's columns."""
 
 
-class RunFolder:
+class RunFolder(RunResults[FileRecorder]):
     """The folder of a run. `setup` is in run.json from the first row on; without it no run.json is
     written.
 
@@ -39,9 +40,9 @@ class RunFolder:
     """
 
     def __init__(self, folder: Path, setup: RunSetup | None = None, csv: bool = True) -> None:
-        self.folder, self.published, self._csv = folder, False, csv
+        super().__init__(folder)
+        self._csv = csv
         self._setup = content(setup) if setup else None
-        self._recorders: list[Recorder] = []
         # What the first row needs, before the time of the loop is taken.
         self._earlier = _listed(folder)
         self._begun = self._text(End(process=os.getpid()))
@@ -63,29 +64,18 @@ class RunFolder:
         values: Vector,
         places: Sequence[int],
         every: int = 1,
-    ) -> Recorder:
+    ) -> FileRecorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
         path = self.folder / f"{clock}.csv"
-        recorder = Recorder(path, columns, values, places, self._publish, every)
+        recorder = FileRecorder(path, columns, values, places, self._publish, every)
         self._recorders.append(recorder)
         return recorder
-
-    def flush(self) -> None:
-        """Write the rows of all clocks that are kept in memory. Raises OSError, as on a full
-        disk."""
-        for recorder in self._recorders:
-            recorder.flush()
 
     def finish(self) -> None:
         """Make the CSV of all clocks. Raises OSError, as on a full disk; the rows can be read
         nevertheless."""
         for recorder in self._recorders if self._csv else ():
             recorder.finish()
-
-    @property
-    def last(self) -> float:
-        """The time (s) of the last row of the first clock."""
-        return self._recorders[0].last or 0.0 if self._recorders else 0.0
 
     def _publish(self) -> None:
         """Called by each recorder after its first row; once all have one, replaces the results of

@@ -7,7 +7,7 @@ ends. `RunRecord` is both, with what is computed of the results afterwards.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +15,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
 from hapticlink.orchestrator.plan.sample_ages import Delay
 from hapticlink.orchestrator.scene.records import Latency
@@ -259,24 +260,10 @@ class RunRecord(RunEnding, RunSetup):
 
 def content(section: RunSetup | RunEnding | PortEnergy) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""
-    values: dict[str, Any] = _plain(section)
+    values: dict[str, Any] = plain(section)
     if "end" in values:
         values["end"] = {k: v for k, v in values["end"].items() if v not in (None, "")}
     return values
-
-
-def _plain(value: Any) -> Any:
-    """As `asdict`, which copies the scene number by number and takes five times as long."""
-    if is_dataclass(value):
-        return {name: _plain(getattr(value, name)) for name in value.__dataclass_fields__}
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, tuple):
-        plain = map(_plain, value)
-        return type(value)(*plain) if hasattr(value, "_fields") else tuple(plain)
-    return value
 
 
 def read(run: Mapping[str, Any], folder: Path | None) -> RunRecord:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Inte
 from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal, delays
-from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.bind_operations import Stop
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
@@ -51,7 +52,7 @@ class Outcome:
     table_time: float = 0.0
     details: RunEnding = field(default_factory=RunEnding)
 
-    def set_reason(self, error: BaseException, results: RunFolder) -> None:
+    def set_reason(self, error: BaseException, results: RunResults[Any]) -> None:
         """Set why the run ended by `error`. Raises `error` again where it is a mistake of this
         package, of neither the scene nor the machine nor a plugin."""
         match error:
@@ -95,7 +96,7 @@ class Outcome:
 
 def run(
     plan: Plan,
-    results: RunFolder,
+    results: RunResults[Any],
     progress: Progress | None = None,
     real_time: RealTimeRun | None = None,
 ) -> Outcome:
@@ -145,7 +146,7 @@ def run(
 def _run_events(
     plan: Plan,
     loop: PythonLoop,
-    results: RunFolder,
+    results: RunResults[Any],
     outcome: Outcome,
     progress: Progress | None,
     real_time: RealTimeRun | None,

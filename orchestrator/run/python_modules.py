@@ -14,11 +14,12 @@ import re
 import sys
 import zlib
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
 from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.archive import opened
 from hapticlink.orchestrator.system.system import Fmu
 
@@ -33,13 +34,18 @@ _loaded: Modules = {}
 
 
 def bundled(path: Path) -> Modules:
-    """The modules in the resources/ of a Python FMU; {} for other FMUs, and for a file that cannot
-    be read, which is reported when it is loaded."""
+    """The modules in the resources/ of a Python FMU, read once as long as the file does not change;
+    {} for other FMUs, and for a file that cannot be read, which is reported when it is loaded."""
     try:
-        with opened(path, "FMU") as archive:
-            crcs = {e.filename: e.CRC for e in archive.infolist()}
-    except InputFault:
+        return _bundled(process_cache.file_at(path))
+    except (InputFault, OSError):
         return {}
+
+
+@lru_cache(process_cache.MAX_UNPACKED)
+def _bundled(at: process_cache.File) -> Modules:
+    with opened(at[0], "FMU") as archive:
+        crcs = {e.filename: e.CRC for e in archive.infolist()}
     modules: Modules = {}
     for file, crc in crcs.items() if "resources/slavemodule.txt" in crcs else ():
         place = file.removeprefix("resources/")

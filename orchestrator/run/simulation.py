@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,8 @@ from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.results.files import Recorder
-from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run import scenario
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
@@ -43,7 +44,7 @@ class Simulation:
     initialised the FMUs.
     """
 
-    def __init__(self, system: System, results: RunFolder, stack: ExitStack) -> None:
+    def __init__(self, system: System, results: RunResults[Any], stack: ExitStack) -> None:
         self.system, self.signals = system, SignalVector(system)
         self.pace: Pace | None = None
         self.beside: Mapping[str, str] = {}

@@ -12,7 +12,7 @@ further point NAME, blocks `hand_NAME`, `haptic_device_NAME` and `controller_NAM
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Annotated, Any, Literal
 
@@ -27,6 +27,7 @@ from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkag
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.faults import Finding
 from hapticlink.orchestrator.base.loop_names import DEVICE, WORKSPACE_MARGIN
+from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
@@ -229,7 +230,8 @@ class Scene:
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""
-        return asdict(self.plain())
+        tables: dict[str, Any] = plain(self.plain())
+        return tables
 
     def plain(self) -> Scene:
         """A copy of the scene without its origin."""

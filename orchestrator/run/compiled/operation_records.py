@@ -277,7 +277,7 @@ class Machine:
 
         def make(index: int) -> object:
             c = self._tables[index]
-            if recorder.files:
+            if recorder.block:
                 c.fill(block=recorder.block.rows, rows=recorder.block.filled)
             c.fill(recorder, "room", "due", "count", "reached", "every", "view")
             where = recorder.places if recorder.view is None else None

@@ -11,7 +11,7 @@ import pytest
 from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
-from hapticlink.orchestrator.results.files import Recorder
+from hapticlink.orchestrator.results.files import FileRecorder
 from hapticlink.orchestrator.results.recover import Recovered, recover
 from tests.orchestrator.foreign_fmus import (
     COMMAND,
@@ -61,7 +61,7 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
     """The process is killed while it writes a block: rows that the table has already are left out,
     one that it has in part is whole in the block, or is counted as lost."""
     values = np.zeros(2)
-    recorder = Recorder(tmp_path / "haptics.csv", ["a", "b"], values, [0, 1], lambda: None)
+    recorder = FileRecorder(tmp_path / "haptics.csv", ["a", "b"], values, [0, 1], lambda: None)
     recorder.publish()
     for k in range(5):
         values[:] = k, -k

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.results.files import Recorder, text, write, write_over
+from hapticlink.orchestrator.results.files import FileRecorder, text, write, write_over
 from hapticlink.orchestrator.results.tables import read_table
 
 
-def recorder_of(path: Path, columns: list[str], view: Any) -> Recorder:
+def recorder_of(path: Path, columns: list[str], view: Any) -> FileRecorder:
     """One whose file is in its place from the first row on."""
-    made = Recorder(path, columns, view, range(len(view)), lambda: made.publish())
+    made = FileRecorder(path, columns, view, range(len(view)), lambda: made.publish())
     return made
 
 
