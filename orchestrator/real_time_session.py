@@ -29,7 +29,7 @@ from hapticlink.orchestrator.scene.arguments import require, require_name
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.live_changes import changed, choices, require_other_rate
-from hapticlink.orchestrator.system.ports import names
+from hapticlink.orchestrator.system.ports import names, scalars_of
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -89,7 +89,9 @@ class LiveRun:
         self._require_running()
         if require_name("output", name) not in self._places:
             fmu, place = name.partition(".")[0], self._simulation.signals.scalar
-            self._places[name] = [place(fmu, s.name) for s in self._scalars(name, "output")]
+            self._places[name] = [
+                place(fmu, s.name) for s in scalars_of(self.system.fmu, name, "output")
+            ]
         return self._simulation.signals.values[self._places[name]]
 
     def energies(self) -> dict[str, Energy]:
@@ -112,7 +114,7 @@ class LiveRun:
         self._require_running()
         fmu = require_name("input or parameter", name).partition(".")[0]
         if name not in self._settings:
-            scalars = [*self._scalars(name, "input", "parameter")]
+            scalars = [*scalars_of(self.system.fmu, name, "input", "parameter")]
             self._require_free(name, scalars)
             instance = self._simulation.instances[fmu]
             self._settings[name] = scalars, instance.connect(scalars, range(len(scalars)))
@@ -247,16 +249,6 @@ class LiveRun:
     def _require_running(self) -> None:
         if not hasattr(self, "_simulation"):
             raise InputFault("the scene does not run yet: ask within the `turn` that `run` calls")
-
-    def _scalars(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
-        fmu, _, port = name.partition(".")
-        fmus = self._simulation.system.fmu
-        if fmu not in fmus:
-            raise InputFault(unknown("FMU", fmu, fmus))
-        if scalars := fmus[fmu].description.port(port, *causalities):
-            return scalars
-        every = [s.port for s in fmus[fmu].description.scalars if s.causality in causalities]
-        raise InputFault(f"{fmu}: {unknown(' or '.join(causalities), port, dict.fromkeys(every))}")
 
     def _require_free(self, name: str, scalars: Iterable[Scalar]) -> None:
         fmu = name.partition(".")[0]

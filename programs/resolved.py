@@ -24,7 +24,7 @@ from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.plan.operations import Event, Push
 from hapticlink.orchestrator.plan.plan import Plan, moments
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.bind_operations import Binder, Instruction
+from hapticlink.orchestrator.run.bind_operations import Binder
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.holds import CompiledHold
@@ -33,7 +33,7 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
-from hapticlink.orchestrator.run.metered_operations import Move, Sample
+from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built

@@ -49,8 +49,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     flat,
 )
-from hapticlink.orchestrator.run.bind_operations import Instruction
-from hapticlink.orchestrator.run.parallel_steps import Finish
+from hapticlink.orchestrator.run.instructions import Finish, Instruction
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 
 STEP = 1e-6

@@ -2,7 +2,7 @@
 
 The worker process has an `Instance`; each call is a message to it and an answer. Inputs are sent
 with the next call and outputs come back with a step, so a step is one message. Its answer is
-awaited in `finish`, so that several FMUs step concurrently (`run.parallel_steps`).
+awaited in `finish`, so that several FMUs step concurrently (`run.instructions`).
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterable
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -40,11 +40,22 @@ class OfSamples(Hold):
     """Base of holds whose value follows from the newest `depth` samples by a law (`laws`)."""
 
     depth: ClassVar[int] = 2
-    laws: ClassVar[tuple[Law, ...]]
+    laws: ClassVar[tuple[Law, ...]] = ()
     """The law while the hold has one sample, two, and so on."""
+    slopes: ClassVar[tuple[Law, ...]] = ()
+    """Laws of the slope (per tick), where a transition needs it."""
+    known: ClassVar[tuple[str, ...]] = (
+        *("y", "y1", "y2", "yd", "yd1"),
+        *("s", "H", "H1", "elapsed", "period"),
+    )
+    """The arguments that the laws may have."""
 
     def __init_subclass__(cls) -> None:
-        _require_known(getattr(cls, "laws", ()), _ARGUMENTS)
+        """Raises TypeError for a law with an argument that has no meaning."""
+        for law in (*cls.laws, *cls.slopes):
+            if unknown := [name for name in arguments(law) if name not in cls.known]:
+                why = f"no argument {unknown[0]!r}; there are {', '.join(cls.known)}"
+                raise TypeError(f"law {law.__name__!r}: {why}")
 
     def __init__(self, context: HoldContext) -> None:
         self.size, self.seconds = context.size, context.seconds
@@ -54,80 +65,59 @@ class OfSamples(Hold):
         self.samples.push(stamp, sample)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        law = self.laws[len(self.samples) - 1]
-        time = tick - self.samples[-1][0] + ahead
-        value: Vector = law(*[_ARGUMENTS[name](self, time) for name in arguments(law)])
+        return self.evaluated(self.laws[len(self.samples) - 1], tick, ahead)
+
+    def evaluated(self, law: Law, tick: int, ahead: float) -> Vector:
+        """The value of a law."""
+        value: Vector = law(*[_ARGUMENTS[name](self, tick, ahead) for name in arguments(law)])
         return value
 
 
-_ARGUMENTS: dict[str, Callable[[OfSamples, float], Value]] = {
-    "y": lambda hold, s: hold.samples[-1][1][: hold.size],
-    "y1": lambda hold, s: hold.samples[-2][1][: hold.size],
-    "y2": lambda hold, s: hold.samples[-3][1][: hold.size],
-    "yd": lambda hold, s: hold.samples[-1][1][hold.size :],
-    "yd1": lambda hold, s: hold.samples[-2][1][hold.size :],
-    "s": lambda hold, s: s,
-    "H": lambda hold, s: hold.samples.period(-1),
-    "H1": lambda hold, s: hold.samples.period(-2),
-    "elapsed": lambda hold, s: hold.seconds(s),
-    "period": lambda hold, s: hold.seconds(hold.samples.period(-1)),
-}
-"""What the argument of a law is, `s` ticks after the newest stamp."""
-
-
-_OF_A_TRANSITION = ("y", "y1", "w", "wd", "r", "H")
-
-
-def _require_known(laws: Iterable[Law], known: Collection[str]) -> None:
-    """Raises TypeError for a law with an argument that has no meaning."""
-    for law in laws:
-        for name in arguments(law):
-            if name not in known:
-                raise TypeError(
-                    f"law {law.__name__!r}: no argument {name!r}; there are {', '.join(known)}"
-                )
-
-
-class Transition(Hold):
+class Transition(OfSamples):
     """Base of holds that go from the value w which they have when a sample arrives to that sample,
-    and reach it a period H later. Their laws take y, y1, w, wd, r and H."""
+    and reach it a period H later. Their laws are that with one sample, that until the newest is
+    reached (r < 1), and that from there on."""
 
-    depth: ClassVar[int] = 2
-    laws: ClassVar[tuple[Law, ...]]
-    """The law with one sample, that until the newest is reached (r < 1), and that from there on."""
-    slopes: ClassVar[tuple[Law, ...] | None] = None
-    """Laws of the slope (per tick), where those of the value need it."""
-
-    def __init_subclass__(cls) -> None:
-        _require_known((*getattr(cls, "laws", ()), *(cls.slopes or ())), _OF_A_TRANSITION)
+    known = ("y", "y1", "w", "wd", "r", "H")
 
     def __init__(self, context: HoldContext) -> None:
-        self._samples = History(self.depth)
-        self._arrival = 0
-        self._from = self._slope = np.zeros(context.size)
+        super().__init__(context)
+        self.arrival = 0
+        self.start = self.slope = np.zeros(context.size)
 
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        if not len(self._samples):
-            self._from = sample.copy()
+        if not len(self.samples):
+            self.start = sample.copy()
         else:
             start = self.value(arrival)
             if self.slopes:
-                self._slope = self._evaluated(self.slopes, arrival, 0.0)
-            self._from = start
-        self._samples.push(stamp, sample)
-        self._arrival = arrival
+                self.slope = self._chosen(self.slopes, arrival, 0.0)
+            self.start = start
+        super().push(stamp, sample, arrival)
+        self.arrival = arrival
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        return self._evaluated(self.laws, tick, ahead)
+        return self._chosen(self.laws, tick, ahead)
 
-    def _evaluated(self, laws: tuple[Law, ...], tick: int, ahead: float) -> Vector:
-        (before, y1), (stamp, y) = self._samples[0], self._samples[-1]
-        known: dict[str, Value] = {"y": y, "y1": y1, "w": self._from, "wd": self._slope}
-        law = laws[0]
-        if stamp > before:
-            H = stamp - before
-            r = (tick - self._arrival + ahead) / H
-            known |= {"H": H, "r": r}
-            law = laws[2] if r >= 1.0 else laws[1]
-        value: Vector = law(*[known[name] for name in arguments(law)])
-        return value
+    def _chosen(self, laws: tuple[Law, ...], tick: int, ahead: float) -> Vector:
+        several = len(self.samples) > 1
+        reached = several and _ARGUMENTS["r"](self, tick, ahead) >= 1.0
+        return self.evaluated(laws[several + reached], tick, ahead)
+
+
+_ARGUMENTS: dict[str, Callable[[Any, int, float], Value]] = {
+    "y": lambda hold, tick, ahead: hold.samples[-1][1][: hold.size],
+    "y1": lambda hold, tick, ahead: hold.samples[-2][1][: hold.size],
+    "y2": lambda hold, tick, ahead: hold.samples[-3][1][: hold.size],
+    "yd": lambda hold, tick, ahead: hold.samples[-1][1][hold.size :],
+    "yd1": lambda hold, tick, ahead: hold.samples[-2][1][hold.size :],
+    "s": lambda hold, tick, ahead: tick - hold.samples[-1][0] + ahead,
+    "H": lambda hold, tick, ahead: hold.samples.period(-1),
+    "H1": lambda hold, tick, ahead: hold.samples.period(-2),
+    "elapsed": lambda hold, tick, ahead: hold.seconds(tick - hold.samples[-1][0] + ahead),
+    "period": lambda hold, tick, ahead: hold.seconds(hold.samples.period(-1)),
+    "w": lambda hold, tick, ahead: hold.start,
+    "wd": lambda hold, tick, ahead: hold.slope,
+    "r": lambda hold, tick, ahead: (tick - hold.arrival + ahead) / hold.samples.period(-1),
+}
+"""What the argument of a law is, of a hold that is read at `tick` for `ahead` ticks later."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.hold import Hold, Vector
 
 
 class ZeroOrder(Hold):
@@ -16,10 +15,10 @@ class ZeroOrder(Hold):
     def __init__(self, context: HoldContext) -> None:
         self._newest = np.zeros(context.size)
 
-    def push(self, stamp: int, sample: NDArray[np.float64], arrival: int) -> None:
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         self._newest[:] = sample
 
-    def value(self, tick: int, ahead: float = 0.0) -> NDArray[np.float64]:
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
         return self._newest
 
 

@@ -25,10 +25,12 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class Get:
-    """Read all outputs of an FMU; their stamp is `ahead` of the event's tick."""
+    """Read all outputs of an FMU; their stamp is `ahead` of the event's tick. Not `judged`, as
+    within an iteration, they need be neither finite nor within their bounds."""
 
     fmu: str
     ahead: int = 0
+    judged: bool = True
 
 
 @dataclass(frozen=True)

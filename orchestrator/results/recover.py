@@ -45,9 +45,9 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
     for name in record.rates:
         table = folder / f"{name}.csv"
         if (source := table.with_suffix(rows.SUFFIX)).is_file():
-            lost = rows.torn(source)
-            _, table_rows = rows.read(source)
-            recovered[name] = Recovered(make_csv(table), float(table_rows[-1, 0]), lost)
+            written = rows.Written(source)
+            count, last = make_csv(table), written.time(len(written) - 1)
+            recovered[name] = Recovered(count, last, int(written.torn))
             remove_rows(table)
     changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
     if record.end.process is not None:

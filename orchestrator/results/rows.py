@@ -9,7 +9,7 @@ import csv
 import ctypes
 import mmap
 import os
-from collections.abc import Iterator
+from bisect import bisect_left, bisect_right
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -87,64 +87,74 @@ def header(columns: tuple[str, ...]) -> bytes:
 def write_csv(source: Path, target: BinaryIO) -> int:
     """Write the table `source` as CSV to `target`; the number of its rows. A row that is not whole
     is left out."""
-    count = 0
-    with source.open("rb") as file:
-        target.write(header(_columns(file.readline(), source)))
-    for part in _parts(source):
-        for first in range(0, len(part), step := max(AT_A_TIME // (8 * part.shape[1]), 1)):
-            target.write(text(part[first : first + step]))
-        count += len(part)
-    return count
+    table = Written(source)
+    target.write(header(table.columns))
+    step = max(AT_A_TIME // (8 * len(table.columns)), 1)
+    for first in range(0, len(table), step):
+        target.write(text(table[first : first + step]))
+    return len(table)
 
 
 def read(path: Path) -> tuple[tuple[str, ...], Rows]:
     """The columns and the rows of a table; a row that is not whole is left out."""
-    columns, pieces = parts(path)
-    return columns, np.concatenate([np.zeros((0, len(columns))), *pieces])
+    table = Written(path)
+    return table.columns, table[:]
 
 
-def parts(path: Path) -> tuple[tuple[str, ...], Iterator[Rows]]:
-    """The columns of a table, and its rows piece by piece."""
-    with path.open("rb") as file:
-        columns = _columns(file.readline(), path)
-    return columns, _parts(path)
+class Written:
+    """The rows of a table on the disk, read where they are asked for: those of its file that are
+    whole, then those of its block that the file does not have.
 
+    torn: whether a row of the file was written in part.
+    """
 
-def count(path: Path) -> int:
-    """The number of rows of a table that are whole, without those of its blocks."""
-    with path.open("rb") as file:
-        line = file.readline()
-        return (os.fstat(file.fileno()).st_size - len(line)) // (8 * len(_columns(line, path)))
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with path.open("rb") as file:
+            self.columns = _columns(file.readline(), path)
+            self._begin = file.tell()
+            self._row = 8 * len(self.columns)
+            size = os.fstat(file.fileno()).st_size - self._begin
+        self._in_file, rest = divmod(size, self._row)
+        self.torn = rest > 0
+        self._newest = np.zeros((0, len(self.columns)))
+        last = self.time(self._in_file - 1) if self._in_file else -np.inf
+        for block in map(self._block, blocks(path)):
+            self._newest = np.concatenate([self._newest, block[block[:, 0] > last]])
 
+    def _block(self, path: Path) -> Rows:
+        with path.open("rb") as file:
+            filled = int.from_bytes(file.read(COUNT), "little")
+            content = file.read(filled * self._row)
+        whole = content[: len(content) // self._row * self._row]
+        return np.frombuffer(whole).reshape(-1, len(self.columns))
 
-def torn(path: Path) -> int:
-    """Number of rows of a table that were written in part: 1, if its last one was."""
-    with path.open("rb") as file:
-        line = file.readline()
-        size = os.fstat(file.fileno()).st_size - len(line)
-    return int(size % (8 * len(_columns(line, path))) > 0)
+    def __len__(self) -> int:
+        return self._in_file + len(self._newest)
+
+    def __getitem__(self, span: slice) -> Rows:
+        first, last, _ = span.indices(len(self))
+        count, begin = max(min(last, self._in_file) - first, 0), self._begin + first * self._row
+        content = np.fromfile(self._path, count=count * len(self.columns), offset=begin)
+        whole = content.reshape(count, len(self.columns))
+        if last <= self._in_file:
+            return whole
+        newest = self._newest[max(first - self._in_file, 0) : last - self._in_file]
+        return np.concatenate([whole, newest])
+
+    def time(self, row: int) -> float:
+        """The time (s) of a row."""
+        return float(self[row : row + 1][0, 0])
+
+    def between(self, begin: float, end: float) -> slice:
+        """The rows of begin <= time <= end (s)."""
+        first = bisect_left(range(len(self)), begin, key=self.time)
+        return slice(first, bisect_right(range(len(self)), end, lo=first, key=self.time))
 
 
 def blocks(table: Path) -> list[Path]:
     """The files of the blocks of a table."""
     return [*table.parent.glob(f".{table.stem}.*.block")]
-
-
-def _parts(path: Path) -> Iterator[Rows]:
-    """The rows of a table, piece by piece: those of the file, then those of its block that the file
-    does not have."""
-    last = -np.inf
-    with path.open("rb") as file:
-        width = len(_columns(file.readline(), path))
-        while content := file.read(max(AT_A_TIME // (8 * width), 1) * 8 * width):
-            if len(part := _rows(content, width)):
-                last = part[-1, 0]
-                yield part
-    for block in blocks(path):
-        with block.open("rb") as file:
-            filled = int.from_bytes(file.read(COUNT), "little")
-            part = _rows(file.read(filled * 8 * width), width)
-            yield part[part[:, 0] > last]
 
 
 def _columns(line: bytes, path: Path) -> tuple[str, ...]:
@@ -159,8 +169,3 @@ def _quoted(name: str) -> str:
     any printable character."""
     doubled = name.replace('"', '""')
     return f'"{doubled}"' if "," in name or '"' in name else name
-
-
-def _rows(content: bytes, width: int) -> Rows:
-    whole = len(content) // (8 * width)
-    return np.frombuffer(content, np.float64, whole * width).reshape(whole, width)

@@ -75,18 +75,17 @@ class Streamed(Results):
     def windows(self) -> Iterator[Results]:
         assert self.folder
         record, end, beside = self.record, self.record.end.time or 0.0, _beside(self.record)
-        written = {name: recorded(name, record.files) for name in record.rates}
         files = {
-            name: _Forward(self.folder / f"{name}{rows.SUFFIX}")
-            for name in written
-            if written[name]
+            name: rows.Written(self.folder / f"{name}{rows.SUFFIX}")
+            for name in record.rates
+            if recorded(name, record.files)
         }
         cuts = [-np.inf, *(end * np.arange(1, self.number) / self.number), np.inf]
         for begin, until in pairwise(map(float, cuts)):
             span = begin - beside, until + beside
             # No table of a window knows the others: a cycle would stay until the next collection.
             tables = {
-                name: files[name].between(*span) if name in files else empty({})
+                name: _part(files[name], *span) if name in files else empty({})
                 for name in record.rates
             }
             window = Results(self.folder, self.run, tables, begin, until)
@@ -115,22 +114,7 @@ def _beside(record: RunRecord) -> float:
     return STEPS_BESIDE * max(longest, first) * int(record.scene["record"]["every"])
 
 
-class _Forward:
-    """Reads spans of the rows of a table, each of which begins later than the one before."""
-
-    def __init__(self, path: Path) -> None:
-        self._columns, self._parts = rows.parts(path)
-        self._total = rows.count(path)
-        self._kept, self._first = np.zeros((0, len(self._columns))), 0
-
-    def between(self, begin: float, end: float) -> Table:
-        """The rows of begin <= time <= end (s)."""
-        over = int(np.searchsorted(self._kept[:, 0], begin))
-        pieces = [self._kept[over:]]
-        while not (len(pieces[-1]) and pieces[-1][-1, 0] > end):
-            if (part := next(self._parts, None)) is None:
-                break
-            pieces.append(part)
-        self._kept, self._first = np.concatenate(pieces), self._first + over
-        span = self._kept[: np.searchsorted(self._kept[:, 0], end, "right")]
-        return Table(self._columns, span, {}, self._first, self._total)
+def _part(table: rows.Written, begin: float, end: float) -> Table:
+    """The rows of begin <= time <= end (s)."""
+    span = table.between(begin, end)
+    return Table(table.columns, table[span], {}, span.start, len(table))

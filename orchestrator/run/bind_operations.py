@@ -26,24 +26,21 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.run.concurrent_fmus import Collect, collected
 from hapticlink.orchestrator.run.fixed_point import FixedPoint
-from hapticlink.orchestrator.run.metered_operations import (
+from hapticlink.orchestrator.run.instructions import (
+    Collect,
     Feed,
-    Metering,
+    Finish,
+    Instruction,
     Move,
-    Read,
     Sample,
-    metered,
+    instructions,
 )
-from hapticlink.orchestrator.run.parallel_steps import Finish, with_barriers
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system import held_polynomials
 
-Bound = list[tuple["Instruction", Call]]
-Instruction = Operation | Metering | Finish | Collect
-"""An operation of a run: of its plan, of its meters, or of waiting for FMUs."""
+Bound = list[tuple[Instruction, Call]]
 
 
 class Stop(Exception):
@@ -68,11 +65,7 @@ class Binder:
     def instructions(self, operations: Iterable[Operation], judged: bool = True) -> Bound:
         """The instructions of a block with their calls. Not `judged`, outputs need not be
         finite."""
-        simulation = self._simulation
-        given = collected(operations, simulation.beside) if simulation.beside else operations
-        taken = metered(given, simulation.meters, judged)
-        waited = {fmu for fmu in simulation.isolated if fmu not in simulation.beside}
-        return [(i, self.bind(i)) for i in with_barriers(taken, waited)]
+        return [(i, self.bind(i)) for i in instructions(operations, self._simulation, judged)]
 
     def bind_all(self, operations: Iterable[Operation], judged: bool = True) -> list[Call]:
         bound = self.instructions(operations, judged)
@@ -82,12 +75,10 @@ class Binder:
         """The call that executes an operation; its argument is the tick."""
         simulation = self._simulation
         match operation:
-            case Get(fmu):
-                get = simulation.instances[fmu].get
+            case Get(fmu, judged=judged):
+                instance = simulation.instances[fmu]
+                get = instance.get if judged else instance.read
                 return lambda tick: get()
-            case Read(fmu):
-                read = simulation.instances[fmu].read
-                return lambda tick: read()
             case Sample(connection, ahead):
                 sample = simulation.meters.of[connection].sample
                 return lambda tick: sample(tick + ahead)

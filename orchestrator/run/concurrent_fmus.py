@@ -11,8 +11,7 @@ fixed, to the next one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from queue import SimpleQueue
 from threading import Thread
 from typing import Protocol
@@ -20,7 +19,7 @@ from typing import Protocol
 from hapticlink.orchestrator.base.faults import FmuFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.plan.operations import Event, Firing, Get, Operation, Step
+from hapticlink.orchestrator.plan.operations import Event, Firing, Step
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled import structures
 
@@ -31,13 +30,6 @@ COLUMNS = ("arrival", "lateness", "computing")
 SAMPLES = "samples"
 """The table of a clock's samples is <clock>_samples.csv."""
 Job = Callable[[], object]
-
-
-@dataclass(frozen=True)
-class Collect:
-    """Take over what the steps beside the loop of a clock's FMUs have left."""
-
-    clock: str
 
 
 class Worker(Protocol):
@@ -172,16 +164,3 @@ def sides(
         )
         for name in clocks
     }
-
-
-def collected(
-    operations: Iterable[Operation], able: Mapping[str, str]
-) -> Iterator[Operation | Collect]:
-    """The operations of a block, with a Collect before the outputs of FMUs beside the loop are
-    read."""
-    seen: set[str] = set()
-    for operation in operations:
-        if isinstance(operation, Get) and able.get(operation.fmu, "") not in ("", *seen):
-            seen.add(able[operation.fmu])
-            yield Collect(able[operation.fmu])
-        yield operation

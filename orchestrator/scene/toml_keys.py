@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any
 
+from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.scene.toml import TOKEN, loads
 
@@ -88,6 +90,15 @@ def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
             return places[path]
         path = path[:-1]
     return "", 0
+
+
+@contextmanager
+def reported(problems: list[Problem], path: Path) -> Iterator[None]:
+    """A ValueError or InputFault ends the context, and becomes a problem at `path`."""
+    try:
+        yield
+    except (ValueError, InputFault) as error:
+        problems.append((path, str(error)))
 
 
 NAMED = ("holds", "delays", "kinds")

@@ -9,7 +9,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, conversion
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import Wire
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, reported
 from hapticlink.orchestrator.system.fmu_tables import outputs, settable
 from hapticlink.orchestrator.system.system import Connection
 
@@ -26,20 +26,16 @@ def connect(
         (source, output), (target, entry) = (e.split(".", 1) for e in (wire.from_, wire.to))
         scalars: tuple[Scalar, ...] = ()
         inputs: tuple[Scalar, ...] = ()
-        try:
+        with reported(problems, (*path, "from")):
             scalars = outputs(described[source], output)
-        except ValueError as error:
-            problems.append(((*path, "from"), str(error)))
-        try:
+        with reported(problems, (*path, "to")):
             inputs = settable(described[target], entry)
-        except ValueError as error:
-            problems.append(((*path, "to"), str(error)))
         if not scalars or not inputs:
             continue
-        try:
-            inputs = _converted(wire, described[source], scalars, described[target], inputs)
-        except ValueError as error:
-            problems.append((path, str(error)))
+        converted: tuple[Scalar, ...] = ()
+        with reported(problems, path):
+            converted = _converted(wire, described[source], scalars, described[target], inputs)
+        if not (inputs := converted):
             continue
         twice = [s.name for s in inputs if (target, s.name) in fed]
         if twice:

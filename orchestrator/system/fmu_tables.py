@@ -17,7 +17,7 @@ from hapticlink.orchestrator.fmi.start_values import Starts, fitting
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import ForeignFmu, Value
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.scene.toml_keys import Problem, reported
 from hapticlink.orchestrator.system.port_map import Mapped, mapped, renamed
 
 if TYPE_CHECKING:
@@ -41,27 +41,21 @@ def fmus(
             continue
         block, names = replaced.get(fmu.name), Mapped()
         if block:
-            try:
+            with reported(problems, ("fmu", i, "map")):
                 names = mapped(description, block, fmu.map)
-            except ValueError as error:
-                problems.append((("fmu", i, "map"), str(error)))
             description = renamed(description, names, block)
         if fmu.timing:
             description = replace(description, timing=fmu.timing)
         elif block and not description.declares_timing:
             description = replace(description, timing=block.timing)
         for name, derivative in fmu.derivatives.items():
-            try:
+            with reported(problems, ("fmu", i, "derivatives", name)):
                 description = _with_derivative(description, name, derivative)
-            except ValueError as error:
-                problems.append((("fmu", i, "derivatives", name), str(error)))
-        starts: list[Starts] = []
+        starts: Starts = ()
         for name, value in fmu.start.items():
-            try:
-                starts.append(_start(description, name, value))
-            except ValueError as error:
-                problems.append((("fmu", i, "start", name), str(error)))
-        yield fmu, description, sum(starts, ()), names
+            with reported(problems, ("fmu", i, "start", name)):
+                starts += _start(description, name, value)
+        yield fmu, description, starts, names
 
 
 def _described(path: FilePath, fmu: ForeignFmu) -> Description:

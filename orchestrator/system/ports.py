@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from hapticlink.components.ports import Kind
+from hapticlink.orchestrator.base.faults import InputFault, unknown
 from hapticlink.orchestrator.fmi.kind_check import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
@@ -16,6 +17,18 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 def names(c: Connection) -> tuple[str, str, str]:
     """The names by which a scene may refer to a connection, the most precise first."""
     return (c.name, f"{c.target}.{c.target_port}", f"{c.source}.{c.source_port}")
+
+
+def scalars_of(fmus: Mapping[str, Fmu], name: str, *causalities: str) -> tuple[Scalar, ...]:
+    """The scalars of `fmu.port`. Raises InputFault where there are none of these causalities."""
+    fmu, _, port = name.partition(".")
+    if fmu not in fmus:
+        raise InputFault(unknown("FMU", fmu, fmus))
+    description = fmus[fmu].description
+    if scalars := description.port(port, *causalities):
+        return scalars
+    every = dict.fromkeys(s.port for s in description.scalars if s.causality in causalities)
+    raise InputFault(f"{fmu}: {unknown(' or '.join(causalities), port, every)}")
 
 
 def paired(c: Connection, entry: Scalar, power: Iterable[PowerPort]) -> PowerPort | None:

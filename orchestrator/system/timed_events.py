@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
-from hapticlink.orchestrator.base.faults import shortened, unknown
+from hapticlink.orchestrator.base.faults import shortened
 from hapticlink.orchestrator.base.ticks import Timeline, exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import TimedEvent, Value
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Path as Keys
-from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.scene.toml_keys import Problem, reported
 from hapticlink.orchestrator.system.assign_holds import Rules
-from hapticlink.orchestrator.system.ports import carries_power
+from hapticlink.orchestrator.system.ports import carries_power, scalars_of
 from hapticlink.orchestrator.system.springs import gains_of_held
 from hapticlink.orchestrator.system.system import Change, Connection, Fmu
 from hapticlink.orchestrator.system.timeline import GRAPHICS_RATE
@@ -38,45 +37,17 @@ def changes(
     for i, event in enumerate(scene.at):
         for key, asked in (("set", event.set), ("override", event.override)):
             for name, value in asked.items():
-                _take(
-                    taken,
-                    problems,
-                    ("at", i, key, name),
-                    events.given,
-                    event,
-                    key,
-                    name,
-                    value,
-                )
+                with reported(problems, ("at", i, key, name)):
+                    taken.append(events.given(event, key, name, value))
         for name in event.freeze:
-            _take(taken, problems, ("at", i, "freeze"), events.brought, event, name, 0.0)
+            with reported(problems, ("at", i, "freeze")):
+                taken.append(events.brought(event, name, 0.0))
         for name, noise in event.noise.items():
-            _take(
-                taken,
-                problems,
-                ("at", i, "noise", name),
-                events.brought,
-                event,
-                name,
-                noise,
-            )
+            with reported(problems, ("at", i, "noise", name)):
+                taken.append(events.brought(event, name, noise))
         problems += ((("at", i, key), why) for key, why in _times(event))
     end = timeline.seconds(timeline.end)
     return tuple(sorted((c for c in taken if c.begin < end), key=lambda change: change.begin))
-
-
-def _take(
-    taken: list[Change],
-    problems: list[Problem],
-    path: Keys,
-    make: Callable[..., Change],
-    *arguments: object,
-) -> None:
-    """Append the change, or why there is none."""
-    try:
-        taken.append(make(*arguments))
-    except ValueError as error:
-        problems.append((path, str(error)))
 
 
 def _times(event: TimedEvent) -> Iterator[tuple[str, str]]:
@@ -87,7 +58,8 @@ def _times(event: TimedEvent) -> Iterator[tuple[str, str]]:
 
 
 class _Events:
-    """Makes changes; all methods raise ValueError, with the remedy, for what cannot be done."""
+    """Makes changes; all methods raise ValueError or InputFault, with the remedy, for what cannot
+    be done."""
 
     def __init__(
         self,
@@ -157,16 +129,7 @@ class _Events:
         return self._scene.duration + 1.0 if event.until is None else event.until
 
     def _scalars(self, name: str) -> tuple[Scalar, ...]:
-        fmu, _, port = name.partition(".")
-        if fmu not in self._fmus:
-            raise ValueError(unknown("FMU", fmu, self._fmus))
-        description = self._fmus[fmu].description
-        if scalars := description.port(port, "input", "parameter"):
-            return scalars
-        every = dict.fromkeys(
-            s.port for s in description.scalars if s.causality in ("input", "parameter")
-        )
-        raise ValueError(f"{fmu}: {unknown('input or parameter', port, every)}")
+        return scalars_of(self._fmus, name, "input", "parameter")
 
     def _feeding(self, name: str) -> list[Connection]:
         named = {s.name for s in self._scalars(name)}

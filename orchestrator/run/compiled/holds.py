@@ -8,43 +8,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hapticlink.orchestrator.holds.delayed import Delayed
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-from hapticlink.orchestrator.holds.first_order import FirstOrder
-from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
-from hapticlink.orchestrator.holds.hermite import Hermite
 from hapticlink.orchestrator.holds.hold import Hold, Vector
-from hapticlink.orchestrator.holds.lead import Lead
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
-from hapticlink.orchestrator.holds.mean import Mean
-from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
-from hapticlink.orchestrator.holds.second_order import SecondOrder
-from hapticlink.orchestrator.holds.slope import Slope
-from hapticlink.orchestrator.holds.smooth import Smooth
-from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.run.spring_holds import WithFurther
 from hapticlink.orchestrator.system.latency import Late, Link
 
 KINDS: Mapping[type[Hold], int] = {
-    ZeroOrder: structures.ZERO_ORDER,
-    Latest: structures.ZERO_ORDER,
-    Lead: structures.LEAD,
-    FirstOrder: structures.FIRST_ORDER,
-    FirstOrderDerivative: structures.FIRST_ORDER_DERIVATIVE,
-    SecondOrder: structures.SECOND_ORDER,
-    Hermite: structures.HERMITE,
-    Slope: structures.SLOPE,
-    Delayed: structures.DELAYED,
-    Smooth: structures.SMOOTH,
-    Mean: structures.MEAN,
-    PassiveSetPosition: structures.PASSIVE_SET_POSITION,
-    Passive: structures.OBSERVED,
-    NearlyEnergyPreserving: structures.OBSERVED,
+    HOLDS[name]: kind
+    for name, kind in {
+        "zoh": structures.ZERO_ORDER,
+        "latest": structures.ZERO_ORDER,
+        "lead": structures.LEAD,
+        "foh": structures.FIRST_ORDER,
+        "foh-derivative": structures.FIRST_ORDER_DERIVATIVE,
+        "second-order": structures.SECOND_ORDER,
+        "hermite": structures.HERMITE,
+        "slope": structures.SLOPE,
+        "delayed": structures.DELAYED,
+        "smooth": structures.SMOOTH,
+        "mean": structures.MEAN,
+        "pspm": structures.PASSIVE_SET_POSITION,
+        "passive": structures.OBSERVED,
+        "nepce": structures.OBSERVED,
+    }.items()
 }
 """The holds that have C, with their names in loop.h."""
 DRAWN, FEW = 256, 16
@@ -91,38 +84,28 @@ def can(hold: Hold, repeats: bool) -> bool:
     return type(pieces.own) in KINDS and not (grows and repeats)
 
 
-class State:
-    """Words of 8 bytes with a structure at their beginning and its arrays behind it."""
-
-    def __init__(self, words: int) -> None:
-        self.words, self._end = np.zeros(words, np.int64), 0
-
-    def place(self, words: int) -> int:
-        """The address of the next `words`."""
-        address: int = self.words.ctypes.data + 8 * self._end
-        self._end += words
-        return address
-
-    def structure(self, kind: type[structures.Structure]) -> Any:
-        first = self._end
-        self.place(_words(kind))
-        return kind.from_buffer(self.words.data, 8 * first)
+def _with_arrays(kind: type[structures.Structure], words: Mapping[str, int]) -> Any:
+    """A structure with arrays of so many zeros of 8 bytes behind it, by its pointers to them."""
+    size = ctypes.sizeof(kind)
+    c = kind.from_buffer(ctypes.create_string_buffer(size + 8 * sum(words.values())))
+    place = ctypes.addressof(c) + size
+    for name, number in words.items():
+        setattr(c, name, place if number else None)
+        place += 8 * number
+    return c
 
 
-def _words(kind: type[structures.Structure]) -> int:
-    return ctypes.sizeof(kind) // 8
-
-
-class CompiledTank(State):
+class CompiledTank:
     """An energy tank in C."""
 
     def __init__(self, tank: EnergyTank) -> None:
         n, near = len(tank.stiffness), tank.near
-        super().__init__(_words(structures.Tank) + 8 * n)
         assert isinstance(near.position, Reader)
+        several = dict.fromkeys(("newest", "modulated"), 2 * n)
+        several |= dict.fromkeys(("x", "moved", "force", "withheld"), n)
+        self.c = c = _with_arrays(structures.Tank, several)
         self._kept = tuple(map(np.ascontiguousarray, (tank.stiffness, tank.damping, near.turns)))
         self._readers = near.position, near.velocity
-        c = self.structure(structures.Tank)
         stiffness, damping, turns = self._kept
         c.fill(near, "period", "sampled", n=n, tick=-1)
         c.fill(tank, "least")
@@ -130,8 +113,6 @@ class CompiledTank(State):
         if near.velocity:
             assert isinstance(near.velocity, Reader)
             c.fill(velocity=near.velocity.where)
-        c.newest, c.modulated = self.place(2 * n), self.place(2 * n)
-        c.x, c.moved, c.force, c.withheld = (self.place(n) for _ in range(4))
 
 
 class Grown:
@@ -178,7 +159,7 @@ def fill_reader(c: structures.Reader, reader: Reader) -> None:
     c.fill(reader, "where", "factor", "offset", n=len(reader.where))
 
 
-class CompiledHold(Hold, State):
+class CompiledHold(Hold):
     """A hold in C. sources: the indices of its samples in the signal vector; held: where `evaluate`
     puts its value. loop: the address of the Loop that it runs in."""
 
@@ -197,21 +178,19 @@ class CompiledHold(Hold, State):
         places = [*sources, *(further.where if further else ())]
         width, turned = len(places), len(angles.angles) if angles else 0
         rows = matrix.n if matrix else 0
-        words = depth * width + 8 * n + turned + 2 * rows
-        State.__init__(self, words + _words(structures.Hold))
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
         self._sources, self._further = np.array(places, np.intp), further
         self._held, self._tank = held, tank
-        self._c = c = self.structure(structures.Hold)
-        c.fill(kind=KINDS[type(own)], n=n, width=width, depth=depth, sources=self._sources)
-        c.fill(samples=self.place(depth * width), vectors=self.place(8 * n), held=held)
+        arrays = {"samples": depth * width, "vectors": 8 * n, "last": turned, "scale": 2 * rows}
+        self._c = c = _with_arrays(structures.Hold, arrays)
+        c.fill(kind=KINDS[type(own)], n=n, width=width, depth=depth)
+        c.fill(sources=self._sources, held=held)
         if angles:
             self._angles = np.array(angles.angles, np.int64), np.array(angles.turn, np.float64)
-            c.fill(angles=self._angles[0], turns=self._angles[1])
-            c.fill(n_angles=turned, last=self.place(turned))
+            c.fill(angles=self._angles[0], turns=self._angles[1], n_angles=turned)
         if matrix:
             c.manifold = 1 if isinstance(matrix, Projector) else 2
-            c.rows, c.rank, c.scale = rows, -1, self.place(2 * rows)
+            c.rows, c.rank = rows, -1
         self.link = None
         if link:
             self._link, self._late = link, np.zeros(DRAWN, np.int64)
@@ -223,11 +202,11 @@ class CompiledHold(Hold, State):
         if isinstance(own, Account):
             self._account = CompiledAccount(own)
             c.fill(account=self._account.c)
-            self._account.c.fill(tank=tank and tank.words)
+            self._account.c.fill(tank=tank and tank.c)
         self.room = 0
         self.grow()
         if tank and isinstance(own, PassiveSetPosition):
-            c.fill(own, "row", tank=tank.words)
+            c.fill(own, "row", tank=tank.c)
         self.address: int = ctypes.addressof(c)
 
     def join(self, holds: Iterable[CompiledHold]) -> None:

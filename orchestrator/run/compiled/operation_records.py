@@ -23,8 +23,8 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.run.bind_operations import Bound, Instruction, Stop
-from hapticlink.orchestrator.run.compiled import fmus, in_python, structures
+from hapticlink.orchestrator.run.bind_operations import Bound, Stop
+from hapticlink.orchestrator.run.compiled import fmus, structures
 from hapticlink.orchestrator.run.compiled.holds import (
     CompiledHold,
     CompiledTank,
@@ -36,7 +36,14 @@ from hapticlink.orchestrator.run.compiled.holds import (
 from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
-from hapticlink.orchestrator.run.metered_operations import Feed, Move, Read, Sample
+from hapticlink.orchestrator.run.instructions import (
+    Collect,
+    Feed,
+    Finish,
+    Instruction,
+    Move,
+    Sample,
+)
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system.system import System
@@ -167,27 +174,27 @@ class Machine:
 
     def _record(self, instruction: Instruction) -> tuple[float, ...]:
         record = self._coded(instruction)
-        if record is None:
-            self.in_python[in_python.named(instruction)] = in_python.why(
-                instruction, self._simulation
-            )
+        if isinstance(record, str):
+            first = next(iter(vars(instruction).values()), "")
+            of = f" {first}" if isinstance(first, str) and first else ""
+            self.in_python[f"{type(instruction).__name__.lower()}{of}"] = record
             return (structures.PYTHON, 0, 0, 0, 0, 0.0)
         return (*record, *(0,) * (5 - len(record)), 0.0) if len(record) < 6 else record
 
-    def _coded(self, instruction: Instruction) -> tuple[float, ...] | None:
-        """Code, a, b, c, d and x of an operation; None where it is for Python."""
+    def _coded(self, instruction: Instruction) -> tuple[float, ...] | str:
+        """Code, a, b, c, d and x of an operation; why it is carried out in Python where it is."""
         simulation, system = self._simulation, self._simulation.system
         match instruction:
-            case Get(fmu) | Read(fmu) if (index := self._fmu(fmu)) is not None:
-                return structures.GET, index, isinstance(instruction, Get)
+            case Get(fmu, judged=judged) if (index := self._fmu(fmu)) is not None:
+                return structures.GET, index, judged
             case Set(fmu, now, False) if (index := self._setter(fmu, now)) is not None:
                 return structures.SET, index
             case Step(fmu) if fmu in simulation.beside:
-                return None
-            case Step(fmu, dticks, part, parts) if (index := self._fmu(fmu)) is not None:
-                size = float(dticks * (system.timeline.base / parts))
-                over = 0 if system.fmu[fmu].sampled and parts == 1 else dticks
-                return structures.STEP, index, part * dticks, parts, over, size
+                return "the FMU runs beside the loop, in a thread"
+            case Step(fmu, dticks, part, count) if (index := self._fmu(fmu)) is not None:
+                size = float(dticks * (system.timeline.base / count))
+                over = 0 if system.fmu[fmu].sampled and count == 1 else dticks
+                return structures.STEP, index, part * dticks, count, over, size
             case Push(connection, ahead) if (index := self._hold(connection)) is not None:
                 return structures.PUSH, index, ahead
             case Evaluate(connection, ahead, 0) if (index := self._hold(connection)) is not None:
@@ -212,7 +219,20 @@ class Machine:
                 place = simulation.signals.scalar(condition.fmu, condition.variable)
                 comparison = [*COMPARISONS].index(condition.comparison)
                 return structures.STOP_WHEN, place, comparison, 0, 0, condition.value
-        return None
+            case Evaluate(order=order) if order:
+                return "the FMU takes derivatives of its inputs"
+            case Set(derivatives=True):
+                return "the FMU takes derivatives of its inputs"
+            case Push(connection) | Evaluate(connection) | Blend(connection):
+                kind = type(parts(simulation.holds[connection]).own).__name__
+                return f"there is no C for {kind}, or none that takes samples back"
+            case Collect():
+                return "its FMUs run beside the loop, in a thread"
+            case Finish():
+                return "the FMU runs in a process of its own"
+            case Get(fmu) | Set(fmu) | Step(fmu) if fmu in simulation.isolated:
+                return "the FMU runs in a process of its own"
+        return "Python repeats steps, whose operations are in C"
 
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
         """The index of an object of `kind`, made at its first use."""
@@ -241,11 +261,11 @@ class Machine:
             return None
         if any(transfer.exact for transfer in setter.transfers):
             return None
-
-        def make(index: int) -> None:
-            fmus.of_setter(setter, instance, self._setters[index], self._memory)
-
-        return self._index("setter", (name, now), make)
+        return self._index(
+            "setter",
+            (name, now),
+            lambda index: fmus.of_setter(setter, instance, self._setters[index], self._memory),
+        )
 
     def _hold(self, connection: str) -> int | None:
         hold = self._simulation.holds[connection]
@@ -295,7 +315,7 @@ class Machine:
             return run(*arguments)
         except SystemError as error:
             instruction, _ = self._bound[position.op]
-            assert isinstance(instruction, Get | Read | Set | Step)
+            assert isinstance(instruction, Get | Set | Step)
             instance = self._simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
             raise instance.raised(
@@ -318,7 +338,7 @@ class Machine:
             hold.serve(code)
             return
         else:
-            assert isinstance(instruction, Get | Read | Set | Step)
+            assert isinstance(instruction, Get | Set | Step)
             instance = simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
             if code == structures.FAILED:

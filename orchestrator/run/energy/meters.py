@@ -1,4 +1,4 @@
-"""One energy meter per power connection, updated by the gets and sets of a run (`metered`)."""
+"""One energy meter per power connection, updated by the gets and sets of a run (`instructions`)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,109 @@
+"""The instructions of a run: the operations of its plan, with what its energy meters take of these
+and where FMUs that step concurrently are waited for.
+
+Consecutive doSteps of FMUs in processes of their own run concurrently; any other operation is a
+barrier. Steps are started and awaited in the plan's order, so results and faults are those of
+sequential execution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Get, Operation, Set, Step
+from hapticlink.orchestrator.run.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The meter of a connection takes a sample of its source, stamped `ahead` of the tick."""
+
+    connection: str
+    ahead: int
+
+
+@dataclass(frozen=True)
+class Move:
+    """The meter of a connection takes the displacement of its target, `ahead` of the tick."""
+
+    connection: str
+    ahead: int
+
+
+@dataclass(frozen=True)
+class Feed:
+    """The meter of a connection takes the effort that its target holds over a `share` of a step."""
+
+    connection: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Collect:
+    """Take over what the steps beside the loop of a clock's FMUs have left."""
+
+    clock: str
+
+
+@dataclass(frozen=True)
+class Finish:
+    """Wait until the steps of FMUs in processes of their own have been taken."""
+
+    fmus: tuple[str, ...]
+
+
+Instruction = Operation | Sample | Move | Feed | Collect | Finish
+
+
+def instructions(
+    operations: Iterable[Operation], simulation: Simulation, judged: bool = True
+) -> Iterator[Instruction]:
+    """The instructions of a block. Not `judged`, outputs need not be finite."""
+    waited = {fmu for fmu in simulation.isolated if fmu not in simulation.beside}
+    return _with_barriers(_with_meters(operations, simulation, judged), waited)
+
+
+def _with_meters(
+    operations: Iterable[Operation], simulation: Simulation, judged: bool
+) -> Iterator[Instruction]:
+    """The operations, each followed by what the meters take of it, with a Collect before the first
+    outputs of a clock whose FMUs step beside the loop."""
+    meters, collected = simulation.meters, set[str]()
+    for operation in operations:
+        match operation:
+            case Get(fmu, ahead):
+                clock = simulation.beside.get(fmu)
+                if clock and clock not in collected:
+                    collected.add(clock)
+                    yield Collect(clock)
+                yield replace(operation, judged=judged)
+                yield from (Sample(c, ahead) for c in meters.of_source.get(fmu, ()))
+                yield from (Move(c, ahead) for c in meters.of_target.get(fmu, ()))
+            case Set(fmu, now=False):
+                yield operation
+                share = meters.shares.get(fmu, 1.0)
+                yield from (Feed(c, share) for c in meters.of_target.get(fmu, ()))
+            case _:
+                yield operation
+
+
+def _with_barriers(
+    instructions: Iterable[Instruction], isolated: Container[str]
+) -> Iterator[Instruction]:
+    """The instructions, with a barrier after each group of concurrent steps."""
+    stepping: list[str] = []
+    for instruction in instructions:
+        match instruction:
+            case Evaluate() | Blend() | Feed():
+                pass
+            case Set(fmu) | Step(fmu) if fmu in isolated and fmu not in stepping:
+                pass
+            case _ if stepping:
+                yield Finish(tuple(stepping))
+                stepping.clear()
+        yield instruction
+        if isinstance(instruction, Step) and instruction.fmu in isolated:
+            stepping.append(instruction.fmu)
+    if stepping:
+        yield Finish(tuple(stepping))
