@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from hapticlink.analysis.stability.bisection import largest
 from hapticlink.analysis.stability.gains import LAWS
@@ -61,9 +60,6 @@ class Margin:
     rate: float | None
     """The lowest graphics rate (Hz) down to which it is stable; infinite where it is with none."""
 
-    def record(self) -> dict[str, Any]:
-        return asdict(self)
-
 
 @dataclass(frozen=True)
 class Remedy:
@@ -73,9 +69,6 @@ class Remedy:
     options: tuple[str, ...]
     growth: float
     stable: bool
-
-    def record(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def improvements(

@@ -7,18 +7,22 @@ the right and left eigenvectors v and w; it does not depend on the units of the 
 (Perez-Arriaga, Verghese, Schweppe, IEEE Trans. Power Apparatus and Systems 101 (1982), 3117). An
 error E of A moves a simple eigenvalue by at most |w||E||v| / |w v| entry by entry, which is taken
 for its uncertainty.
+
+The argument of z is known up to whole turns only: the phase of a number c that the mode moves,
+unwrapped over the events of the period, is omega P. It is exact as long as c turns by less than
+half a turn between two events.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eig
 
 from hapticlink.analysis.stability.linearisation import Linearisation
-from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.arrays import Complex, Vector
 
 FLOOR = 1e-9
 """Relative error of the entries of A by rounding."""
@@ -88,6 +92,20 @@ def modes(linear: Linearisation, period: float) -> list[Mode]:
             )
         )
     return sorted(found, key=lambda mode: -abs(mode.z))
+
+
+def with_turns(mode: Mode, path: Complex, period: float) -> Mode:
+    """The mode with the frequency of a number that moves along `path` in a period (s)."""
+    path = path[np.abs(path) > 0]
+    if len(path) < 2:
+        return mode
+    if mode.z.imag == 0.0:  # a real mode changes its sign at half turns
+        turns = np.count_nonzero(np.diff(np.sign(path.real))) / 2
+        return replace(mode, omega=2 * np.pi * turns / period)
+    whole = np.unwrap(np.angle(path))[-1] - np.angle(path[0])
+    argument = np.angle(mode.z)
+    turns = np.round((whole - argument) / (2 * np.pi))
+    return replace(mode, omega=abs(argument + 2 * np.pi * turns) / period)
 
 
 def leading(mode: Mode, names: Sequence[str], most: int = 3) -> list[tuple[str, float]]:

@@ -93,7 +93,7 @@ class StateVector:
         return Template(
             {name: simulation.instances[name].serialized() for name in self._taken},
             simulation.signals.values.copy(),
-            [_copied(vars(hold), _same) for hold in self._holds.values()],
+            [_copied(vars(hold), np.copy) for hold in self._holds.values()],
         )
 
     def restore(self, template: Template) -> None:
@@ -101,7 +101,7 @@ class StateVector:
             self._simulation.instances[name].deserialize(template.fmus[name])
         self._simulation.signals.values[:] = template.signals
         for hold, kept in zip(self._holds.values(), template.holds, strict=True):
-            vars(hold).update(_copied(kept, _same))
+            vars(hold).update(_copied(kept, np.copy))
 
     def put(self, template: Template, numbers: Vector) -> None:
         """Restores `template` with other numbers."""
@@ -131,8 +131,7 @@ class StateVector:
             doubles(instances[name].serialized())[taken] for name, taken in self._taken.items()
         ]
         parts.append(self._simulation.signals.values)
-        for hold in self._holds.values():
-            parts += _floats(vars(hold))
+        parts += (value.ravel() for h in self._holds.values() for _, value in _floats(vars(h)))
         return np.concatenate(parts)
 
     def ages(self, of: Callable[[dict[str, Any]], Any]) -> tuple[Any, ...]:
@@ -153,7 +152,7 @@ class StateVector:
         parts = [doubles(template.fmus[name])[taken] for name, taken in self._taken.items()]
         parts.append(template.signals)
         for kept in template.holds:
-            parts.append(np.concatenate([np.zeros(0), *_floats(kept)]))
+            parts.append(np.concatenate([[], *(value.ravel() for _, value in _floats(kept))]))
         return parts
 
     def coordinates(self, template: Template) -> list[Coordinate]:
@@ -171,7 +170,7 @@ class StateVector:
         further = range(len(outputs), len(template.signals))
         coordinates += outputs + [Coordinate("held values", f"[{i}]", "signal") for i in further]
         for owner, kept in zip(self._holds, template.holds, strict=True):
-            for path, value in _named(kept, ""):
+            for path, value in _floats(kept, ""):
                 entries = [f"[{i + 1}]" for i in range(value.size)] if value.ndim else [""]
                 coordinates += [Coordinate(owner, path.strip(".") + e, "hold") for e in entries]
         return coordinates
@@ -225,10 +224,6 @@ def doubles(state: bytes) -> Vector:
     return np.frombuffer(state, offset=len(state) % 8)
 
 
-def _same(value: Vector) -> Vector:
-    return value.copy()
-
-
 def _copied(value: Any, take: Take) -> Any:
     """A copy of nested containers and of the parts of holds, with `take` applied to every number
     that is a float; what cannot change, functions and shared tanks stay as they are."""
@@ -252,41 +247,20 @@ def _copied(value: Any, take: Take) -> Any:
     return value if callable(value) else deepcopy(value)
 
 
-def _floats(value: Any) -> Iterator[Vector]:
-    """The floats of what `_copied` copies, in its order."""
+def _floats(value: Any, path: str | None = None) -> Iterator[tuple[str, Vector]]:
+    """The floats of what `_copied` copies, in its order and shape, and the place of each, which is
+    not written out for the path None."""
     match value:
-        case int() | str() | None | NearEnd():
-            pass
-        case np.ndarray():
-            if value.dtype.kind == "f":
-                yield value.ravel()
+        case np.ndarray() if value.dtype.kind == "f":
+            yield path or "", value
         case float():
-            yield np.array([value])
+            yield path or "", np.array(value)
         case dict():
             for k, v in value.items():
                 if k not in COUNTED:
-                    yield from _floats(v)
-        case list() | tuple() | deque():
-            for v in value:
-                yield from _floats(v)
-        case Hold() | History() | Link():
-            yield from _floats(vars(value))
-
-
-def _named(value: Any, path: str) -> Iterator[tuple[str, Vector]]:
-    """`_floats` with the place of each, in the shape that it has there."""
-    match value:
-        case int() | str() | None | NearEnd():
-            pass
-        case np.ndarray() | float():
-            if np.asarray(value).dtype.kind == "f":
-                yield path, np.asarray(value)
-        case dict():
-            for k, v in value.items():
-                if k not in COUNTED:
-                    yield from _named(v, f"{path}.{k}")
+                    yield from _floats(v, None if path is None else f"{path}.{k}")
         case list() | tuple() | deque():
             for i, v in enumerate(value, 1):
-                yield from _named(v, f"{path}[{i}]")
+                yield from _floats(v, None if path is None else f"{path}[{i}]")
         case Hold() | History() | Link():
-            yield from _named(vars(value), path)
+            yield from _floats(vars(value), path)

@@ -16,6 +16,7 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,7 @@ def judged(seed: int, poses: int = 3) -> dict[str, Any]:
     decided = found.in_hands not in ("drifts", "marginal") and not slow
     row["right"] = row["run"] == says if decided else "not decided"
     if found.remedy:
-        row["remedy"] = found.remedy.record()
+        row["remedy"] = asdict(found.remedy)
         pairs = dict(option.split("=", 1) for option in found.remedy.options)
         remedied = options | {key: _value(value) for key, value in pairs.items()}
         row["run_remedied"] = run_case(name, remedied, found, case)
