@@ -70,8 +70,8 @@ def job(
 def key(scene: Scene) -> str:
     """SHA-256 of everything that a run depends on: the resolved scene, its FMU files, versions and
     sources, also those of plugins. Raises InputFault for an FMU file that cannot be read."""
-    versions = [*computed_with(), plugins.loaded()]
-    whole: dict[str, Any] = {"scene": scene.plain(), "made_with": versions}
+    computed_with = [*_computed_with(), plugins.loaded()]
+    whole: dict[str, Any] = {"scene": scene.plain(), "made_with": computed_with}
     try:
         paths = [Path(f.path) for f in scene.fmu if f.path]
         files = [sha256(path.read_bytes()).hexdigest() for path in paths]
@@ -81,7 +81,7 @@ def key(scene: Scene) -> str:
 
 
 @cache
-def computed_with() -> list[str]:
+def _computed_with() -> list[str]:
     """What computes a row: Python, packages and sources, in C too, but nothing that only draws."""
     code = sources(
         hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.analysis

@@ -18,7 +18,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import util
-from multiprocessing.context import BaseContext, SpawnContext, SpawnProcess
+from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.process import BaseProcess
 from types import ModuleType
 from typing import Any
@@ -49,7 +49,7 @@ def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
 def _spread(work: Work, queue: deque[Job], count: int) -> Generator[Done, None, list[Job]]:
     """Runs jobs from `queue` until it is empty; if a process dies, returns the jobs in progress."""
     in_progress: dict[Future[Row], Job] = {}
-    with _context() as context, _executor(min(count, len(queue)), context) as pool:
+    with _executor(min(count, len(queue))) as pool:
         while queue or in_progress:
             try:
                 while queue and len(in_progress) < count:
@@ -66,18 +66,16 @@ def _spread(work: Work, queue: deque[Job], count: int) -> Generator[Done, None, 
     return []
 
 
-class _Worker(BaseProcess):
-    """A process that does not import the caller's main script, as it would by default: a script
-    needs no `if __name__ == "__main__"`, and need not be a file."""
+class _Worker(SpawnProcess):
+    """A spawned process that does not import the caller's main script, as it would by default: a
+    script needs no `if __name__ == "__main__"`, and need not be a file."""
 
-    _started_by: Callable[[BaseProcess], Any]
-
-    @classmethod
-    def _Popen(cls, process: BaseProcess) -> Any:
+    @staticmethod
+    def _Popen(process: BaseProcess) -> Any:
         main = sys.modules["__main__"]
         sys.modules["__main__"] = ModuleType("__main__")
         try:
-            return cls._started_by(process)
+            return SpawnProcess._Popen(process)
         finally:
             sys.modules["__main__"] = main
 
@@ -87,48 +85,8 @@ class _Worker(BaseProcess):
         leave_threads(0)
 
 
-class _Spawned(_Worker, SpawnProcess):
-    """One that imports what it needs."""
-
-    _started_by = SpawnProcess._Popen
-
-
-if sys.platform != "win32":
-    from multiprocessing.context import ForkServerContext, ForkServerProcess
-
-    class _Forked(_Worker, ForkServerProcess):
-        """One that is a fork of the server."""
-
-        _started_by = ForkServerProcess._Popen
-
-
 @contextmanager
-def _context() -> Iterator[BaseContext]:
-    """How processes are started, without a fork of the caller, whose FMUs hold threads and
-    libraries: on Linux as forks of a server that has imported once what all of them need, elsewhere
-    and where the caller has such a server of its own by an import each."""
-    if sys.platform == "linux":
-        from multiprocessing import forkserver
-
-        server: Any = forkserver._forkserver  # which Python has no public way to end
-        if server._forkserver_pid is None:
-            before = server._preload_modules
-            server.set_forkserver_preload([f"{__package__}.preloaded"])
-            try:
-                served: Any = ForkServerContext()
-                served.Process = _Forked
-                yield served
-            finally:
-                server.set_forkserver_preload(before)
-                server._stop()
-            return
-    spawned: Any = SpawnContext()
-    spawned.Process = _Spawned
-    yield spawned
-
-
-@contextmanager
-def _executor(count: int, context: BaseContext) -> Iterator[ProcessPoolExecutor]:
+def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
     before = set(multiprocessing.active_children())
 
     def kill() -> None:
@@ -138,6 +96,8 @@ def _executor(count: int, context: BaseContext) -> Iterator[ProcessPoolExecutor]
         util._run_finalizers(0)  # type: ignore[attr-defined]  # its semaphores, else warned of
 
     interrupt.add(kill)
+    context = SpawnContext()  # FMUs hold threads and libraries: no fork
+    context.Process = _Worker  # type: ignore[misc]
     pool = ProcessPoolExecutor(
         count, mp_context=context, initializer=_follow, max_tasks_per_child=RUNS
     )
