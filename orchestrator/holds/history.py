@@ -100,9 +100,10 @@ class Transition(OfSamples):
         return self._chosen(self.laws, tick, ahead)
 
     def _chosen(self, laws: tuple[Law, ...], tick: int, ahead: float) -> Vector:
-        several = len(self.samples) > 1
-        reached = several and _ARGUMENTS["r"](self, tick, ahead) >= 1.0
-        return self.evaluated(laws[several + reached], tick, ahead)
+        which = len(self.samples) - 1
+        if which and _ARGUMENTS["r"](self, tick, ahead) >= 1.0:
+            which = 2
+        return self.evaluated(laws[which], tick, ahead)
 
 
 _ARGUMENTS: dict[str, Callable[[Any, int, float], Value]] = {
