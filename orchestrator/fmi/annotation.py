@@ -18,8 +18,7 @@ none of it, whatever its ports are called; any FMU may carry it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 from xml.etree.ElementTree import Element
 
 from hapticlink.components.ports import Kind, Power, Spring
@@ -32,17 +31,23 @@ if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
     from hapticlink.components.component import Timing
 
 TIMINGS = ("continuous", "sampled")
+SPRING_ENDS = {
+    "set_position": ("input",),
+    "position": ("input", "output"),
+    "set_velocity": ("input",),
+    "velocity": ("input", "output"),
+    "force": ("output",),
+}
+"""The ports of a spring-damper, and what they may be."""
 
 
-@dataclass(frozen=True)
-class Annotation:
-    """What an FMU declares: kinds by output port, power by input port; timing None if
-    undeclared. states: names of the states that a serialised FMU state ends with, None if
-    undeclared."""
+class Annotation(NamedTuple):
+    """What an FMU declares, as in `Description`."""
 
-    timing: Timing | None = None
-    kinds: Mapping[str, Kind] = field(default_factory=dict)
-    power: Mapping[str, Power] = field(default_factory=dict)
+    kinds: Mapping[str, Kind]
+    power: Mapping[str, Power]
+    timing: Timing = "continuous"
+    declares_timing: bool = False
     springs: tuple[Spring, ...] = ()
     states: tuple[str, ...] | None = None
 
@@ -56,7 +61,7 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
     """The annotation of an FMU, empty if it has none. Raises ValueError if it is malformed, or does
     not fit the variables and their units."""
     if (declared := block(tree)) is None:
-        return Annotation()
+        return Annotation({}, {})
     timing: Any = declared.get("timing")
     if timing is not None:
         _one_of(timing, "timing", TIMINGS)
@@ -76,7 +81,7 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
             kinds[name] = ports.kind(element)
         else:
             power[name] = ports.power(element)
-    return Annotation(timing, kinds, power, tuple(springs), states)
+    return Annotation(kinds, power, timing or "continuous", bool(timing), tuple(springs), states)
 
 
 class _Ports:
@@ -107,15 +112,10 @@ class _Ports:
         needed = "set_position position stiffness"
         spring = Spring(**_attributes(element, needed, "damping set_velocity velocity force"))
         size = len(self._entries(spring.set_position, "input"))
-        self._entries(spring.position, "input", "output", size=size)
-        for parameter in filter(None, (spring.stiffness, spring.damping)):
-            self._entries(parameter, "parameter", size=size)
-        if spring.set_velocity:
-            self._entries(spring.set_velocity, "input", size=size)
-        if spring.velocity:
-            self._entries(spring.velocity, "input", "output", size=size)
-        if spring.force:
-            self._entries(spring.force, "output", size=size)
+        gains = dict.fromkeys(("stiffness", "damping"), ("parameter",))
+        for name, causalities in (SPRING_ENDS | gains).items():
+            if port := getattr(spring, name):
+                self._entries(port, *causalities, size=size)
         return spring
 
     def _entries(self, name: str, *causalities: str, size: int = 0) -> list[Scalar]:

@@ -128,29 +128,20 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         _require_binary(archive, model.coSimulation.modelIdentifier, version)
         require_whole(archive)
     try:
-        declared = annotation.read(tree, variables.scalars, variables.units)
+        declared = annotation.read(tree, variables["scalars"], variables["units"])
     except ValueError as error:
         raise InputFault(f"{path}: its hapticlink annotation cannot be used: {error}") from error
     capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]
     return Description(
-        path,
-        model.guid,
-        model.coSimulation.modelIdentifier,
-        declared.timing or "continuous",
-        variables.scalars,
-        version,
-        variables.units,
-        frozenset(capable),
-        model.defaultExperiment and model.defaultExperiment.stepSize,
-        dependencies=variables.dependencies,
-        strings=variables.texts,
-        derivatives=variables.derivatives,
-        kinds=declared.kinds,
-        power=declared.power,
-        springs=declared.springs,
-        states=declared.states,
-        declares_timing=declared.timing is not None,
+        path=path,
+        guid=model.guid,
+        identifier=model.coSimulation.modelIdentifier,
+        fmi=version,
+        flags=frozenset(capable),
+        step_size=model.defaultExperiment and model.defaultExperiment.stepSize,
         block=None if annotation.block(tree) is None else model.modelName,
+        **variables,
+        **declared._asdict(),
     )
 
 
@@ -174,18 +165,10 @@ def _resized(tree: ElementTree.Element, sizes: Mapping[str, int]) -> bytes:
     return ElementTree.tostring(tree)
 
 
-@dataclass(frozen=True)
-class _Variables:
+def _variables(
+    tree: ElementTree.Element, model: Any, version: str, *, resized: bool
+) -> dict[str, Any]:
     """What ModelVariables, UnitDefinitions and ModelStructure say, as in `Description`."""
-
-    scalars: tuple[Scalar, ...]
-    texts: tuple[Scalar, ...]
-    units: dict[str, Unit]
-    derivatives: dict[str, str]
-    dependencies: dict[str, frozenset[str]]
-
-
-def _variables(tree: ElementTree.Element, model: Any, version: str, *, resized: bool) -> _Variables:
     require_countable(model)
     relative, bounded = differences(tree), annotation.block(tree) is not None
     scalars = tuple(
@@ -194,15 +177,20 @@ def _variables(tree: ElementTree.Element, model: Any, version: str, *, resized: 
         for s in numbers(v, version, v.name in relative, bounded=bounded, resized=resized)
     )
     written = ("String", "Binary")
-    texts = tuple(text(v) for v in model.modelVariables if v.type in written and not v.shape)
-    require_unique(s.name for s in (*scalars, *texts))
+    strings = tuple(text(v) for v in model.modelVariables if v.type in written and not v.shape)
+    require_unique(s.name for s in (*scalars, *strings))
     dependencies = {
         output.variable.name: frozenset(v.name for v in output.dependencies)
         for output in model.outputs
         if output.dependencies is not None
     }
-    units = {u.name: _unit(u) for u in model.unitDefinitions}
-    return _Variables(scalars, texts, units, derivatives(model), dependencies)
+    return {
+        "scalars": scalars,
+        "strings": strings,
+        "units": {u.name: _unit(u) for u in model.unitDefinitions},
+        "derivatives": derivatives(model),
+        "dependencies": dependencies,
+    }
 
 
 def _only_xml(text: bytes) -> BytesIO:

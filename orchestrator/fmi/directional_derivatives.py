@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
-
-Matrix = NDArray[np.float64]
 
 
 def derivatives(

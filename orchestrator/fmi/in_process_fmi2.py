@@ -29,7 +29,7 @@ from hapticlink.orchestrator.fmi.input_derivatives import Varying
 from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.load_library import loaded
 from hapticlink.orchestrator.fmi.retry import Retry
-from hapticlink.orchestrator.fmi.setter import Places, Setter
+from hapticlink.orchestrator.fmi.setter import Setter, Setting
 from hapticlink.orchestrator.fmi.start_values import Starts, wide
 from hapticlink.orchestrator.fmi.states import WithStates
 from hapticlink.orchestrator.fmi.status import (
@@ -90,7 +90,7 @@ class InProcess(WithStates):
             return self._settled(status, time)
 
         self._advance: Callable[[float, float], int] = advance
-        if self.policy.discard == "retry" and Retry.possible(self.description):
+        if self.policy.discard == "retry" and not Retry.why_not(self.description):
             self.retry = Retry(self.slave, self.description.fmi, self.place, advance)
             self._advance = self.retry.step
 
@@ -159,7 +159,7 @@ class InProcess(WithStates):
         setting = self._setting([scalars[i] for i in order], exact)
         self._setters += self.description.block is not None
         set_all = partial(self._carry_out, counted="sets")
-        return Setter(where, conversions, *setting, set_all, self.place, self._setters)
+        return Setter(where, conversions, setting, set_all, self.place, self._setters)
 
     def _carry_out(
         self, transfers: Sequence[Transfer], counted: str, passing: bool = False
@@ -183,16 +183,14 @@ class InProcess(WithStates):
         if self.retry:
             self.retry.renew = varying.renew
 
-        def set_from(board: Vector) -> None:
+        def set_from(signals: Vector) -> None:
             self.place.setter = 0  # the inputs move on from what was set
-            if not self.ended and not succeeded(status := varying.set(board)):
+            if not self.ended and not succeeded(status := varying.set(signals)):
                 raise self.failed(varying.name, status)
 
         return set_from
 
-    def _setting(
-        self, scalars: Sequence[Scalar], exact: Mapping[str, int]
-    ) -> tuple[Vector, Places | None, list[Transfer]]:
+    def _setting(self, scalars: Sequence[Scalar], exact: Mapping[str, int]) -> Setting:
         """`whole`, `into` and `transfers` of a Setter of `scalars`."""
         values = np.zeros(len(scalars))
         return values, None, self._transfers("Set", scalars, values, exact)

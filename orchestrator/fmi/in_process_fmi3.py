@@ -13,12 +13,10 @@ import numpy as np
 from fmpy import fmi3
 
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
-from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.messages import keep
-from hapticlink.orchestrator.fmi.setter import Places
+from hapticlink.orchestrator.fmi.setter import Setting
 from hapticlink.orchestrator.fmi.start_values import wide
 from hapticlink.orchestrator.fmi.status import succeeded
-from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 
@@ -57,9 +55,7 @@ class InProcess3(InProcess):
                 raise self._fault(what, time)
         return status
 
-    def _setting(
-        self, scalars: Sequence[Scalar], exact: Mapping[str, int]
-    ) -> tuple[Vector, Places | None, list[Transfer]]:
+    def _setting(self, scalars: Sequence[Scalar], exact: Mapping[str, int]) -> Setting:
         """Arrays are set as a whole: entries that are not connected keep their start values. Raises
         FmuFault if such an entry has none, because its array was resized."""
         references = {s.reference for s in scalars}
@@ -95,3 +91,7 @@ class InProcess3(InProcess):
             self._call("fmi3ExitConfigurationMode")
         self._set_starts()
         self._call("fmi3EnterInitializationMode", False, 0.0, 0.0, True, stop_time)
+
+
+IN_PROCESS = {"2": InProcess, "3": InProcess3}
+"""The class of an FMU in this process, by version of FMI."""

@@ -9,13 +9,11 @@ from math import factorial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.status import succeeded
 from hapticlink.orchestrator.fmi.transfer import transfers
 from hapticlink.orchestrator.fmi.variables import Scalar
-
-Vector = NDArray[np.float64]
 
 
 class Varying:
@@ -47,9 +45,9 @@ class Varying:
             ctypes.c_void_p(self._now[constant:].ctypes.data),
         )
 
-    def set(self, board: Vector) -> int:
+    def set(self, signals: Vector) -> int:
         """Set the derivatives; the values are set together with all other inputs."""
-        self._first[:] = self._now[:] = board[self._places] * self._factors + self._offsets
+        self._first[:] = self._now[:] = signals[self._places] * self._factors + self._offsets
         return self._set_derivatives()
 
     def renew(self, elapsed: float) -> int:

@@ -10,11 +10,10 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.faults import Diverged, Fault, FmuFault
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.instance_location import Place
 from hapticlink.orchestrator.fmi.output_bounds import Bounds
@@ -22,8 +21,6 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:  # a worker process need not load what reads scenes
     from hapticlink.orchestrator.fmi.start_values import Starts
-
-Vector = NDArray[np.float64]
 
 
 class Instance(ABC):

@@ -100,20 +100,21 @@ class Isolated(Instance):
     # --- the calls of a run ---------------------------------------------------------------
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
-        return self._remote(self._ask("connect", list(scalars)), places)
+        return self._remote(self._ask("connect", "connect", list(scalars)), places)
 
     def connect_derivatives(
         self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
     ) -> Callable[[Vector], None]:
-        return self._remote(self._ask("connect_derivatives", list(scalars), list(orders)), places)
+        asked = "connect_derivatives", list(scalars), list(orders)
+        return self._remote(self._ask("connect", *asked), places)
 
     def _remote(self, key: int, places: Sequence[int]) -> Callable[[Vector], None]:
         """A function that queues the values at `places` for the setter `key` of the worker."""
         where = np.array(places, dtype=np.intp)
 
-        def set_from(board: Vector) -> None:
+        def set_from(signals: Vector) -> None:
             if not self.ended:
-                self._pending.append((key, board[where].tobytes()))
+                self._pending.append((key, signals[where].tobytes()))
 
         return set_from
 

@@ -59,10 +59,6 @@ class Retry:
         self.saved = [Saved(slave, fmi, place) for _ in range(HALVINGS + 1)]
 
     @staticmethod
-    def possible(description: Description) -> bool:
-        return not Retry.why_not(description)
-
-    @staticmethod
     def why_not(description: Description) -> str:
         """The reason why an FMU cannot repeat a step in smaller ones, "" if it can."""
         if description.timing == "sampled":

@@ -7,16 +7,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.instance_location import Place
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.units import SAME, Linear
 
-Vector = NDArray[np.float64]
-Places = NDArray[np.intp]
+Setting = tuple[Vector, NDArray[np.intp] | None, Sequence[Transfer]]
+"""`whole`, `into` and `transfers` of a Setter."""
 
 
 class Setter:
-    """values[i] = factors[i] board[where[i]] + offsets[i], then the calls of `transfers`, unless
+    """values[i] = factors[i] signals[where[i]] + offsets[i], then the calls of `transfers`, unless
     the FMU has these values: inputs keep theirs (FMI 2.0.5 section 2.1.7).
 
     place: of the FMU. key: of this among the setters of the FMU, 0 where the FMU may change its
@@ -29,28 +30,26 @@ class Setter:
         self,
         where: Sequence[int],
         conversions: Sequence[Linear],
-        whole: Vector,
-        into: Places | None,
-        transfers: Sequence[Transfer],
+        setting: Setting,
         carry_out: Callable[[Sequence[Transfer]], None],
         place: Place,
         key: int,
     ) -> None:
         self.place, self.key, self._before = place, key, b""
-        self.where, self.whole, self.into = np.array(where, dtype=np.intp), whole, into
-        self.values = whole if into is None else np.zeros(len(where))
+        self.where, self._carry_out = np.array(where, dtype=np.intp), carry_out
+        self.whole, self.into, self.transfers = setting
+        self.values = self.whole if self.into is None else np.zeros(len(where))
         self.factors: Vector | None = None
         self.offsets: Vector | None = None
         if any(c != SAME for c in conversions):
             self.factors = np.array([c.factor for c in conversions])
             self.offsets = np.array([c.offset for c in conversions])
-        self.transfers, self._carry_out = transfers, carry_out
 
-    def __call__(self, board: Vector) -> None:
+    def __call__(self, signals: Vector) -> None:
         if self.place.ended:
             return
         # "raise" would copy through a buffer.
-        board.take(self.where, out=self.values, mode="clip")
+        signals.take(self.where, out=self.values, mode="clip")
         if self.factors is not None and self.offsets is not None:
             self.values.__imul__(self.factors).__iadd__(self.offsets)
         before, self._before = self._before, self.values.tobytes()

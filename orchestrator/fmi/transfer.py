@@ -9,12 +9,11 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.start_values import WIDE
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
-Vector = NDArray[np.float64]
 _IN_C: dict[str, type[np.generic]] = {
     "Real": np.float64, "Integer": np.int32,
     "Float64": np.float64, "Float32": np.float32,
@@ -43,31 +42,25 @@ class Transfer:
         fmi: str,
         verb: str,
         scalars: Sequence[Scalar],
-        type_: str,
         values: Vector,
-        places: Sequence[int],
         exact: Mapping[str, int],
     ) -> None:
-        chosen = [i for i, s in enumerate(scalars) if s.type == type_]
+        self.values, self.type, self.fmi = values, (type_ := scalars[0].type), fmi
         self.name = f"fmi{fmi}{verb}{type_}"
-        self.values = values[places[chosen[0]] : places[chosen[-1]] + 1]
-        self.type, self.fmi = type_, fmi
         in_c = _IN_C.get(type_) or _BOOLEAN[fmi]
         self._boolean, self._whole = type_ == "Boolean", np.issubdtype(in_c, np.integer)
         if self._whole:
             self._limits = np.iinfo(in_c)
             self._named = f"{type_} holds {self._limits.min} to {self._limits.max}"
-            self._names = [scalars[i].name for i in chosen]
+            self._names = [s.name for s in scalars]
         self.exact = [
-            (k, exact[scalars[i].name])
-            for k, i in enumerate(chosen)
-            if type_ in WIDE and scalars[i].name in exact
+            (k, exact[s.name]) for k, s in enumerate(scalars) if type_ in WIDE and s.name in exact
         ]
         self._wide = type_ in WIDE
         direct = in_c is np.float64
-        self.buffer: Any = self.values if direct else np.zeros(len(chosen), in_c)
-        references = [scalars[i].reference for i in chosen if scalars[i].entry == 0]
-        count = [ctypes.c_size_t(len(chosen))] * (fmi == "3")
+        self.buffer: Any = self.values if direct else np.zeros(len(values), in_c)
+        references = [s.reference for s in scalars if s.entry == 0]
+        count = [ctypes.c_size_t(len(values))] * (fmi == "3")
         self.function, self.component = slave.dll[self.name], slave.component
         self.references = (ctypes.c_uint * len(references))(*references)
         # Argument objects and pointers are made once; a fresh function has no other types set.
@@ -129,6 +122,11 @@ def transfers(
 ) -> list[Transfer]:
     """One transfer per FMI type. `scalars` are sorted by type, those of a type side by side at
     their `places` in `values`, by default from the first on."""
-    places = range(len(scalars)) if places is None else places
-    present = [t for t in TYPES if any(s.type == t for s in scalars)]
-    return [Transfer(slave, fmi, verb, scalars, t, values, places, exact) for t in present]
+    several = []
+    for type_ in TYPES:
+        chosen = [i for i, s in enumerate(scalars) if s.type == type_]
+        if chosen:
+            first, last = (i if places is None else places[i] for i in (chosen[0], chosen[-1]))
+            of_type = [scalars[i] for i in chosen]
+            several.append(Transfer(slave, fmi, verb, of_type, values[first : last + 1], exact))
+    return several

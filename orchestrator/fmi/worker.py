@@ -16,8 +16,8 @@ import numpy as np
 
 from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
 from hapticlink.orchestrator.base.process_end import leave_threads
+from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
@@ -47,12 +47,9 @@ class Worker:
         self._instance = kind(name, description, np.zeros(outputs), starts, policy, folder)
         self.instance.__enter__()
 
-    def connect(self, scalars: Any) -> int:
-        self._setters.append(self.instance.connect(scalars, range(len(scalars))))
-        return len(self._setters) - 1
-
-    def connect_derivatives(self, scalars: Any, orders: Any) -> int:
-        setter = self.instance.connect_derivatives(scalars, orders, range(len(scalars)))
+    def connect(self, call: str, scalars: Any, *orders: Any) -> int:
+        """The key of the setter that `call` of the instance gives."""
+        setter = getattr(self.instance, call)(scalars, *orders, range(len(scalars)))
         self._setters.append(setter)
         return len(self._setters) - 1
 

@@ -12,6 +12,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
@@ -197,13 +199,14 @@ class Binder:
             return lambda tick: hold.push(tick + ahead, view, tick + simulation.late)
         return lambda tick: hold.push(tick + ahead, values[sources], tick + simulation.late)
 
+    def _held(self, connection: str) -> tuple[Hold, Vector]:
+        """The hold of a connection, and where its value stands among the signals."""
+        signals = self._simulation.signals
+        return self._simulation.holds[connection], signals.values[signals.hold(connection)]
+
     def _evaluate(self, connection: str, ahead: float) -> Call:
         """Writes the hold's value `ahead` ticks after the event to the target's held input."""
-        simulation = self._simulation
-        hold, view = (
-            simulation.holds[connection],
-            simulation.signals.values[simulation.signals.hold(connection)],
-        )
+        simulation, (hold, view) = self._simulation, self._held(connection)
 
         def evaluate(tick: int) -> None:
             late = simulation.late
@@ -215,13 +218,8 @@ class Binder:
         """Writes the hold's value at the beginning of a step of `width` ticks, the derivatives
         there up to `order`, and the mean over the step, from the polynomial through order + 1
         equidistant values."""
-        simulation = self._simulation
-        hold, values, signals = (
-            simulation.holds[connection],
-            simulation.signals.values,
-            simulation.signals,
-        )
-        view, span = values[signals.hold(connection)], signals.derivatives(connection)
+        simulation, (hold, view) = self._simulation, self._held(connection)
+        values, span = simulation.signals.values, simulation.signals.derivatives(connection)
         derived, mean = values[span], values[span.stop : span.stop + len(view)]
         instants = [ahead + i * width / order for i in range(order + 1)]
         seconds = simulation.seconds(width)
@@ -237,11 +235,7 @@ class Binder:
 
     def _blend(self, connection: str, points: tuple[tuple[float, Fraction], ...]) -> Call:
         """Writes a weighted sum of the hold's values at several instants."""
-        simulation = self._simulation
-        hold, view = (
-            simulation.holds[connection],
-            simulation.signals.values[simulation.signals.hold(connection)],
-        )
+        simulation, (hold, view) = self._simulation, self._held(connection)
         pairs = [(weight, float(ahead)) for weight, ahead in points]
 
         def blend(tick: int) -> None:

@@ -38,10 +38,10 @@ def _ports(fmu: Fmu, names: set[str]) -> set[str]:
     return {s.port for s in fmu.description.outputs if f"{fmu.name}.{s.name}" in names}
 
 
-def _with(fmu: Fmu, often: set[str], rows: set[str], apart: bool) -> Fmu:
-    """The FMU with these outputs; `apart`, those for rows alone come after the others."""
+def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
+    """The FMU with these outputs; `separate`, those for rows alone come after the others."""
     outputs = [s for s in fmu.description.outputs if s.port in often | rows]
-    seldom = frozenset(s.name for s in outputs if apart and s.port not in often)
+    seldom = frozenset(s.name for s in outputs if separate and s.port not in often)
     outputs.sort(key=lambda s: s.name in seldom)
     others = [s for s in fmu.description.scalars if s.causality != "output"]
     return replace(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -23,13 +22,11 @@ from hapticlink.orchestrator.system.system import Connection, System
 
 def total(counts: Iterable[Iterations]) -> Iterations | None:
     """The counts of all loops of a run together; None where it has none."""
-    found = None
-    for c in counts:
-        found = found or Iterations()
-        for name, value in vars(c).items():
-            merged = max if name == "max_iterations" else operator.add
-            setattr(found, name, merged(getattr(found, name), value))
-    return found
+    every = [vars(c) for c in counts]
+    if not every:
+        return None
+    summed = {name: sum(c[name] for c in every) for name in every[0]}
+    return Iterations(**summed | {"max_iterations": max(c["max_iterations"] for c in every)})
 
 
 class Unconverged(Fault):

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from hapticlink.orchestrator.base.faults import Fault, shortened
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.hold import Hold, Vector
 from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run import spring_holds
-from hapticlink.orchestrator.run.checked_hold import CheckedHold
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import SetSpring
@@ -110,3 +110,30 @@ def _context(
         row = of.ports.index(f"{connection.target}.{connection.target_port}")
         tank = shared[of], row
     return HoldContext(size, system.timeline.seconds, moved, moving, tank)
+
+
+class CheckedHold(Hold):
+    """Wraps a hold of a plugin; those of the package have tests instead. A value that is no vector
+    of `size` finite numbers is a Fault, which names the hold and its connection."""
+
+    def __init__(self, hold: Hold, size: int, name: str, connection: str) -> None:
+        self._hold, self._size = hold, size
+        self._name, self._connection = name, connection
+
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
+        self._hold.push(stamp, sample, arrival)
+
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
+        value = self._hold.value(tick, ahead)
+        if (
+            not isinstance(value, np.ndarray)
+            or value.shape != (self._size,)
+            or value.dtype.kind not in "fiu"
+            or not np.isfinite(value).all()
+        ):
+            raise Fault(
+                f"hold {self._name!r} of {self._connection}: its value is "
+                f"{shortened(' '.join(repr(value).split()))}, where {self._size} finite numbers in "
+                "a NumPy array are needed"
+            )
+        return value

@@ -7,9 +7,9 @@ from contextlib import ExitStack
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.capabilities import NEEDS_TOOL
+from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
-from hapticlink.orchestrator.fmi.versions import IN_PROCESS
 from hapticlink.orchestrator.run.python_modules import bundled, clashes
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import Fmu, System

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
@@ -80,24 +80,15 @@ def document(
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
     below, below_places = document(base_text, base, where, so_far, base)
     below = dropping.taken(below, dropped, lambda message: refuse(message, "drop"))
-    replaced = set(_replaced(below, data))
+    replaced: set[Path] = set()
+    merged = _merged(below, data, replaced)
     inherited = {
         path: place
         for path, place in below_places.items()
         if toml_keys.value(below, path) is not None
         and not any(path[:i] in replaced for i in range(1, len(path) + 1))
     }
-    return _merged(below, data), inherited | places
-
-
-def _replaced(base: Mapping[str, Any], top: Mapping[str, Any], above: Path = ()) -> Iterator[Path]:
-    """The paths at which the value of `top` replaces that of `base` instead of merging."""
-    for key, value in top.items():
-        below = base.get(key)
-        if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
-            yield from _replaced(below, value, (*above, key))
-        else:
-            yield (*above, key)
+    return merged, inherited | places
 
 
 def with_family(
@@ -116,17 +107,21 @@ def with_family(
         finding = Finding(".".join(map(str, error.path)), error.message, line, option, file)
         raise SceneFault(name, [finding]) from None
     others = {k: v for k, v in linkage.items() if k not in families.ARGUMENTS}
-    return {**data, "linkage": _merged(expanded, others)}
+    return {**data, "linkage": _merged(expanded, others, set())}
 
 
-def _merged(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
+def _merged(
+    base: dict[str, Any], top: Mapping[str, Any], replaced: set[Path], above: Path = ()
+) -> dict[str, Any]:
     """`top` over `base`: tables merge key by key; other values of `top`, and tables of another
-    `type`, replace those of `base`."""
+    `type`, replace those of `base`, at paths which are added to `replaced`."""
     merged = dict(base)
     for key, value in top.items():
         below = base.get(key)
         if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
-            value = _merged(below, value)
+            value = _merged(below, value, replaced, (*above, key))
+        else:
+            replaced.add((*above, key))
         merged[key] = value
     return merged
 

@@ -49,8 +49,8 @@ def tables(path: Path) -> dict[str, Any]:
         names = _names(part.place for part in system if part.source is not None)
         with _room() as room:
             described = _described(path, archive, system, room)
-        apart = Wires(path, _unconnected(system), described, defined)
-        described = _resized(described, Parameters(path, archive, apart).values())
+        unconnected = Wires(path, _unconnected(system), described, defined)
+        described = _resized(described, Parameters(path, archive, unconnected).values())
         wires = Wires(path, system, described, defined)
         starts = Parameters(path, archive, wires).starts()
     rest = annotation.read(path, root)

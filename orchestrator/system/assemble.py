@@ -46,25 +46,20 @@ def from_scene(
     that do not fit, and names in the scene that its FMUs do not have.
     """
     problems: list[Problem] = []
-    of = timeline.of
-    replaced = replacements.replaced(blocks.replaced)
-    ours = tuple(Fmu(b.name, described(files[b.name]), of[b.name]) for b in blocks.own)
+    replaced, rows = replacements.replaced(blocks.replaced), haptic_loop.rows(scene)
+    of, order = timeline.of, {b.name: i for i, b in enumerate(blocks.loop)}
+    ours = [Fmu(b.name, described(files[b.name]), of[b.name]) for b in blocks.own]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
-    foreign = (
-        Fmu(fmu.name, description, of[fmu.name], starts, fmu.isolate)
-        for fmu, description, starts, _ in tables
-    )
-    order = {b.name: i for i, b in enumerate(blocks.loop)}
+    foreign = (Fmu(t.name, about, of[t.name], starts, t.isolate) for t, about, starts, _ in tables)
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
-    fmus = tuple(
-        with_sizes(replace(u, isolate=u.isolate or scene.isolate), timeline) for u in every
-    )
+    alone = (replace(u, isolate=u.isolate or scene.isolate) for u in every)
+    fmus = tuple(with_sizes(u, timeline) for u in alone)
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
     rules = rules_of(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, timeline, rules)
     problems += checks.unfit(scene, fmus, assigned, refused, rules.springs)
-    problems += replacements.unfit(scene, replaced, haptic_loop.rows(scene), fmus, connections)
+    problems += replacements.unfit(scene, replaced, rows, fmus, connections)
     problems += checks.step_sizes(fmus, timeline)
     problems += checks.iterated(scene, fmus, assigned)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
@@ -74,28 +69,19 @@ def from_scene(
     written = recorded(scene.record, fmus, assigned, problems)
     if problems:
         raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
+    read_again = (*scene.get_after_set, *_read_again(scene, ours))
+    mapped = {table.name: names for table, *_, names in tables}
     return System(
         fmus,
         assigned,
         timeline,
-        Coupling(
-            scene.coupling,
-            scene.iteration,
-            scene.substeps,
-            (*scene.get_after_set, *_read_again(scene, ours)),
-        ),
+        Coupling(scene.coupling, scene.iteration, scene.substeps, read_again),
         condition,
         scene.faults,
         EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
         Recording(written, scene.record.every),
         refused,
-        replacements.replacements(
-            replaced,
-            haptic_loop.rows(scene),
-            fmus,
-            assigned,
-            {fmu.name: names for fmu, *_, names in tables},
-        ),
+        replacements.replacements(replaced, rows, fmus, assigned, mapped),
         changes,
     )
 

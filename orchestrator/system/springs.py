@@ -5,21 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
+from hapticlink.orchestrator.fmi.annotation import SPRING_ENDS
 from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
-
-_KINDS = {
-    "set_position": ("input",),
-    "position": ("input", "output"),
-    "set_velocity": ("input",),
-    "velocity": ("input", "output"),
-    "force": ("output",),
-}
-"""The ports of a spring, and what they may be."""
 
 
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
@@ -86,7 +78,7 @@ def unfit(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
         size = _size(s.set_position, fmus, "input")
-        for end, kinds in _KINDS.items():
+        for end, kinds in SPRING_ENDS.items():
             port = getattr(s, end)
             if not port:
                 continue
