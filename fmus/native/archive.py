@@ -20,6 +20,7 @@ from hapticlink.fmus.native.compiler import (
     compiler_version,
     entry,
 )
+from hapticlink.fmus.native.linking import WINDOWS
 from hapticlink.fmus.native.source import component_source
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
@@ -56,6 +57,7 @@ def entries(
         "component.h": header.encode(),
         "fmi2.c": WRAPPER.read_bytes(),
         COMMON.name: COMMON.read_bytes(),
+        WINDOWS.name: WINDOWS.read_bytes(),
         "compiler": json.dumps(made_by).encode(),
         "xml": model_description(
             component, "", stop_time=stop_time, step_size=step_size, needs_tool=False

@@ -21,6 +21,7 @@ import fmpy
 
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler_cache import CHOICE, linker_cache
+from hapticlink.fmus.native.linking import system_libraries
 from hapticlink.fmus.versions import install_command, version
 
 _ARM_LINUX = sys.platform == "linux" and machine.machine().lower() in ("aarch64", "arm64")
@@ -143,9 +144,12 @@ def _compiled(
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
     if target == WEBASSEMBLY:
         link = ["-mexec-model=reactor", "-s"]
-    objects = _objects(source, own_folder, target, options)
     # A Mach-O file contains the path that it was written to, so this is the same everywhere.
-    _zig([*link, *options, "-o", "library", *objects], own_folder, target)
+    objects = ["-o", "library", *_objects(source, own_folder, target, options)]
+    try:
+        _zig([*link, *system_libraries(target), *options, *objects], own_folder, target)
+    except CompilerError:  # of functions that zig's own library may have
+        _zig([*link, *options, *objects], own_folder, target)
     return (own_folder / "library").read_bytes()
 
 

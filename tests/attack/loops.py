@@ -106,7 +106,7 @@ def sanitized(folder: Path) -> str:
     place = folder / "sanitized"
     place.mkdir()
     flags = (*UNDEFINED, "-fsanitize=address", "-fno-sanitize-recover=all", "-O1")
-    build.compile_loop(place / "loop.so", ["gcc", *flags])
+    build.compile_loop(place / "loop.so", build.Compiler(["gcc", *flags]))
     return str(place)
 
 

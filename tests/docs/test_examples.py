@@ -72,7 +72,7 @@ NOT_RUN = {
     "hapticlink bench standalone": "takes minutes, and measures the machine",
     "hapticlink bench view": "takes a minute, and measures the machine",
     "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
-        "compiles for minutes; tests/orchestrator/scene/test_packaging.py",
+        "compiles for five machines; tests/orchestrator/scene/test_packaging.py",
     "hapticlink sweep closed-loop --vary graphics.rate=10..60 --scheduler tcp://10.0.0.5:8786":
         "needs a cluster; tests/analysis/sweep/test_sweep.py",
     "hapticlink run their.ssp --set haptics.rate=100 --set duration=10 --set fmu.engine.rate=20":

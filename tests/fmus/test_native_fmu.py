@@ -443,10 +443,6 @@ def test_a_mac_binary_holds_both_processors(tmp_path):
         assert str(tmp_path.parent).encode() not in part
 
 
-@pytest.mark.skipif(
-    "HAPTICLINK_TEST_WINDOWS" not in os.environ,
-    reason="set HAPTICLINK_TEST_WINDOWS: the first build for Windows makes its C library (minutes)",
-)
 def test_a_windows_binary(tmp_path):
     path = build_native(sample_components.stateless(), tmp_path, platforms=("win64",))
     with zipfile.ZipFile(path) as archive:
@@ -486,6 +482,26 @@ def test_c_that_does_not_compile_says_where(tmp_path):
     with pytest.raises(FmuError, match=r"broken\.c does not compile for .*\n.*broken\.c:1:27"):
         compile_library(source, tmp_path / "broken.so")
     assert list(tmp_path.iterdir()) == [source]
+
+
+def test_functions_that_the_system_lacks_come_from_zig_s_own_library(tmp_path, monkeypatch):
+    """The second link is not carried out: zig would build that library for seconds."""
+    zig, links = compiler._zig, []
+
+    def no_own_library(arguments, folder, target):
+        if "-c" not in arguments:
+            links.append("-nostdlib" in arguments)
+            if not links[-1]:
+                return (folder / "library").write_bytes(b"linked")
+        zig(arguments, folder, target)
+
+    monkeypatch.setattr(compiler, "_zig", no_own_library)
+    source = tmp_path / "divided.c"
+    source.write_text("FMI2_Export __int128 divided(__int128 a, __int128 b) { return a / b; }\n")
+    options = ["-include", "fmi2Functions.h"]
+    library = compile_library(source, tmp_path / "divided.so", options=options)
+    assert links == [True, False]
+    assert library.read_bytes() == b"linked"
 
 
 def test_a_library_of_ones_own(tmp_path):

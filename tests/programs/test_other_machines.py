@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import zipfile
 from functools import cache
 from pathlib import Path
@@ -16,10 +15,11 @@ import pytest
 
 from hapticlink.fmus.native.compiler import compile_library
 from hapticlink.programs.build import OPTIONS
+from tests.programs import windows
 from tests.programs.built import COMPILER, needs_compiler, program
+from tests.programs.windows import WINE
 
 pytestmark = needs_compiler
-WINE = shutil.which("wine64") or shutil.which("wine64", path="/usr/lib/wine")
 ARM, QEMU = shutil.which("aarch64-linux-gnu-gcc"), shutil.which("qemu-aarch64")
 FLAGS = ("-std=gnu11", "-O0", "-w", "-ffp-contract=off", *OPTIONS)
 
@@ -74,13 +74,9 @@ def test_arm(sources: Path) -> None:
 
 
 @pytest.mark.skipif(not WINE, reason="no wine64")
-def test_windows(sources: Path, tmp_path: Path) -> None:
+def test_windows(sources: Path) -> None:
     folder = sources.parent
     library = folder / "library.dll"  # the name that zig gives it inside, which life.exe asks for
-    compile_library([*sources.glob("*.c")], library, "win64", (*OPTIONS, "-O0"))
-    zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", f"-I{sources}"]
-    subprocess.run([*zig, "life.c", library.name, "-o", "life.exe"], cwd=folder, check=True)
-    wine = {"WINEDEBUG": "-all", "WINEPREFIX": str(tmp_path / "wine")}
-    assert lived([str(WINE), "life.exe"], sources, **wine) == pytest.approx(
-        here(sources), rel=1e-13
-    )
+    compile_library([*sources.glob("*.c")], library, "win64", OPTIONS)
+    life = windows.program(folder / "life.c", library, [f"-I{sources}"])
+    assert lived(life, sources, **windows.environment()) == pytest.approx(here(sources), rel=1e-13)

@@ -14,16 +14,18 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).absolute().parent
 LAWS = runpy.run_path(str(HERE / "generate_laws.py"))
+LINKING = runpy.run_path(str(HERE.parents[2] / "fmus" / "native" / "linking.py"))
 SOURCES = (
     "loop.h", "operations.c", "event_loop.c", "pace.c", "fmu_calls.c", "step_check.c", "meters.c",
     "holds.c", "manifolds.c", "energy_account.c", "energy_tank.c", "platform.c", "process_state.c",
     "python_errors.c",
 )  # fmt: skip
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
-FLAGS = ("-shared", "-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")
+FLAGS = ("-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")
 WHEELS = {
     "manylinux_2_17_x86_64": "x86_64-linux-gnu.2.17",
     "manylinux_2_17_aarch64": "aarch64-linux-gnu.2.17",
@@ -34,6 +36,13 @@ WHEELS = {
 """The compiler's target for each platform tag of a wheel (PEP 425, PEP 600): systems old enough for
 those in use, and all of them from any machine."""
 _ENDINGS = {"macosx": ".dylib", "win": ".dll"}
+
+
+class Compiler(NamedTuple):
+    """The command of a C compiler, and its arguments to link with the libraries of a system."""
+
+    command: Sequence[str]
+    libraries: Sequence[str] = ("-lm",)
 
 
 def this_machine() -> str | None:
@@ -61,32 +70,40 @@ def name(tag: str | None = None) -> str:
     return f"loop-{sha.hexdigest()[:16]}{_ENDINGS.get(system, '.so')}"
 
 
-def compilers() -> Iterator[list[str]]:
-    """The commands of the compilers that are there: the machine's own, which takes a fraction of a
-    second, then the package `ziglang`."""
+def compilers() -> Iterator[Compiler]:
+    """The compilers that are there: the machine's own, which takes a fraction of a second, then the
+    package `ziglang`."""
     for command in ("cc", "gcc", "clang"):
         if sys.platform != "win32" and (path := shutil.which(command)):
-            yield [path]
+            yield Compiler([path])
     if find_spec("ziglang"):
         yield zig()
 
 
-def zig(tag: str | None = None) -> list[str]:
-    """The command of `ziglang`, for this machine or the platform tag of a wheel. Raises KeyError
-    for a tag that WHEELS does not have."""
-    tag = tag or this_machine()
-    return [sys.executable, "-m", "ziglang", "cc", *(["-target", WHEELS[tag]] if tag else [])]
+def zig(tag: str | None = None) -> Compiler:
+    """The package `ziglang`, for this machine or the platform tag of a wheel. Raises KeyError for a
+    tag that WHEELS does not have."""
+    command, tag = [sys.executable, "-m", "ziglang", "cc"], tag or this_machine()
+    if tag is None:
+        return Compiler(command)
+    return Compiler([*command, "-target", WHEELS[tag]], LINKING["system_libraries"](WHEELS[tag]))
 
 
-def compile_loop(library: Path, compiler: Sequence[str]) -> None:
+def compile_loop(library: Path, compiler: Compiler) -> None:
     """Compile the loop to `library`, which is there whole or not at all. Raises
     subprocess.CalledProcessError, or OSError, where that fails."""
-    with tempfile.TemporaryDirectory(dir=library.parent, prefix=".loop-") as room:
-        unfinished = Path(room) / library.name
-        Path(room, "hold_laws.h").write_text(LAWS["text"](), encoding="utf-8")
-        sources = [str(HERE / source) for source in SOURCES if source.endswith(".c")]
-        math = [] if library.suffix == ".dll" else ["-lm"]
-        command = [*compiler, *FLAGS, f"-I{room}", "-o", str(unfinished), *sources, *math]
-        environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(Path(room) / "cache")}
-        subprocess.run(command, check=True, capture_output=True, env=environment)
-        os.replace(unfinished, library)
+    with tempfile.TemporaryDirectory(dir=library.parent, prefix=".loop-") as folder:
+        room = Path(folder)
+        environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(room / "cache")}
+
+        def run(*arguments: str) -> None:
+            command = [*compiler.command, *FLAGS, *arguments]
+            subprocess.run(command, cwd=room, check=True, capture_output=True, env=environment)
+
+        (room / "hold_laws.h").write_text(LAWS["text"](), encoding="utf-8")
+        sources = [HERE / source for source in SOURCES if source.endswith(".c")]
+        for source in sources:
+            run("-I.", "-c", "-o", f"{source.stem}.o", str(source))
+        objects = [f"{source.stem}.o" for source in sources]
+        run("-shared", "-o", library.name, *objects, *compiler.libraries)
+        os.replace(room / library.name, library)

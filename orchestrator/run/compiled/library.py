@@ -69,7 +69,8 @@ def _compiled() -> Path:
             fmu_cache.private(root)
             build.compile_loop(library, compiler)
         except subprocess.CalledProcessError as error:
-            why = f"{compiler[0]} could not compile it: {error.stderr.decode(errors='replace')}"
+            said = error.stderr.decode(errors="replace")
+            why = f"{compiler.command[0]} could not compile it: {said}"
         except OSError as error:
             why = f"it could not be compiled: {error}"
         else:

@@ -2,7 +2,6 @@
 
 #include "loop.h"
 
-#include <fenv.h>
 #include <stdio.h>
 #include <stdlib.h>
 #ifdef _WIN32
@@ -18,10 +17,14 @@ enum { CONTROL = 0xffc0, USUAL = 0x1f80 }; /* of MXCSR: rounding, masks of excep
 static inline unsigned control(void) { return _mm_getcsr() & CONTROL; }
 
 static void set_control(unsigned value) {
-    fesetround(FE_TONEAREST); /* of the x87 unit, too */
+    unsigned short x87;
+    __asm__ volatile("fnstcw %0" : "=m"(x87));
+    x87 &= ~0xc00; /* to the nearest */
+    __asm__ volatile("fldcw %0" : : "m"(x87));
     _mm_setcsr((_mm_getcsr() & ~(unsigned)CONTROL) | value);
 }
 #else
+#include <fenv.h>
 enum { USUAL = FE_TONEAREST };
 
 static inline unsigned control(void) { return (unsigned)fegetround(); }
