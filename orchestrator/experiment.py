@@ -15,6 +15,8 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import current_directory, interpreter_state, interrupt
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi import capabilities
+from hapticlink.orchestrator.network.parts import NOWHERE, Servers, placed
+from hapticlink.orchestrator.network.remote_fmu import FRAMES
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.files import remove_rows
@@ -93,6 +95,7 @@ def simulate(
     csv: bool = True,
     real_time: RealTimeRun | None = None,
     keep_rows: bool = False,
+    remote: Servers = NOWHERE,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -100,12 +103,13 @@ def simulate(
     Interrupted for a signal before the run. A fault during the run is in the outcome, and its
     results up to then are kept. Results of an earlier run in `folder` are removed once the first
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
-    writes them, with `keep_rows` beside the CSVs, until `remove_rows`.
+    writes them, with `keep_rows` beside the CSVs, until `remove_rows`. remote: the FMUs that run
+    on other computers.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
     read = open_scene.load(scene, options)
     with folder_lock.held(folder), built(read) as every:
-        system = with_fetched(every)
+        system = placed(with_fetched(every), read, remote)
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin
@@ -114,6 +118,7 @@ def simulate(
         if real_time:
             sides = dict.fromkeys(beside(plan)[0].values())
             tables += [f"{clock}_{SAMPLES}" for clock in sides]
+            tables += [f"{fmu.name}_{FRAMES}" for fmu in system.fmus if fmu.served]
         before = setup(read, plan, tables, _left_out(every, system))
         for fmu in system.fmus:
             if offered := capabilities.unused(fmu.description):

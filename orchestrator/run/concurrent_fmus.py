@@ -160,15 +160,15 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def sides(
-    plan: Plan, able: Mapping[str, str], clock: Callable[[], int], worker: Callable[[], Worker]
+    plan: Plan, able: Mapping[str, str], clock: Callable[[], int], worker: Callable[[str], Worker]
 ) -> dict[str, Side]:
-    """The side of each clock that has FMUs beside the loop."""
+    """The side of each clock that has FMUs beside the loop; `worker` makes that of a clock."""
     fmus, clocks = plan.system.fmu, dict.fromkeys(able.values())
     return {
         name: Side(
             all(varies_step(fmus[f].description) for f, of in able.items() if of == name),
             clock,
-            worker(),
+            worker(name),
         )
         for name in clocks
     }
