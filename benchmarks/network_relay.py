@@ -55,7 +55,7 @@ def relay(
         while waiting and waiting[0][0] <= now:
             _, _, socket, parts = heapq.heappop(waiting)
             socket.send_multipart(parts)
-        patience = 1e3 * (waiting[0][0] - now) if waiting else None
+        patience = math.ceil(1e3 * (waiting[0][0] - now)) if waiting else None
         for socket, _ in poller.poll(patience):
             parts = socket.recv_multipart()
             now = monotonic()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from hapticlink.orchestrator.base import current_directory, interpreter_state, i
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.network.parts import NOWHERE, Servers, placed
-from hapticlink.orchestrator.network.remote_fmu import FRAMES
+from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.files import remove_rows
@@ -25,7 +26,7 @@ from hapticlink.orchestrator.results.run_record import content
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.windows import opened
 from hapticlink.orchestrator.run import crash_monitor
-from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, beside
+from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
@@ -113,12 +114,11 @@ def simulate(
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin
-        columns = _columns(system)
-        tables = list(columns)
+        tables: dict[str, Sequence[str]] = {**_columns(system)}
         if real_time:
-            sides = dict.fromkeys(beside(plan)[0].values())
-            tables += [f"{clock}_{SAMPLES}" for clock in sides]
-            tables += [f"{fmu.name}_{FRAMES}" for fmu in system.fmus if fmu.served]
+            sides = dict.fromkeys(beside_or_refused(plan).values())
+            tables |= {f"{clock}_{SAMPLES}": COLUMNS for clock in sides}
+            tables |= {f"{fmu.name}_{FRAMES}": FRAME for fmu in system.fmus if fmu.served}
         before = setup(read, plan, tables, _left_out(every, system))
         for fmu in system.fmus:
             if offered := capabilities.unused(fmu.description):
@@ -135,7 +135,7 @@ def simulate(
             ):
                 outcome = run(plan, results, progress, real_time)
             try:
-                results.end(outcome.ending(build_time), columns)
+                results.end(outcome.ending(build_time), tables)
             except OSError as error:
                 if outcome.fault is None:
                     outcome.fault = Fault(f"{folder}: {error.strerror or error}")

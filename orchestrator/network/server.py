@@ -221,7 +221,7 @@ class Server:
     def _refuse(self, why: str) -> None:
         """Count a message that is refused; say the first of each of so many kinds."""
         if why not in self.refused:
-            if len(self.refused) == KINDS:
+            if len(self.refused) >= KINDS:
                 why = "for further reasons"
             else:
                 self._say(f"refused: {why}")

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import InputFault
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run import concurrent_fmus
@@ -46,10 +45,6 @@ class RealTimeRun:
         self._simulation = simulation
         simulation.pace = self.pace
         simulation.beside, self._in_loop = concurrent_fmus.beside(plan)
-        for fmu in plan.system.fmus:
-            if fmu.served and fmu.name not in simulation.beside:
-                why = self._in_loop.get(fmu.name, "it is at the haptic rate")
-                raise InputFault(f"{fmu.name} cannot be remote in real time: {why}")
         now = self.pace.now
         simulation.sides = concurrent_fmus.sides(plan, simulation.beside, now, self._worker)
         try:

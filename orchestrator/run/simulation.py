@@ -122,6 +122,7 @@ class Simulation:
             frame, all_of_it = np.zeros(len(FRAME)), range(len(FRAME))
             recorder = self._results.recorder(f"{name}_{FRAMES}", FRAME, frame, all_of_it)
             self.frames[name] = self._stack.enter_context(recorder)
+            recorder.row(0.0)  # of outputs that came with the initialisation
 
     def collect(self, clock: str, tick: int) -> None:
         """Take over the sample that the FMUs beside the loop have left for a tick, `late`."""
