@@ -141,9 +141,9 @@ def _page(rows: Sequence[Row], options: Sequence[str], command: str) -> Iterator
     yield "# Two computers"
     yield ""
     yield (
-        f"With 5 ms each way {fast.late} of {fast.taken} samples are late and the tracking error is "
-        f"{short(fast.rms)} mm RMS, {short(one.rms)} on one computer; with 60 +- 20 ms {far.late} "
-        f"of {far.taken} are late and it is {short(far.rms)} mm; the recorded arrivals of {same} "
+        f"With 5 ms each way {fast.late} of {fast.taken} samples are late and the tracking error "
+        f"is {short(fast.rms)} mm RMS, {short(one.rms)} on one computer; with 60 +- 20 ms "
+        f"{far.late} of {far.taken} are late and it is {short(far.rms)} mm; the recorded arrivals of {same} "
         f"of the {len(rows)} runs give their bytes again."
     )
     yield ""
@@ -153,8 +153,8 @@ def _page(rows: Sequence[Row], options: Sequence[str], command: str) -> Iterator
         f"Made by `{command}`: `{SCENE}` with {', '.join(f'`{o}`' for o in options)} at 512 Hz in "
         "real time, its graphics at 30 Hz in another process, behind a relay that delays and loses "
         "messages of each way by a seed. The energy is what the rendering generated at the user's "
-        "port at most; each row is one run, on a machine that did other work beside it. How it works: "
-        "[two computers](../../docs/two-computers.md)."
+        "port at most; each row is one run, on a machine that did other work beside it. How it "
+        "works: [two computers](../../docs/two-computers.md)."
     )
     yield ""
     heads = ("each way", "samples", "late", "at most (ms)", "sent again", "error RMS (mm)",
