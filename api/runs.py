@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,10 @@ from hapticlink.analysis.findings.measures import Measures
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
-from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.network import key_file
+from hapticlink.orchestrator.network.parts import NOWHERE, Servers
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders
@@ -21,6 +23,7 @@ from hapticlink.orchestrator.results.run_record import content
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.results.tables import load as read_tables
 from hapticlink.orchestrator.run.real_time import RealTimeRun
+from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_axes
@@ -43,6 +46,9 @@ def run(
     figures: bool = True,
     progress: Callable[[float], None] | None = None,
     real_time: bool = False,
+    arrivals: str | Path | None = None,
+    remote: Mapping[str, str] | None = None,
+    key: str | Path | None = None,
 ) -> Run:
     """Run a scene, changed by `options` (see `scene`).
 
@@ -50,7 +56,10 @@ def run(
     plan.txt and, where `figures` is true, figures. They replace those of an earlier run there from
     the first row on. `progress` is called with the simulated time (s) from time to time.
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
-    (docs/real-time.md).
+    (docs/real-time.md). `arrivals` is the folder of a run in real time, whose samples arrive here
+    when they arrived there. `remote` has the addresses HOST:PORT of FMUs, or of all FMUs at a rate,
+    that `hapticlink serve` serves on other computers, and `key` is the file of the key of both
+    (docs/two-computers.md).
 
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
@@ -60,7 +69,13 @@ def run(
     is, and Ctrl-C ends the runs of the main thread.
     """
     read = open_scene.load(scene, options)
-    return run_paced(read, out, RealTimeRun() if real_time else None, figures, progress)
+    if arrivals is not None and (real_time or remote):
+        raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")
+    paced = RealTimeRun() if real_time else None
+    if arrivals is not None:
+        paced = RecordedArrivals(Path(arrivals), read)
+    servers = Servers(remote or {}, Path(key) if key else key_file.DEFAULT)
+    return run_paced(read, out, paced, figures, progress, remote=servers)
 
 
 @interrupt.held()
@@ -71,13 +86,14 @@ def run_paced(
     figures: bool = True,
     progress: Callable[[float], None] | None = None,
     tables: bool = True,
+    remote: Servers = NOWHERE,
 ) -> Run:
     """As `run`; without `out` and `tables` the results have no tables."""
     if out is None:
-        ended = _in_memory(scene, progress, real_time, tables)
+        ended = _in_memory(scene, progress, real_time, tables, remote)
     else:
         with folder_lock.held(Path(out)):
-            ended = _in_folder(scene, Path(out), progress, figures, real_time)
+            ended = _in_folder(scene, Path(out), progress, figures, real_time, remote)
     if interrupt.came() or ended.record.end.reason == "interrupted":
         raise RunInterrupted(ended)
     return ended
@@ -88,9 +104,10 @@ def _in_memory(
     progress: Callable[[float], None] | None,
     real_time: RealTimeRun | None,
     tables: bool,
+    remote: Servers,
 ) -> Run:
     with temporary_folders.room() as folder:
-        ended = simulate(scene, folder, (), progress, csv=False, real_time=real_time)
+        ended = simulate(scene, folder, (), progress, csv=False, real_time=real_time, remote=remote)
         if not tables:
             return Run(None, ended.run, {})
         results = read_tables(folder, binary=True) if ended.outcome.published else ended.results
@@ -115,8 +132,11 @@ def _in_folder(
     progress: Callable[[float], None] | None,
     figures: bool,
     real_time: RealTimeRun | None,
+    remote: Servers,
 ) -> Run:
-    ended = simulate(scene, folder, (), progress, real_time=real_time, keep_rows=True)
+    ended = simulate(
+        scene, folder, (), progress, real_time=real_time, keep_rows=True, remote=remote
+    )
     try:
         return _found(folder, ended, figures)
     finally:

@@ -24,6 +24,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
     "command",
     {
         "run": "Run a scene: results, run.json and figures.",
+        "serve": "Serve FMUs of a scene to a run on another computer.",
         "view": "Drag a scene's mechanism on a page, in real time, or replay a run.",
         "new": "Write a commented scene of your own to change.",
         "compare": "Tabulate what differs between runs, and draw them over each other.",

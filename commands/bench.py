@@ -25,6 +25,7 @@ Benchmark = Literal[
     "one",
     "standalone",
     "engine",
+    "network",
     "advise",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
@@ -55,6 +56,7 @@ def bench(
     - one: a scene as one FMU, beside its run through FMUs
     - standalone: a scene as a page in one file: size, and speed in a browser
     - engine: MuJoCo in the place of the graphics copy and of the mechanism
+    - network: the graphics on another computer: delay, jitter and loss against error and energy
     - advise: what `hapticlink advise` is worth on scenes kept apart
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress

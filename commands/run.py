@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -18,7 +19,7 @@ from hapticlink.commands.options import (
     print_result,
 )
 from hapticlink.commands.progress import progress
-from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.faults import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
@@ -33,6 +34,22 @@ RealTime = Annotated[
     ),
 ]
 
+Remote = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--remote",
+        consume_multiple=False,
+        negative="",
+        help="part=HOST:PORT, an FMU, or all FMUs at a rate such as graphics, that `hapticlink "
+        "serve` serves there; repeatable.",
+    ),
+]
+Key = Annotated[Path | None, Parameter(help="File of the key of --remote, as of `serve`.")]
+Arrivals = Annotated[
+    Path | None,
+    Parameter(help="Folder of a run in real time: samples arrive when they arrived there."),
+]
+
 
 def run(
     scene: Scene,
@@ -43,6 +60,9 @@ def run(
     figures: Figures = True,
     explain: Explain = False,
     real_time: RealTime = False,
+    remote: Remote = None,
+    key: Key = None,
+    arrivals: Arrivals = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> int:
@@ -68,7 +88,16 @@ def run(
     try:
         read = hl.scene(scene, changes.options)
         with progress(read.title, read.duration, hidden=quiet) as report:
-            result = hl.run(read, out=folder, figures=figures, progress=report, real_time=real_time)
+            result = hl.run(
+                read,
+                out=folder,
+                figures=figures,
+                progress=report,
+                real_time=real_time,
+                arrivals=arrivals,
+                remote=dict(map(_place, remote or ())),
+                key=key,
+            )
     except hl.RunInterrupted as ended:
         result = ended.run
     if result.fault:
@@ -81,3 +110,10 @@ def run(
         lines.append(f"  {folder}/: nothing written, the run failed before the first sample")
     print_result(lines, result.run, quiet, json)
     return Fault.exit_status if result.fault else 0
+
+
+def _place(given: str) -> tuple[str, str]:
+    part, equals, address = given.partition("=")
+    if not (part and equals and address):
+        raise InputFault(f"--remote {given}: write part=HOST:PORT, e.g. graphics=127.0.0.1:5555")
+    return part, address

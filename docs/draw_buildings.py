@@ -35,6 +35,7 @@ BUILDINGS = {
         "holds",
         "scene",
         "system",
+        "network",
         "plan",
         "results",
         "run",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +17,8 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import current_directory, interpreter_state, interrupt
 from hapticlink.orchestrator.base.faults import Fault
 from hapticlink.orchestrator.fmi import capabilities
+from hapticlink.orchestrator.network.parts import NOWHERE, Servers, placed
+from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.files import remove_rows
@@ -26,7 +28,7 @@ from hapticlink.orchestrator.results.run_results import ResultsInMemory
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.windows import WINDOW_BYTES, opened
 from hapticlink.orchestrator.run import crash_monitor
-from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, beside
+from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
@@ -99,7 +101,7 @@ def _left_out(every: System, system: System) -> list[str]:
     return [*dict.fromkeys(left_out)]
 
 
-def _memory(system: System, columns: Mapping[str, list[str]]) -> ResultsInMemory | None:
+def _memory(system: System, columns: Mapping[str, Sequence[str]]) -> ResultsInMemory | None:
     """Room for the results of a run; None where their rows may be more than a window."""
     counts = {c.name: len(c.starts) for c in system.timeline.clocks}
     written = sum(counts[clock] * (1 + len(names)) for clock, names in columns.items())
@@ -116,6 +118,7 @@ def simulate(
     real_time: RealTimeRun | None = None,
     keep_rows: bool = False,
     in_memory: bool = False,
+    remote: Servers = NOWHERE,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -125,7 +128,7 @@ def simulate(
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
     writes them, with `keep_rows` beside the CSVs, until `remove_rows`. `in_memory`: nothing is
     written, unless the tables are more than a window (`results.windows`) or an FMU of others, which
-    may crash the process, runs in it.
+    may crash the process, runs in it. remote: the FMUs that run on other computers.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
     read = open_scene.load(scene, options)
@@ -133,15 +136,15 @@ def simulate(
         if not in_memory:
             stack.enter_context(folder_lock.held(folder))
         every = stack.enter_context(built(read))
-        system = with_fetched(every)
+        system = placed(with_fetched(every), read, remote)
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin
-        columns = _columns(system)
-        tables = list(columns)
+        tables: dict[str, Sequence[str]] = {**_columns(system)}
         if real_time:
-            sides = dict.fromkeys(beside(plan)[0].values())
-            tables += [f"{clock}_{SAMPLES}" for clock in sides]
+            sides = dict.fromkeys(beside_or_refused(plan).values())
+            tables |= {f"{clock}_{SAMPLES}": COLUMNS for clock in sides}
+            tables |= {f"{fmu.name}_{FRAMES}": FRAME for fmu in system.fmus if fmu.served}
         before = setup(read, plan, tables, _left_out(every, system))
         for fmu in system.fmus:
             if offered := capabilities.unused(fmu.description):
@@ -149,7 +152,7 @@ def simulate(
                 logging.getLogger(__name__).warning(warning, fmu.name, offered)
         alone = isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
-        memory = _memory(system, columns) if in_memory and not foreign else None
+        memory = _memory(system, tables) if in_memory and not foreign else None
         if memory:
             with interpreter_state.restored():
                 outcome = run(plan, memory, progress, real_time)
@@ -166,7 +169,7 @@ def simulate(
             ):
                 outcome = run(plan, results, progress, real_time)
             try:
-                results.end(outcome.ending(build_time), columns)
+                results.end(outcome.ending(build_time), tables)
             except OSError as error:
                 if outcome.fault is None:
                     outcome.fault = Fault(f"{folder}: {error.strerror or error}")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -27,10 +27,23 @@ LOADING = 60.0
 """Seconds at least that a process and its FMU may take to load, whatever the timeout of a call."""
 
 
+class Caller(Protocol):
+    """What carries out the calls of an FMU elsewhere, as `Process` does."""
+
+    busy: bool
+    interruptible: bool
+
+    def send(self, message: Any, allowed: float) -> None: ...
+
+    def answer(self, allowed: float | None = None) -> Any: ...
+
+    def end(self) -> object: ...
+
+
 class Isolated(Instance):
     """An FMU in a worker process: `step` starts a doStep, `finish` waits for it."""
 
-    _process: Process | None = None
+    _process: Caller | None = None
     _fresh: bytes | FmuFault | None = None
     """Outputs that have come with a step and not been read, or why they could not be."""
     _smaller = 0

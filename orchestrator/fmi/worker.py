@@ -71,7 +71,7 @@ class Worker:
         try:
             outputs = self.read()
         except FmuFault as failed:  # raised when somebody reads
-            fault = _fault_fields(failed)
+            fault = fault_fields(failed)
         return outputs, fault, instance.ended, instance.step_time, instance.smaller_steps
 
     def close(self) -> dict[str, int]:
@@ -84,8 +84,9 @@ class Worker:
         return instance.calls
 
 
-def _fault_fields(fault: FmuFault) -> tuple[Any, ...]:
-    return fault.what, fault.time, fault.messages, fault.passing, fault.repeatable
+def fault_fields(fault: FmuFault) -> tuple[Any, ...]:
+    """The arguments of a fault behind the name of its FMU, as plain data."""
+    return fault.what, float(fault.time), fault.messages, fault.passing, fault.repeatable
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
@@ -102,7 +103,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             called = worker.instance if call in worker.DIRECT else worker
             answer = ("answer", getattr(called, call)(*arguments))
         except FmuFault as fault:
-            answer = ("end" if isinstance(fault, AsksToEnd) else "fault", _fault_fields(fault))
+            answer = ("end" if isinstance(fault, AsksToEnd) else "fault", fault_fields(fault))
         pickle.dump(answer, answers)
         answers.flush()
     with suppress(FmuFault):  # nobody is left to receive it

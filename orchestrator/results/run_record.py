@@ -208,6 +208,9 @@ class RunEnding:
     compiled loop, with the reason."""
     real_time: dict[str, Any] | None = None
     """What became of a run in real time (`RealTimeRun.report`)."""
+    network: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """What became of the messages to FMUs on other computers, and their clocks
+    (`Remote.network`)."""
     timings: Timings = Timings()
     iterations: Iterations | None = None
     unstable: str = ""

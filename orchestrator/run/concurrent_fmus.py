@@ -16,7 +16,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Protocol
 
-from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.faults import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.plan.operations import Event, Firing, Step
@@ -151,16 +151,27 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
     return able, unable
 
 
+def beside_or_refused(plan: Plan) -> dict[str, str]:
+    """The FMUs whose steps can be taken beside the haptic loop, with their clocks. Raises
+    InputFault where one that cannot is on another computer: the loop would wait for it."""
+    able, unable = beside(plan)
+    for fmu in plan.system.fmus:
+        if fmu.served and fmu.name not in able:
+            why = unable.get(fmu.name, "it is at the haptic rate")
+            raise InputFault(f"{fmu.name} cannot be remote in real time: {why}")
+    return able
+
+
 def sides(
-    plan: Plan, able: Mapping[str, str], clock: Callable[[], int], worker: Callable[[], Worker]
+    plan: Plan, able: Mapping[str, str], clock: Callable[[], int], worker: Callable[[str], Worker]
 ) -> dict[str, Side]:
-    """The side of each clock that has FMUs beside the loop."""
+    """The side of each clock that has FMUs beside the loop; `worker` makes that of a clock."""
     fmus, clocks = plan.system.fmu, dict.fromkeys(able.values())
     return {
         name: Side(
             all(varies_step(fmus[f].description) for f, of in able.items() if of == name),
             clock,
-            worker(),
+            worker(name),
         )
         for name in clocks
     }

@@ -194,6 +194,7 @@ def _details(
         smaller_steps={name: i.smaller_steps for name, i in instances.items() if i.smaller_steps},
         in_python=loop.in_python,
         real_time=real_time.report() if real_time else None,
+        network={name: remote.network() for name, remote in simulation.remote.items()},
         timings=Timings(steps={name: i.step_time for name, i in instances.items()}),
         iterations=loop.iterations(),
         unstable=unstable(system, energies),

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable
 from contextlib import ExitStack
+from functools import partial
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.capabilities import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
+from hapticlink.orchestrator.network.remote_fmu import Remote
 from hapticlink.orchestrator.run.python_modules import bundled, clashes
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
-    """The FMUs that run in a process of their own, by name, with the reason."""
+    """The FMUs that run in a process of their own, here or elsewhere, by name, with the reason."""
     fmus = tuple(fmus)
     asked = {u.name: "asked for" for u in fmus if u.isolate}
+    asked |= {u.name: f"served from {u.served.address}" for u in fmus if u.served}
     tools = {
         u.name: "it needs a tool, which may never answer"
         for u in fmus
@@ -39,7 +42,8 @@ def opened(
         interrupt.check()
         kind = Isolated if fmu.name in alone else IN_PROCESS[fmu.description.fmi]
         outputs = signals.values[signals.fmu(fmu.name)]
-        instance = kind(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
+        opening = partial(Remote, fmu.served) if fmu.served else kind
+        instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
         instance.seldom = fmu.seldom
         instances[fmu.name] = stack.enter_context(instance)
     return instances

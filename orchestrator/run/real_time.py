@@ -32,7 +32,7 @@ class RealTimeRun:
         turn: Callable[[Simulation, CompiledLoop], object] | None = None,
         clock: Callable[[], int] | None = None,
         wait: Callable[[int], object] | None = None,
-        worker: Callable[[], Worker] = ThreadWorker,
+        worker: Callable[[str], Worker] = lambda clock: ThreadWorker(),
     ) -> None:
         self.pace, self._turn, self._worker = Pace(clock, wait), turn, worker
         self.changes: list[tuple[float, str]] = []

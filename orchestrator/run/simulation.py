@@ -13,6 +13,7 @@ from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
+from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
 from hapticlink.orchestrator.results.run_results import RunResults
@@ -39,9 +40,9 @@ class Simulation:
     values, with the newest outputs of the sources, and the derivatives of held values.
 
     pace: the schedule of a run in real time. beside: the FMUs whose steps are then taken beside the
-    loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock. late:
-    ticks by which the current event comes after its own. swept: whether sweeps alone have
-    initialised the FMUs.
+    loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock,
+    `frames`, tables of what went to other computers, by FMU. late: ticks by which the current event
+    comes after its own. swept: whether sweeps alone have initialised the FMUs.
     """
 
     def __init__(self, system: System, results: RunResults[Any], stack: ExitStack) -> None:
@@ -50,6 +51,7 @@ class Simulation:
         self.beside: Mapping[str, str] = {}
         self.sides: Mapping[str, Side] = {}
         self.arrivals: dict[str, Recorder] = {}
+        self.frames: dict[str, Recorder] = {}
         self.late = 0
         self.swept = False
         self.seconds = system.timeline.seconds
@@ -117,6 +119,11 @@ class Simulation:
             recorder = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, sample, all_of_it)
             self.arrivals[side] = self._stack.enter_context(recorder)
             recorder.row(0.0)  # the sample of t = 0 is there at once
+        for name in self.remote if self.pace else ():
+            frame, all_of_it = np.zeros(len(FRAME)), range(len(FRAME))
+            recorder = self._results.recorder(f"{name}_{FRAMES}", FRAME, frame, all_of_it)
+            self.frames[name] = self._stack.enter_context(recorder)
+            recorder.row(0.0)  # of outputs that came with the initialisation
 
     def collect(self, clock: str, tick: int) -> None:
         """Take over the sample that the FMUs beside the loop have left for a tick, `late`."""
@@ -124,6 +131,15 @@ class Simulation:
         computing = self.sides[clock].collect(late)
         arrived.values[:] = self.seconds(tick + self.late), late, computing
         arrived.row(self.seconds(tick))
+        for name, frames in self.frames.items():
+            if self.beside[name] == clock and self.pace:
+                frames.values[:] = self.remote[name].frame(self.pace.now() - self.pace.c.origin)
+                frames.row(self.seconds(tick))
+
+    @property
+    def remote(self) -> dict[str, Remote]:
+        """The FMUs on other computers."""
+        return {n: i for n, i in self.instances.items() if isinstance(i, Remote)}
 
     def _derived(
         self, incoming: Iterable[Connection]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import Description
@@ -21,6 +22,16 @@ from hapticlink.orchestrator.scene.records import (
 
 
 @dataclass(frozen=True)
+class ServedAt:
+    """Where an FMU is served from (`network/`): its address, HOST:PORT, the file of the key, and
+    what both sides have to agree on."""
+
+    address: str
+    key: Path
+    identity: Mapping[str, str]
+
+
+@dataclass(frozen=True)
 class Fmu:
     """One FMU of the system, the clock that it steps at, its start values, and whether it runs in
     a process of its own. seldom: outputs that are only read for the rows of a table."""
@@ -31,6 +42,8 @@ class Fmu:
     starts: Starts = ()
     isolate: bool = False
     seldom: frozenset[str] = frozenset()
+    served: ServedAt | None = None
+    """Where it runs, if that is on another computer."""
 
     @property
     def sampled(self) -> bool:

@@ -68,6 +68,7 @@ NOT_RUN = {
     "--set 'controller.teleoperation.stiffness=[500.0, 500.0, 0.5]'":
         "as the one above it on its page",
     "hapticlink bench advise": "thousands of runs; tests/analysis/advise/test_advise.py",
+    "hapticlink bench network": "takes a minute, and measures the machine",
     "hapticlink bench one": "takes minutes, and measures the machine",
     "hapticlink bench standalone": "takes minutes, and measures the machine",
     "hapticlink bench view": "takes a minute, and measures the machine",
@@ -79,7 +80,7 @@ NOT_RUN = {
         "is of somebody else's file; tests/orchestrator/ssp/test_ssp.py",
 }  # fmt: skip
 """Commands that are parsed, with their scene, keys and values, but not run; the reason."""
-UNTIL_STOPPED = re.compile("hapticlink view (?!.*--export)")
+UNTIL_STOPPED = re.compile("hapticlink (view (?!.*--export)|serve )")
 """Commands that run until Ctrl-C, parsed but not run; tests/visualization/served."""
 TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""

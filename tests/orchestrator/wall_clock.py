@@ -47,4 +47,4 @@ class WallClock:
 
     def run(self, turn: Callable[..., object] | None = None) -> RealTimeRun:
         """What a run takes to be paced by this clock."""
-        return RealTimeRun(turn, self, self.wait, lambda: self)
+        return RealTimeRun(turn, self, self.wait, lambda clock: self)

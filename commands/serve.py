@@ -1,0 +1,66 @@
+"""`hapticlink serve`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from hapticlink.commands.options import UNCHANGED, Changes, Scene
+from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.orchestrator.network import key_file
+
+Key = Annotated[
+    Path,
+    Parameter(help="File of the key that both computers need, made where it serves first."),
+]
+
+
+def serve(
+    scene: Scene,
+    /,
+    *,
+    changes: Changes = UNCHANGED,
+    part: Annotated[
+        str, Parameter(help="What to serve: an FMU, or all FMUs at a rate, such as graphics.")
+    ] = "graphics",
+    listen: Annotated[
+        str, Parameter(help="HOST:PORT to serve at; HOST is an address of this computer.")
+    ] = "127.0.0.1:5555",
+    key: Key = key_file.DEFAULT,
+) -> int:
+    """Serve FMUs of a scene to a run on another computer, one run after the other, until Ctrl-C.
+
+    The run has the same scene with the same options, and a copy of the key's file. For example:
+
+        hapticlink serve closed-loop --part graphics --listen 192.168.1.2:5555
+        hapticlink run closed-loop --real-time --remote graphics=192.168.1.2:5555
+    """
+    import hapticlink as hl
+    from hapticlink.orchestrator.network import parts
+    from hapticlink.orchestrator.network.server import Server
+    from hapticlink.orchestrator.system.build_system import built
+
+    parts.require_address(listen)
+    if key_file.create(key):
+        say(f"{key}: a new key, which the other computer needs: copy it by a safe way")
+    secret, read = key_file.read(key), hl.scene(scene, changes.options)
+    with built(read) as system:
+        names = parts.fmus_of(system, part)
+        served = {n: (system.fmu[n], parts.identity(read, system.fmu[n])) for n in names}
+        server = Server(served, read.faults, _say)
+        _say(f"{read.title}: {', '.join(names)}")
+        try:
+            server.serve(listen, secret)
+        finally:
+            server.close()
+    if server.refused:
+        say(f"{server.refused.total()} messages were refused")
+    return 0
+
+
+def _say(text: str) -> None:
+    say(text)
+    sys.stdout.flush()

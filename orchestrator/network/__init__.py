@@ -1,0 +1,1 @@
+"""FMUs that are served from another computer, and the run that steps them from here."""
