@@ -60,6 +60,7 @@ def replayed(out: Path) -> dict[str, bytes]:
     run = hl.run("closed-loop", OPTIONS, out=again, figures=False, arrivals=out)
     assert run.fault is None
     assert run.run["real_time"]["deadlines_missed"] == 0
+    assert f"without a clock; samples arrived as those of {out} did" in str(run)
     return tables(again)
 
 
