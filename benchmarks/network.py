@@ -96,9 +96,9 @@ def _row(out: Path, options: Sequence[str], remote: dict[str, str], key: Path) -
     assert port
     x, y = (run.tables["haptics"][f"{name}"] for name in ("virtual_mechanism.x", "haptic_device.x"))
     error = 1e3 * ((x - y)[:, :2] ** 2).sum(axis=1) ** 0.5
-    told = run.run["network"].get("virtual_environment", {"repeated": 0})
+    exchange = run.run["network"].get("virtual_environment", {"repeated": 0})
     return Row(
-        samples["taken"], samples["late"], 1e3 * samples["largest_lateness"], told["repeated"],
+        samples["taken"], samples["late"], 1e3 * samples["largest_lateness"], exchange["repeated"],
         tracking.rms_mm, tracking.max_mm, 1e3 * port.peak,
         f"{report['deadlines_missed']} of {report['ticks']}", "yes" if same else "no",
         (run.tables["haptics"]["time"], error),

@@ -198,8 +198,8 @@ def _steps(record: RunRecord) -> Iterator[str]:
         yield f"{fmu}: {count} steps were discarded and repeated with smaller ones"
     if record.real_time:
         yield from _real_time(record.real_time)
-    for fmu, told in record.network.items():
-        yield from _network(fmu, told)
+    for fmu, exchange in record.network.items():
+        yield from _network(fmu, exchange)
     if (counts := record.iterations) and counts.unconverged:
         yield f"warning: {counts.unconverged} of {counts.steps} iterated steps did not converge"
     for fmu, errors in record.step_errors.items():
@@ -264,13 +264,14 @@ def _real_time(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"{fmu} ran in the haptic loop: {why}"
 
 
-def _network(fmu: str, told: Mapping[str, Any]) -> Iterator[str]:
-    trip, clock = told["round_trip"], told["clock"]
+def _network(fmu: str, exchange: Mapping[str, Any]) -> Iterator[str]:
+    """Lines on what was exchanged with the server of an FMU: delay and clock, and outages."""
+    trip, clock = exchange["round_trip"], exchange["clock"]
     if clock:
         times = f"{short(1e3 * trip['p50'])} ms there and back, at most {short(1e3 * trip['max'])}"
         ahead = f"{short(1e3 * clock['offset'])} +- {short(1e3 * clock['offset_uncertainty'])} ms"
-        yield f"{fmu}, at {told['server']}: {times}; its clock is ahead by {ahead}"
-    if outages := told["outages"]:
+        yield f"{fmu}, at {exchange['server']}: {times}; its clock is ahead by {ahead}"
+    if outages := exchange["outages"]:
         longest = short(max(length for _, length in outages))
         yield (
             f"warning: {fmu}: {len(outages)} outages of its server, at most {longest} s, in which "

@@ -1,4 +1,4 @@
-"""The slopes of the operations of a co-simulation at rest.
+"""The derivatives of the operations of a co-simulation at its equilibrium.
 
 Each operation changes few numbers: a doStep those of one FMU, the evaluation of a hold those of one
 connection. With the slopes J of what it writes with respect to what it reads, and their errors E,

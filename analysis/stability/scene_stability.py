@@ -64,8 +64,8 @@ def stability(
     progress: Progress | None = None,
 ) -> Stability:
     """The stability of a scene, changed by `options` (see `scene`), in a number of `poses` of its
-    run and in hands from soft to firm; with a `grid`, also at as many times as many places of the
-    workspace around the run, as far as linkage and device reach them.
+    run and in hands from soft to firm. With `grid` = N it is also judged with the operational point
+    at N x N places around those that the run visits, as far as linkage and device reach them.
 
     `progress` is called with what is judged, and the numbers of finished and of all steps. `bounds`
     are those of a drift. Raises InputFault for a scene without linkage, one whose run or map has no

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.visualization.page.chromium import Page, chromium
+from tests.visualization.page.compared_runs import differ_without_topology
 from tests.visualization.page.served_page import Served
 
 NAME = "hapticlink.commands.compared_run"
@@ -43,21 +44,7 @@ def test_two_settings_run_under_one_mouse(pair: Served) -> None:
         for pulled in page.get("[view.frame, view.frame.b].map((f) => Math.hypot(...f.F_hand))"):
             assert pulled > 0.3
         page.page.mouse.up()
-        page.page.click("#acts")
-        page.page.uncheck("[data-control=topology]")
-        page.until("location.hash === '#b.controller.topology=false'")
-        page.pull(0.03, 0.03)
-        page.run_for(1.0)
-        error = "Math.hypot(f.x[0] - f.handle[0], f.x[1] - f.handle[1])"
-        a, b = page.get(f"[view.frame, view.frame.b].map((f) => {error})")
-        assert b > 3 * a
-        energies = page.get("[view.frame.energy, view.frame.b.energy].map((e) => Object.values(e))")
-        assert len(energies[0]) > 3
-        assert energies[0] != energies[1]
-        said = page.page.locator(
-            "[data-chart='energy generated since the start'] figcaption b"
-        ).first.inner_text()
-        assert " | " in said
+        differ_without_topology(page)
         page.page.mouse.up()
         page.page.click("#acts")
         page.until("document.querySelector('[data-control=topology]').checked")

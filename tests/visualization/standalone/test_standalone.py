@@ -13,6 +13,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.commands import main
 from tests.visualization.page.chromium import AT, Page, chromium
+from tests.visualization.page.compared_runs import differ_without_topology
 
 
 @pytest.fixture(scope="module")
@@ -131,22 +132,8 @@ def test_two_settings_run_under_one_mouse(file: Path, browser: Any) -> None:
     alike = "JSON.stringify(view.frame.x) === JSON.stringify(view.frame.b.x)"
     assert page.get(alike)
     page.page.mouse.up()
-    page.page.click("#acts")
-    page.page.uncheck("[data-control=topology]")
-    page.until("location.hash === '#b.controller.topology=false'")
-    page.pull(0.03, 0.03)
-    page.run_for(1.0)
+    differ_without_topology(page)
     assert not page.get(alike)
-    error = "Math.hypot(f.x[0] - f.handle[0], f.x[1] - f.handle[1])"
-    a, b = page.get(f"[view.frame, view.frame.b].map((f) => {error})")
-    assert b > 3 * a
-    energies = page.get("[view.frame.energy, view.frame.b.energy].map((e) => Object.values(e))")
-    assert len(energies[0]) > 3
-    assert energies[0] != energies[1]
-    said = page.page.locator(
-        "[data-chart='energy generated since the start'] figcaption b"
-    ).first.inner_text()
-    assert " | " in said
     page.page.mouse.up()
     assert page.faults == []
     page.page.close()
