@@ -12,7 +12,8 @@ from hapticlink.visualization.served.server_pipe import Pipe, read, to_caller
 
 
 def main() -> None:
-    """Run the scene with the settings, which the caller sends first, until it has ended."""
+    """Run the scene with the settings, which the caller sends first, until it has ended. It waits
+    at its start until the caller lets it go on."""
     out = to_caller()
     if (arguments := read(sys.stdin.buffer)) is None:
         return
@@ -22,7 +23,7 @@ def main() -> None:
 
     root, scene, settings = arguments
     with suppress(Fault):  # the page's server has ended
-        Session(unpacked(scene), link, Path(root), hl.RealTime, settings).run()
+        Session(unpacked(scene), link, Path(root), hl.RealTime, settings, paused=True).run()
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from time import monotonic_ns
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,10 @@ from hapticlink.orchestrator.fmi.isolated import LOADING, Isolated
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.fmi.worker_process import Died
 from hapticlink.orchestrator.network import key_file
-from hapticlink.orchestrator.network.channel import Channel
 from hapticlink.orchestrator.system.system import ServedAt
+
+if TYPE_CHECKING:
+    from hapticlink.orchestrator.network.channel import Channel
 
 CLOSING = 2.0
 """Seconds that a server may take to close its FMU, which no result waits for."""
@@ -44,6 +46,9 @@ class Remote(Isolated):
         self._channel: Channel | None = None
 
     def _load(self) -> None:
+        # Here, since every run imports this file.
+        from hapticlink.orchestrator.network.channel import Channel
+
         self._pending: list[tuple[int, bytes]] = []
         self._saved_time: dict[int, float] = {}
         self._channel = Channel(self._at.address, key_file.read(self._at.key), len(self.outputs))

@@ -100,8 +100,8 @@ class Pages:
         for message in messages_of_second:
             kind = message["type"]
             if kind == "scene" and kind not in self._newest_of_second:
-                if self._newest["state"]["paused"]:
-                    self._tell(messages.Time("time", "pause"))
+                if not self._newest["state"]["paused"] and self._second:
+                    self._second.send(messages.Time("time", "resume"))
                 self._tell(messages.Time("time", "reset"))
             self._newest_of_second[kind] = picture.drawn(message) if kind == "frame" else message
             if kind == "controls":

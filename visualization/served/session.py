@@ -49,7 +49,7 @@ class Session:
     """The runs of a scene behind a page. `recordings` get folders `<root>-1`, `<root>-2`, ...
 
     real_time: `hl.RealTime`, which runs a scene and writes its folder as `hl.run` does. settings:
-    those with which the first run begins.
+    those with which the first run begins. paused: whether it waits at its start.
     """
 
     def __init__(
@@ -59,12 +59,13 @@ class Session:
         root: Path,
         real_time: Callable[[Scene], Any],
         settings: Settings | None = None,
+        paused: bool = False,
     ) -> None:
         self._scene, self._link, self._root, self._real_time = scene, link, root, real_time
         self._controls: Controls | None = None
         self._settings = settings or Settings()
         self._shown = 0.0
-        self._state: dict[str, Any] = {"paused": False, "recording": None, "ended": None}
+        self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
         self.recordings: list[Path] = []
         Building(link)
 
