@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import named_runs
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, page, settings, text

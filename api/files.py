@@ -13,7 +13,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.native import PLATFORMS
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.run import start_parameters

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hapticlink.analysis.maps.stability_map import Map, compute_map
 from hapticlink.analysis.sweep.points import Vary, axes
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options

@@ -12,7 +12,7 @@ from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import Tracking, pose_error, table_of
 from hapticlink.api.frame import frame
-from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 if TYPE_CHECKING:

@@ -12,10 +12,10 @@ from hapticlink.analysis.findings.measures import Measures
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
-from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.network import key_file
-from hapticlink.orchestrator.network.parts import NOWHERE, Servers
+from hapticlink.orchestrator.network.served_part import NOWHERE, Servers
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders

@@ -17,7 +17,7 @@ from hapticlink.analysis.sweep.run_sweep import Unfinished
 from hapticlink.analysis.sweep.run_sweep import sweep as make
 from hapticlink.api.frame import frame
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import Fault, InputFault, unknown
+from hapticlink.orchestrator.base.errors import Fault, InputFault, unknown
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options

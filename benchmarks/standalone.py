@@ -26,8 +26,8 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.run import execute_plan
 from hapticlink.orchestrator.run.compiled.library import load
-from hapticlink.visualization.interactive.viewed_scene import viewed
-from hapticlink.visualization.page import one_file
+from hapticlink.visualization.browser_code import one_file
+from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
 
 SCENES = (

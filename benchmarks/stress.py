@@ -27,7 +27,7 @@ import numpy as np
 
 import hapticlink as hl
 from hapticlink.analysis.stability.scene_variants import SceneVariants
-from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 
 CATALOGUE = Path(__file__).parent / "stress.toml"
 Outcome = Literal["stable", "warned", "stopped", "ended", "refused", "grew"]

@@ -27,15 +27,15 @@ from numpy.typing import ArrayLike
 
 import hapticlink as hl
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.visualization.interactive.viewed_scene import viewed
-from hapticlink.visualization.served.server_pipe import Link
-from hapticlink.visualization.served.session import Session
+from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_page.server_pipe import Link
+from hapticlink.visualization.live_page.session import Session
 
 SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5
-SERVER = "hapticlink.visualization.served.server"
+SERVER = "hapticlink.visualization.live_page.server"
 
 
 class Done(Exception):

@@ -11,7 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from hapticlink.components.registry import Registry, no_function
 from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
-from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
 
 app = App(

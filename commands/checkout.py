@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 
 def folder(command: str) -> Path:

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands.options import Json, Out, print_result
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 Runs = Annotated[list[Path], Parameter(help="Folders of two or more runs.", negative="")]
 

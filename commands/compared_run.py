@@ -6,9 +6,9 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.visualization.interactive.viewed_scene import unpacked
-from hapticlink.visualization.served.server_pipe import Pipe, read, to_caller
+from hapticlink.orchestrator.base.errors import Fault
+from hapticlink.visualization.interactive_scene.viewed_scene import unpacked
+from hapticlink.visualization.live_page.server_pipe import Pipe, read, to_caller
 
 
 def main() -> None:
@@ -19,7 +19,7 @@ def main() -> None:
         return
     link = Pipe(sys.stdin.buffer, out)
     import hapticlink as hl
-    from hapticlink.visualization.served.session import Session
+    from hapticlink.visualization.live_page.session import Session
 
     root, scene, settings = arguments
     with suppress(Fault):  # the page's server has ended

@@ -90,7 +90,7 @@ def _runs() -> dict[str, str]:
 
     import hapticlink as hl
     from hapticlink.orchestrator.base import interrupt
-    from hapticlink.orchestrator.base.faults import Fault
+    from hapticlink.orchestrator.base.errors import Fault
 
     states = {}
     for packaging in ("python", "native") if find_spec("ziglang") else ("python",):

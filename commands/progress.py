@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from time import monotonic
 
-from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.errors import Fault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import printable, say
 
 SHORT = 2.0

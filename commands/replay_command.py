@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hapticlink.commands import page_address
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 from hapticlink.visualization.replay import replay_page, serve
 from hapticlink.visualization.replay.recorded_frames import Recorded

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.terminal_output import say
 
 Runs = Annotated[list[Path], Parameter(help="Folders of runs.", negative="")]

@@ -19,7 +19,7 @@ from hapticlink.commands.options import (
     print_result,
 )
 from hapticlink.commands.progress import progress
-from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]

@@ -39,17 +39,17 @@ def serve(
         hapticlink run closed-loop --real-time --remote graphics=192.168.1.2:5555
     """
     import hapticlink as hl
-    from hapticlink.orchestrator.network import parts
+    from hapticlink.orchestrator.network import served_part
     from hapticlink.orchestrator.network.server import Server
     from hapticlink.orchestrator.system.build_system import built
 
-    parts.require_address(listen)
+    served_part.require_address(listen)
     if key_file.create(key):
         say(f"{key}: a new key, which the other computer needs: copy it by a safe way")
     secret, read = key_file.read(key), hl.scene(scene, changes.options)
     with built(read) as system:
-        names = parts.fmus_of(system, part)
-        served = {n: (system.fmu[n], parts.identity(read, system.fmu[n])) for n in names}
+        names = served_part.fmus_of(system, part)
+        served = {n: (system.fmu[n], served_part.identity(read, system.fmu[n])) for n in names}
         server = Server(served, read.faults, _say)
         _say(f"{read.title}: {', '.join(names)}")
         try:

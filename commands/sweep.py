@@ -64,7 +64,7 @@ def sweep(
     """
     import hapticlink as hl
     from hapticlink.analysis.sweep.row import REFUSED
-    from hapticlink.orchestrator.base.faults import InputFault
+    from hapticlink.orchestrator.base.errors import InputFault
 
     name = default_folder("sweeps", scene).name
     folder = out or default_folder("sweeps", scene)

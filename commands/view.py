@@ -15,12 +15,12 @@ from hapticlink.commands import completion, page_address
 from hapticlink.commands.options import UNCHANGED, Changes, Out, default_folder
 from hapticlink.commands.progress import waiting
 from hapticlink.fmus.versions import install_command
-from hapticlink.orchestrator.base.faults import Fault, InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 
 if TYPE_CHECKING:
     from hapticlink.orchestrator.scene.scene import Scene
-    from hapticlink.visualization.served.server_pipe import Link
+    from hapticlink.visualization.live_page.server_pipe import Link
 
 Host = Annotated[
     str,
@@ -100,8 +100,8 @@ def view(
             f"`hapticlink view {default_folder('runs', scene)}`"
         )
     import hapticlink as hl
-    from hapticlink.visualization.interactive.viewed_scene import viewed
-    from hapticlink.visualization.served.session import Session
+    from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+    from hapticlink.visualization.live_page.session import Session
 
     read = viewed(scene, changes.options)
     if standalone:
@@ -146,9 +146,9 @@ def _served(host: str, port: int | None, *arguments: str) -> Iterator[tuple[Link
     """The server, and the port that it listens on. Raises InputFault where it cannot start."""
     if not find_spec("websockets"):
         raise InputFault(f"the page needs the package websockets: {install_command('view')}")
-    from hapticlink.visualization.served.server_pipe import Link
+    from hapticlink.visualization.live_page.server_pipe import Link
 
-    module, error = "hapticlink.visualization.served.server", ""
+    module, error = "hapticlink.visualization.live_page.server", ""
     for tried in (page_address.PORT, 0) if port is None else (port,):
         with Link(module, host, str(tried), *arguments) as link:
             if (first := link.first()) is None:

@@ -48,9 +48,9 @@ BUILDINGS = {
         ".",
         "mechanism",
         "figures",
-        "page",
-        "interactive",
-        "served",
+        "browser_code",
+        "interactive_scene",
+        "live_page",
         "standalone",
         "replay",
         "compare",
@@ -142,7 +142,7 @@ def _chips(building: str, rooms: dict[str, int], y: float) -> tuple[list[str], f
     """The rooms as SVG in rows from y on, and where the last row ends."""
     shapes, x = [], float(LEFT)
     for room, count in rooms.items():
-        name = {".": "(loose files)", "page": "page (JavaScript)"}.get(room, room)
+        name = {".": "(loose files)", "browser_code": "browser_code (JavaScript)"}.get(room, room)
         text = f"{name} {count:,}"
         width = LETTER * len(text) + 14
         if x + width > WIDTH - 8:

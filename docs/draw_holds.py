@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds import HOLDS, Hold, HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
-from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 
 Vector = NDArray[np.float64]
 FOLDER = Path(__file__).with_name("figures")

@@ -12,9 +12,10 @@ from fmpy.model_description import ValidationError
 from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.archive import entries, require_platform, write
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.errors import FmuError
+from hapticlink.fmus.python_fmu import entries, require_platform
+from hapticlink.fmus.reproducible_zip import write
 
 
 def build(
@@ -65,11 +66,11 @@ def build_native(
     Raises FmuError if ziglang is not installed or a platform is unknown, CompilerError if the
     source does not compile.
     """
-    from hapticlink.fmus.native import archive, host_platform
+    from hapticlink.fmus.native import host_platform, native_fmu
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    files = archive.entries(
+    files = native_fmu.entries(
         component,
         folder,
         stop_time=stop_time,

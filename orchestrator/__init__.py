@@ -1,1 +1,1 @@
-"""How FMUs run together: scenes, rates, holds, coupling, results, commands."""
+"""How FMUs run together: scenes, rates, holds, coupling, results."""

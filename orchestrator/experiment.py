@@ -15,10 +15,11 @@ import numpy as np
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import current_directory, interpreter_state, interrupt
-from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.errors import Fault
+from hapticlink.orchestrator.describe_run import setup
 from hapticlink.orchestrator.fmi import capabilities
-from hapticlink.orchestrator.network.parts import NOWHERE, Servers, placed
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
+from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.files import remove_rows
@@ -34,7 +35,6 @@ from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.open_fmus import isolated
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.run_setup import setup
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built

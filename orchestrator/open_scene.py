@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path as FilePath
 
 from hapticlink.orchestrator.base import plugins
-from hapticlink.orchestrator.base.faults import Finding, SceneFault
+from hapticlink.orchestrator.base.errors import Finding, SceneFault
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document

@@ -16,7 +16,7 @@ from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.communication_points import Frames
-from hapticlink.orchestrator.base.faults import InputFault, shortened, unknown
+from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS

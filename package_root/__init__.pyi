@@ -32,9 +32,9 @@ from hapticlink.api.sweeps import Sweep as Sweep
 from hapticlink.api.sweeps import sweep as sweep
 from hapticlink.api.view import Replay as Replay
 from hapticlink.api.view import view as view
-from hapticlink.orchestrator.base.faults import Fault as Fault
-from hapticlink.orchestrator.base.faults import InputFault as InputFault
-from hapticlink.orchestrator.base.faults import SceneFault as SceneFault
+from hapticlink.orchestrator.base.errors import Fault as Fault
+from hapticlink.orchestrator.base.errors import InputFault as InputFault
+from hapticlink.orchestrator.base.errors import SceneFault as SceneFault
 from hapticlink.orchestrator.results.tables import Table as Table
 from hapticlink.orchestrator.scene.scene import Scene as Scene
 

@@ -14,7 +14,6 @@ from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Component
 from hapticlink.fmus import cache
-from hapticlink.fmus.archive import digest, write
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import CompilerError, FmuError
@@ -27,8 +26,9 @@ from hapticlink.fmus.native.compiler import (
     compiler_version,
     host_platform,
 )
+from hapticlink.fmus.reproducible_zip import digest, write
 from hapticlink.orchestrator.base import interrupt, temporary_folders
-from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -36,7 +36,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
 from hapticlink.programs import description, description_fmi3
 from hapticlink.programs.ports import ports
-from hapticlink.programs.resolved import Resolved, resolved
+from hapticlink.programs.resolve_scene import Resolved, resolved
 from hapticlink.programs.sources import fmi3_sources, identifiers, sources
 
 OPTIONS = ("-DEXPORT=",)

@@ -9,14 +9,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.plan.operations import Event, Firing, Record
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.bind_operations import Binder, Bound
 from hapticlink.orchestrator.run.compiled import structures
-from hapticlink.orchestrator.run.compiled.holds import CompiledHold
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.simulation import Simulation

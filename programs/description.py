@@ -7,9 +7,9 @@ from html import escape
 from xml.etree import ElementTree as ET
 
 from hapticlink.components.base_units import BASES
-from hapticlink.fmus.archive import icon
 from hapticlink.fmus.documentation import STYLE
 from hapticlink.fmus.model_description import LOG_CATEGORIES
+from hapticlink.fmus.python_fmu import icon
 from hapticlink.fmus.units import base_unit
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.scene.scene import Scene

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
-from hapticlink.fmus.archive import icon
+from hapticlink.fmus.python_fmu import icon
 from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE, VARIABLE_STEP
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.description import (

@@ -18,7 +18,7 @@ import fmpy
 
 from hapticlink.fmus.errors import CompilerError
 from hapticlink.fmus.native.compiler import global_names
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import Description
 

@@ -1,4 +1,4 @@
-/* Latencies as orchestrator/system/latency.py draws them, with whole numbers throughout. */
+/* Latencies as orchestrator/system/latency_and_loss.py draws them, with whole numbers throughout. */
 
 #include "program.h"
 

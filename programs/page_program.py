@@ -16,7 +16,7 @@ from hapticlink.programs import refusals
 from hapticlink.programs.build import OPTIONS
 from hapticlink.programs.foreign import write_texts
 from hapticlink.programs.ports import Port
-from hapticlink.programs.resolved import Resolved
+from hapticlink.programs.resolve_scene import Resolved
 from hapticlink.programs.sources import HERE, prefixed, sources, table
 
 PAGE = "page.c"

@@ -21,7 +21,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.system.system import System
-from hapticlink.programs.resolved import Resolved
+from hapticlink.programs.resolve_scene import Resolved
 
 Kind = Literal["INPUT", "OUTSIDE", "PARAMETER", "OUTPUT", "ENERGY", "STEP_ERROR"]
 

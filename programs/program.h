@@ -19,7 +19,7 @@ typedef struct {
     Pcg64 generator;
 } Latency;
 
-/* Draws the next latency (ticks), -1 for a lost sample: Link.draw of orchestrator/system/latency.py. */
+/* Draws the next latency (ticks), -1 for a lost sample: Link.draw of orchestrator/system/latency_and_loss.py. */
 int64_t latency_draw(const Latency *latency, Pcg64 *generator);
 
 /* A uniform number from 0 to 1. */

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.operation_records import too_long

@@ -15,16 +15,16 @@ import fmpy
 import numpy as np
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.native.archive import COMMON, FMI3, WRAPPER
+from hapticlink.fmus.native.native_fmu import COMMON, FMI3, WRAPPER
 from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.run.compiled import build as loop
 from hapticlink.programs.foreign import HEADERS
+from hapticlink.programs.memory_regions import Regions
 from hapticlink.programs.ports import Port, arrays
-from hapticlink.programs.regions import Regions
-from hapticlink.programs.resolved import Resolved
+from hapticlink.programs.resolve_scene import Resolved
 from hapticlink.programs.typed_data import TypedData
 
 HERE = Path(__file__).parent

@@ -9,7 +9,7 @@ from typing import Any
 
 from hapticlink.fmus.native.source import number
 from hapticlink.orchestrator.run.compiled.structures import POINTERS
-from hapticlink.programs.regions import (
+from hapticlink.programs.memory_regions import (
     APART,
     FUNCTIONS,
     NUMBERS,

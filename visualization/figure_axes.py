@@ -17,7 +17,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import shortened
+from hapticlink.orchestrator.base.errors import shortened
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.tables import Results
 

@@ -25,7 +25,7 @@ from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.run_sweep import sweep
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from hapticlink.fmus.cost import Cost, cost
 from hapticlink.fmus.errors import FmuError
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene

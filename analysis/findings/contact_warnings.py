@@ -16,14 +16,14 @@ from hapticlink.components.integrators import METHODS
 from hapticlink.components.integrators.base import ContactState, Integrator
 from hapticlink.components.specs.contacts import Contacts, Pair
 from hapticlink.components.specs.linkage import Linkage, Mechanism
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     CONTACT_GAP,
     CONTROLLER,
     ENVIRONMENT_WRENCH,
     JOINT_COORDINATES,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.scene_part import scene_part
+from hapticlink.orchestrator.results.recorded_scene import scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 ROWS = 500

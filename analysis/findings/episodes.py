@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.analysis.findings.episode_thresholds import EPISODES, FULL_TORQUE, NOTICEABLE_J
 from hapticlink.analysis.findings.forces import torques, touching
-from hapticlink.analysis.findings.limits import EPISODES, FULL_TORQUE, NOTICEABLE_J
 from hapticlink.analysis.findings.tracking import (
     COPY_BRANCH_OK,
     constrained,
@@ -20,8 +20,8 @@ from hapticlink.analysis.findings.tracking import (
     of_block,
 )
 from hapticlink.analysis.findings.user_port import UserPort, ports
-from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
-from hapticlink.orchestrator.results.scene_part import all_devices
+from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.results.recorded_scene import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import further_users, of_block
 from hapticlink.components.specs.device import Device
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     CONTACT_GAP,
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,

@@ -17,7 +17,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
-from hapticlink.orchestrator.base.loop_names import JOINT_RATES
+from hapticlink.orchestrator.base.signal_names import JOINT_RATES
 from hapticlink.orchestrator.results.tables import Results, Vector
 
 BOUND = 0.1

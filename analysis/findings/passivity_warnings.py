@@ -1,5 +1,6 @@
-"""Warnings of what takes the bound from holds, energy tanks and passivity controllers, which count
-the energy of a force over the motion that follows its sample."""
+"""Warnings where the energy bound of passive holds, tanks and passivity controllers does not apply:
+they assume that a force acts over the motion right after its sample, which a late or saturated
+force does not."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from hapticlink.analysis.findings.episodes import Episode
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.control import Passivity
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     MEASURED_HANDLE_POSE,
     PASSIVITY_DAMPING,
@@ -21,7 +22,7 @@ from hapticlink.orchestrator.base.loop_names import (
     user_of_block,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.scene_part import all_devices
+from hapticlink.orchestrator.results.recorded_scene import all_devices
 from hapticlink.orchestrator.results.tables import Results, Table
 
 

@@ -33,8 +33,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import of_block, poses, table_of
-from hapticlink.analysis.findings.works import Works
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.analysis.findings.work_of_wrenches import Works
+from hapticlink.orchestrator.base.signal_names import (
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,
     MECHANISM,

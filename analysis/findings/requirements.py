@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach
 from hapticlink.components.linkage.closures import rows
-from hapticlink.orchestrator.base.loop_names import ENVIRONMENT
+from hapticlink.orchestrator.base.signal_names import ENVIRONMENT
 from hapticlink.orchestrator.scene.blocks import from_graphics, impedance, topology
 from hapticlink.orchestrator.scene.scene import Scene
 

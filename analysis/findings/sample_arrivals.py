@@ -8,7 +8,7 @@ import numpy as np
 
 from hapticlink.orchestrator.results.run_record import RunRecord
 from hapticlink.orchestrator.results.tables import Vector
-from hapticlink.orchestrator.system.latency import Link
+from hapticlink.orchestrator.system.latency_and_loss import Link
 
 
 class Arrivals:

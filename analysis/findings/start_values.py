@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.orchestrator.base.loop_names import MECHANISM
+from hapticlink.orchestrator.base.signal_names import MECHANISM
 from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
 from hapticlink.orchestrator.system.system import System
 

@@ -15,7 +15,7 @@ from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.analysis.findings.user_port import allowed, pushed_by_others
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
     CONTACT_GAP,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     CONSTRAINT_COUNTS,
     COPY_BRANCH_OK,
     DEVICE,

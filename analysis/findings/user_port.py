@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.limits import NOTICEABLE_J
+from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
 from hapticlink.analysis.findings.port_blocks import by_block, needed
 from hapticlink.analysis.findings.tracking import (
     further_users,
@@ -34,8 +34,8 @@ from hapticlink.analysis.findings.tracking import (
     table_of,
     until_last,
 )
-from hapticlink.analysis.findings.works import Works
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.analysis.findings.work_of_wrenches import Works
+from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     DEVICE,
     DRIFT_WRENCH,

@@ -23,7 +23,7 @@ from hapticlink.analysis.fit.estimate import FROM_ZERO, Estimate, standard_devia
 from hapticlink.analysis.fit.log import Log
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 PASS = 40.0
 """Cut-off (Hz) of the low pass: beyond it an arm does not move."""

@@ -28,7 +28,7 @@ from hapticlink.components.device import pantograph
 from hapticlink.components.device.numeric_torques import numbers
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 FITTED = ("handle_mass", "handle_inertia", "motor_damping", "motor_friction")
 """What a log of any motion determines; masses of links act like those at handle and rotors."""

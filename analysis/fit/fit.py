@@ -14,7 +14,7 @@ from hapticlink.analysis.fit.estimate import Estimate
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.overrides import Options, toml
 from hapticlink.orchestrator.scene.scene import Scene
 

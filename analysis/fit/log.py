@@ -12,8 +12,12 @@ import numpy as np
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Matrix
-from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.loop_names import HAND_WRENCH, MEASURED_HANDLE_POSE, MOTOR_WRENCH
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import (
+    HAND_WRENCH,
+    MEASURED_HANDLE_POSE,
+    MOTOR_WRENCH,
+)
 from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.tables import Table, read_table
 

@@ -15,7 +15,7 @@ from hapticlink.analysis.sweep.grid import Axis, Point
 from hapticlink.analysis.sweep.job import Job, job
 from hapticlink.analysis.sweep.row import REFUSED, Row
 from hapticlink.orchestrator.base import plugins
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 
 DONE = "done"

@@ -18,8 +18,8 @@ from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins, temporary_folders
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.loop_names import JOINT_RATES, POINT_VELOCITY
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import JOINT_RATES, POINT_VELOCITY
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene.scene import Scene
 

@@ -18,7 +18,7 @@ from hapticlink.analysis.sweep.row import Row
 from hapticlink.analysis.sweep.run_sweep import Unfinished
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.scene.scene import Scene
 
 

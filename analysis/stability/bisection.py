@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 DOUBLINGS = 10
 """How often a scale is doubled or halved on the way to a limit."""

@@ -19,7 +19,7 @@ from scipy.linalg import null_space
 from hapticlink.analysis.stability.state_vector import Coordinate
 from hapticlink.components.dynamics.closure_jacobian_values import closure_jacobian
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
-from hapticlink.orchestrator.base.loop_names import SHARED
+from hapticlink.orchestrator.base.signal_names import SHARED
 from hapticlink.orchestrator.scene.scene import Scene
 
 RANK = 1e-6

@@ -16,7 +16,7 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linear_period import LinearPeriod, linear_period
 from hapticlink.analysis.stability.linearisation import Linearisation
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 TOLERANCE = 1e-9
 """Of each coordinate z at rest, relative to max(1, |z|)."""

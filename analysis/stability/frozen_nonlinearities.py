@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from hapticlink.analysis.stability.state_vector import Coordinate
-from hapticlink.orchestrator.base.loop_names import CONTROLLER, DEVICE, MECHANISM
+from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, MECHANISM
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.passive import Passive

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from hapticlink.orchestrator.base.loop_names import CONTROLLER
+from hapticlink.orchestrator.base.signal_names import CONTROLLER
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.system.system import Fmu, System
 

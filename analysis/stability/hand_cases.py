@@ -19,8 +19,8 @@ from hapticlink.analysis.stability.modes import Mode, counted, leading, modes, v
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.components.specs.hand import Hand
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
-from hapticlink.orchestrator.base.loop_names import CONTROLLER, HAND, user_of_block
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
+from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, user_of_block
 from hapticlink.orchestrator.scene.scene import Scene
 
 SHARES = 3
@@ -29,8 +29,8 @@ SLIGHT = 0.01
 DAMPINGS = 2.0 ** np.arange(-4, 7)
 """Of a free handle (N.s/m), that are tried."""
 CALMED = 0.1
-"""The rate (1/s) at which a free handle that is damped enough at least comes to rest: large motions
-around a pose where the constrained directions change grow where small ones decay slower."""
+"""The smallest decay rate (1/s) that counts as damped enough for a free handle. Where small motions
+decay more slowly, large ones around a pose where the constrained directions change can grow."""
 TURNING = 1e-3
 """Their rotational damping (N.m.s/rad) over that of translations (N.s/m)."""
 
@@ -81,9 +81,9 @@ class Case:
 
 
 class InHands:
-    """A scene at rest in a pose, with gains scaled by `scales`, and all that the controller reads
-    `late` steps of it later; in the hand None it is as it is. Raises InputFault or FmuFault where
-    it has no equilibrium."""
+    """A scene at rest in a pose, with the gains multiplied by `scales` and every input of the
+    controller delayed by `late` of its steps; for the hand None the scene's own stays. Raises
+    InputFault or FmuFault where it has no equilibrium."""
 
     def __init__(self, place: RestingScene, scales: Scales | None = None, late: int = 0) -> None:
         period = place.period(scales or {})

@@ -21,7 +21,7 @@ from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.communication_points import Frames
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Event, Operation, Record, StopWhen

@@ -18,12 +18,12 @@ from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.mode_kinds import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
-from hapticlink.analysis.stability.rates import frame_length, whole_frames
 from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.analysis.stability.short_hyperperiod import frame_length, whole_frames
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
-from hapticlink.orchestrator.base.loop_names import CONTROLLER
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
+from hapticlink.orchestrator.base.signal_names import CONTROLLER
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene

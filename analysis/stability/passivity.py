@@ -49,11 +49,11 @@ from hapticlink.analysis.stability.port_response import (
     response,
 )
 from hapticlink.analysis.stability.poses import in_own_hand
-from hapticlink.analysis.stability.rates import rounded
+from hapticlink.analysis.stability.short_hyperperiod import rounded
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator.base.arrays import Complex, Vector
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene

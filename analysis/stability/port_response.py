@@ -26,8 +26,8 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.state_vector import SIGNALS
 from hapticlink.orchestrator.base.arrays import Complex, Matrix
-from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.loop_names import HAND, MECHANISM
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import HAND, MECHANISM
 from hapticlink.orchestrator.plan.operations import Get, Set, Step
 from hapticlink.orchestrator.run.energy.bonds import bond
 from hapticlink.orchestrator.run.signals import SignalVector

@@ -20,8 +20,8 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
-from hapticlink.orchestrator.base.faults import Fault, FmuFault, InputFault
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.errors import Fault, FmuFault, InputFault
+from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     HAND,
     HAND_WRENCH,

@@ -21,8 +21,8 @@ from hapticlink.analysis.stability.modes import Mode, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
-from hapticlink.orchestrator.base.loop_names import ENVIRONMENT_WRENCH, HAND
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
+from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH, HAND
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.overrides import Options

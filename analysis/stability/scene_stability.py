@@ -31,7 +31,7 @@ from hapticlink.analysis.stability.poses import (
     settled,
     simulated,
 )
-from hapticlink.analysis.stability.rates import short
+from hapticlink.analysis.stability.short_hyperperiod import short
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
@@ -40,7 +40,7 @@ from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shortened
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options

@@ -18,8 +18,8 @@ from hapticlink.analysis.stability.poses import in_own_hand
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.components.specs.hand import Hand
-from hapticlink.orchestrator.base.faults import Fault, FmuFault, InputFault
-from hapticlink.orchestrator.base.loop_names import HAND
+from hapticlink.orchestrator.base.errors import Fault, FmuFault, InputFault
+from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options

@@ -14,7 +14,7 @@ from hapticlink.analysis.sweep.pool import Done, Work
 from hapticlink.analysis.sweep.row import DIED, failed
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 
 def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:

@@ -16,7 +16,7 @@ from itertools import product
 from pathlib import Path
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.faults import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shortened
 from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import flat
 

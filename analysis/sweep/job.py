@@ -20,8 +20,8 @@ from hapticlink.fmus.cache import sources
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, plugins
-from hapticlink.orchestrator.base.faults import Fault, InputFault
-from hapticlink.orchestrator.run_setup import PACKAGES
+from hapticlink.orchestrator.base.errors import Fault, InputFault
+from hapticlink.orchestrator.describe_run import PACKAGES
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_source import Source
 

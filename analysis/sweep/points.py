@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.analysis.sweep.grid import Axis, Point, grid, listed, parse
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.overrides import text
 
 Vary = Mapping[str, Iterable[Any]] | Sequence[str]

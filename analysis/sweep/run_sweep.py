@@ -12,7 +12,7 @@ from hapticlink.analysis.sweep import cluster, pool, table
 from hapticlink.analysis.sweep.job import Job, key
 from hapticlink.analysis.sweep.row import DIED, INTERRUPTED, REFUSED, Row, failed, measure
 from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
-from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.errors import Fault, Interrupted
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.fmi import process_cache
 

@@ -26,15 +26,15 @@ import numpy as np
 from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import evenly_spaced, simulated
-from hapticlink.analysis.stability.rates import whole_frames
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
-from hapticlink.orchestrator.base.loop_names import MOBILITIES
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
+from hapticlink.orchestrator.base.signal_names import MOBILITIES
 from hapticlink.orchestrator.base.text_table import aligned
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short

@@ -1,5 +1,5 @@
 """What a hand feels: the dynamic stiffness 1/|n' X n| (N/m) of the handle along a wrench n with a
-unit force, X its compliance at a frequency of pressing (held.py).
+unit force, X its compliance at a frequency of pressing (`Response.compliance`).
 
 Of a joint constraint n is a wrench that no motion of the mechanism answers, in null(S Lambda^-1 S),
 the one of them with the largest force; of a contact it is the contact's.
@@ -19,8 +19,8 @@ from hapticlink.analysis.tune.stability_limits import FINE
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
-from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     MOBILITIES,
 )

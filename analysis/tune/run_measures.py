@@ -13,7 +13,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.user_port import allowed, hand_work
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results.tables import Results
 
 TRACKED = 1.2

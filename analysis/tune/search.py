@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from hapticlink.analysis.stability.bisection import DOUBLINGS, largest
 from hapticlink.analysis.tune.felt_stiffness import Feel
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 COARSE = 0.05
 """Of the logarithm of a scale, how well the largest is found."""

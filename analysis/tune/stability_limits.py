@@ -11,7 +11,7 @@ from hapticlink.analysis.stability.bisection import largest
 from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.hands import SPRINGS
 from hapticlink.analysis.stability.resting_scene import RestingScene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 FINE = 0.01
 """Of the logarithm of a scale."""

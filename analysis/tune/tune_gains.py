@@ -24,8 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.stability.poses import Pose, at_equilibrium, evenly_spaced, simulated
-from hapticlink.analysis.stability.rates import whole_frames
 from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.tune.felt_stiffness import Feel
 from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
@@ -35,7 +35,7 @@ from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options

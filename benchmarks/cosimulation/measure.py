@@ -12,7 +12,7 @@ from benchmarks.continuous import GRID, Reference
 from benchmarks.cosimulation.points import Point
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
 

@@ -11,7 +11,7 @@ from hapticlink.components import forces, integrators, time_signals
 from hapticlink.components.component import Block
 from hapticlink.components.contact import located_events
 from hapticlink.components.contact.located_events import LocatedEvents
-from hapticlink.components.contact.unilateral import OneSidedForces
+from hapticlink.components.contact.one_sided_spring import OneSidedForces
 from hapticlink.components.dynamics import further_points, joint_ports
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import (

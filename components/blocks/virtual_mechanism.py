@@ -23,7 +23,7 @@ from hapticlink.components.contact import contact_forces, joint_limits
 from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
 from hapticlink.components.contact.joint_limits import JointLimits
-from hapticlink.components.contact.unilateral import AllOneSidedForces, OneSidedForces
+from hapticlink.components.contact.one_sided_spring import AllOneSidedForces, OneSidedForces
 from hapticlink.components.dynamics import (
     closure_diagnostics,
     further_points,

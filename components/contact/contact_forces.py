@@ -1,7 +1,7 @@
 """Penalty contact of bodies that never pulls (k_contact, b_contact of section B.6).
 
     g  = n . (x - x_plane) - r,   g' = n . v          gap (m) and its rate at the contact point
-    F  = n max(0, -k g - b g')  where g < 0, else 0   (unilateral.py)
+    F  = n max(0, -k g - b g')  where g < 0, else 0   (one_sided_spring.py)
     Q  = sum_i J_i' F_i
 
 F acts on the point of the body's surface that has the velocity v relative to the other body, or to
@@ -26,7 +26,7 @@ from hapticlink.components.contact.detection import (
     shape_parameters,
     touches,
 )
-from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
+from hapticlink.components.contact.one_sided_spring import OneSidedForces, Unilateral
 from hapticlink.components.forces import dry_friction
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts

@@ -1,4 +1,4 @@
-"""Joint limits: one-sided spring-dampers (unilateral.py) at the ends of a coordinate's range.
+"""Joint limits: one-sided spring-dampers (one_sided_spring.py) at the ends of a coordinate's range.
 
     g = c - c_lower,  g' = c'    and    g = c_upper - c,  g' = -c'
     Q = (dc/dq)' (F_lower - F_upper)
@@ -23,7 +23,7 @@ from collections.abc import Iterator
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.contact.unilateral import OneSidedForces, Unilateral
+from hapticlink.components.contact.one_sided_spring import OneSidedForces, Unilateral
 from hapticlink.components.dynamics.constrained_directions import LOCKED
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate, joints_with

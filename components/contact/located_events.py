@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components import integrators
-from hapticlink.components.contact.unilateral import BEGUN, BY_STATE, Unilateral
+from hapticlink.components.contact.one_sided_spring import BEGUN, BY_STATE, Unilateral
 from hapticlink.components.integrators.base import Integrator, Ode
 
 STEEP = 1 / 3  # of the mean slope of e, at either end: inverse interpolation is monotonic
@@ -37,7 +37,8 @@ class LocatedEvents(Integrator):
     """An integration method that locates so many `events` in each step.
 
     functions: (x, x', u, p) -> (pushes, g, s, g', s') of k contacts, each k x 1 (`functions`). A
-    step takes an ode (x, (laws, u), p, t) -> x' with the laws of the contacts (unilateral.py).
+    step takes an ode (x, (laws, u), p, t) -> x' with the laws of the contacts
+    (one_sided_spring.py).
     """
 
     def __init__(self, method: Integrator, events: int, functions: ca.Function) -> None:

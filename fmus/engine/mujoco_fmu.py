@@ -17,9 +17,9 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.components.component import Component, Variable
-from hapticlink.fmus.archive import packed
 from hapticlink.fmus.engine.mjcf import HAND, chain, coordinates, mjcf, offset, points
 from hapticlink.fmus.errors import FmuError
+from hapticlink.fmus.python_fmu import packed
 
 INTEGRATORS = {
     "semi-implicit-euler": "Euler",

@@ -16,7 +16,7 @@ from hapticlink.fmus.native.split_functions import split
 
 def component_source(component: Component) -> tuple[str, Iterable[str]]:
     """component.h (sizes, names, start values and functions) and the texts of further C files, with
-    pieces of long functions, as `pieces.split`; the same texts for the same component.
+    pieces of long functions, as `split_functions.split`; the same texts for the same component.
 
     The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """

@@ -39,7 +39,7 @@ def came() -> bool:
 def check(time: float | None = None) -> None:
     """Raises Interrupted, with the simulated `time` (s), if a signal has arrived."""
     if _count:
-        from hapticlink.orchestrator.base.faults import Interrupted  # loaded within `held`
+        from hapticlink.orchestrator.base.errors import Interrupted  # loaded within `held`
 
         raise Interrupted(time)
 

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 
 from hapticlink.components import registry
-from hapticlink.orchestrator.base.faults import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shortened
 
 GROUP = "hapticlink.plugins"
 PACKAGE = f"{Path(registry.__file__).parent.parent}{os.sep}"

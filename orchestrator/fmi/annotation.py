@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 from xml.etree.ElementTree import Element
 
 from hapticlink.components.ports import Kind, Power, Spring
-from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.kind_check import misfit
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import Scalar

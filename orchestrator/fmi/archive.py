@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from xml.parsers import expat
 
 from hapticlink.fmus.cache import is_whole
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 MAX_XML_BYTES = 256 * 2**20
 """Bytes of one XML entry; the largest FMUs (10^5 variables) have some 50 MB."""

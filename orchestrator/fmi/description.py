@@ -17,7 +17,7 @@ from fmpy import platform, platform_tuple, read_model_description, sharedLibrary
 
 from hapticlink.components.base_units import BASES
 from hapticlink.components.ports import Kind, Power, Spring
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import annotation
 from hapticlink.orchestrator.fmi.archive import opened, read_xml, require_whole
 from hapticlink.orchestrator.fmi.units import Unit

@@ -21,7 +21,7 @@ import numpy as np
 from fmpy import fmi2
 
 from hapticlink.orchestrator.base import current_directory
-from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
+from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries, rounding_mode
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives

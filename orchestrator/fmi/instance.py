@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
-from hapticlink.orchestrator.base.faults import Diverged, Fault, FmuFault
+from hapticlink.orchestrator.base.errors import Diverged, Fault, FmuFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.instance_location import Place
+from hapticlink.orchestrator.fmi.instance_progress import Place
 from hapticlink.orchestrator.fmi.output_bounds import Bounds
 from hapticlink.orchestrator.fmi.variables import Scalar
 

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
-from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
+from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.fmi.variables import Scalar

@@ -1,5 +1,6 @@
-"""What a process keeps of FMUs: descriptions, and those of this project unpacked, once for all
-instances of a file. Those of others are unpacked for each, which may write beside its resources."""
+"""What a process keeps of FMUs: model descriptions, and the unpacked files of FMUs of this project,
+once for all instances. Foreign FMUs, which may write next to their resources, are unpacked afresh
+for every instance."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """What the libraries of pythonfmu 0.7 and pythonfmu3 0.3 need, so as not to crash the process.
 
-They destroy the static that holds the interpreter and then, in the library's destructor, drop it
-once more: memory is corrupted as the process ends. Dropped while Python still runs, by the function
-that they export for it, it is null by then. An FMU without its Python module crashes them at once.
+At the end of the process they release the Python interpreter twice, which corrupts memory. The
+function that they export for it, `finalizePythonInterpreter`, is therefore called earlier, so that
+the second release finds a null pointer. An FMU without its Python module crashes them at once.
 
 Since they must stay loaded until then, FMUs whose libraries have the same bytes share one, under a
 path that does not change from run to run: each path of its own would cost 0.3 MB and 8 memory maps

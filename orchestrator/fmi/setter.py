@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.fmi.instance_location import Place
+from hapticlink.orchestrator.fmi.instance_progress import Place
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.units import SAME, Linear
 

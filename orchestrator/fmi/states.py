@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.retry import Saved
 from hapticlink.orchestrator.fmi.status import ERROR, succeeded

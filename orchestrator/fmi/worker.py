@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault
+from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.base.process_end import leave_threads
 from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
 from hapticlink.orchestrator.fmi.instance import Instance

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hapticlink.fmus.versions import install_command
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 DEFAULT = Path("~/.config/hapticlink/network.key_secret")
 """Where the key is if no other file is named."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.isolated import LOADING, Isolated

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import AsksToEnd, FmuFault, InputFault
+from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault, InputFault
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
 from hapticlink.orchestrator.fmi.worker import Worker, fault_fields
 from hapticlink.orchestrator.network.channel import ALIVE, SECURE
 from hapticlink.orchestrator.network.key_file import Key
 from hapticlink.orchestrator.network.messages import Answer, Malformed, Request, request_of
-from hapticlink.orchestrator.network.parts import Identity, differences
+from hapticlink.orchestrator.network.served_part import Identity, differences
 from hapticlink.orchestrator.system.system import Fmu
 
 LEASE = 10.0

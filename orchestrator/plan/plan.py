@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
-from hapticlink.orchestrator.base.faults import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shortened
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.plan.operations import (
     Set,
 )
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.system.latency import Link
+from hapticlink.orchestrator.system.latency_and_loss import Link
 
 
 class Use(NamedTuple):

@@ -1,1 +1,1 @@
-"""Result folders: files, tables, figures, summary."""
+"""Result folders: files and tables."""

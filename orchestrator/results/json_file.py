@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 MAX_BYTES = 1 << 28
 """A run.json names its outputs, of which there are a million at most."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folder_lock, json_file, rows
 from hapticlink.orchestrator.results.files import make_csv, remove_rows, write_json
 from hapticlink.orchestrator.results.numbers import last_time

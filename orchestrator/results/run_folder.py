@@ -11,7 +11,7 @@ from pathlib import Path
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.faults import InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.results import json_file, rows
 from hapticlink.orchestrator.results.files import FileRecorder, text, write, write_json, write_over
 from hapticlink.orchestrator.results.run_record import (

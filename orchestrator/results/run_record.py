@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
 from hapticlink.orchestrator.plan.sample_ages import Delay

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.results import json_file, rows, run_record
 from hapticlink.orchestrator.results.run_record import RunRecord

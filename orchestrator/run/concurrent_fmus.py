@@ -16,7 +16,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Protocol
 
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.plan.operations import Event, Firing, Step

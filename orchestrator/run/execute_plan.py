@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base import interpreter_state, interrupt, plugins
-from hapticlink.orchestrator.base.faults import AsksToEnd, Diverged, Fault, Interrupted
-from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.base.errors import AsksToEnd, Diverged, Fault, Interrupted
+from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal, delays
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings

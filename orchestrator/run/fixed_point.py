@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.plan.operations import Repeat
 from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run import jacobians

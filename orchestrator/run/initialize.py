@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import FmuFault
-from hapticlink.orchestrator.base.loop_names import DEVICE
+from hapticlink.orchestrator.base.errors import FmuFault
+from hapticlink.orchestrator.base.signal_names import DEVICE
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.signals import SignalVector

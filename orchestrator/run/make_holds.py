@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import Fault, shortened
+from hapticlink.orchestrator.base.errors import Fault, shortened
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.hold import Hold, Vector
-from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run import spring_holds
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import SetSpring
-from hapticlink.orchestrator.system.latency import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 from hapticlink.orchestrator.system.ports import beside, kind, turns
 from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System

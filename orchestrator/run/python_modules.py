@@ -18,7 +18,7 @@ from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.archive import opened
 from hapticlink.orchestrator.system.system import Fmu

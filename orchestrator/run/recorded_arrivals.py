@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.network.parts import OF_A_RUN
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.network.served_part import OF_A_RUN
 from hapticlink.orchestrator.results import json_file, run_record
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop

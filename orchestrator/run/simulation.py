@@ -17,7 +17,7 @@ from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run import scenario
+from hapticlink.orchestrator.run import apply_timed_events
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meters import Meters
@@ -89,7 +89,7 @@ class Simulation:
                 self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
         self.meters.start()
         self.balance.start()
-        scenario.arm(self.system, self.instances, self.signals)
+        apply_timed_events.arm(self.system, self.instances, self.signals)
         for fmu in self.system.fmus:
             incoming = self.system.into(fmu.name)
             if not incoming:

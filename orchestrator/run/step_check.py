@@ -25,7 +25,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import FmuFault
+from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance import Instance, Vector

@@ -7,7 +7,7 @@ from numbers import Real
 from typing import Any, get_args
 
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.base.faults import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shortened
 
 
 def require(name: str, value: object, kind: Any) -> float:

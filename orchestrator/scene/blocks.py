@@ -8,7 +8,7 @@ from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.linkage import GraphicsCopy
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     DEVICE,
     ENVIRONMENT,

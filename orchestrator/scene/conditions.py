@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hapticlink.orchestrator.base.loop_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import shortened, unknown
+from hapticlink.orchestrator.base.errors import shortened, unknown
 from hapticlink.orchestrator.scene.toml_keys import parts
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import Finding, InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.scene import dropped_keys as dropping
 from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find_scene import find, folder_of

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.faults import InputFault, near, shortened
+from hapticlink.orchestrator.base.errors import InputFault, near, shortened
 from hapticlink.orchestrator.scene.toml import LARGEST
 
 

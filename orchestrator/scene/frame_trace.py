@@ -12,7 +12,7 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 LARGEST = 2**24
 """Bytes: some 10^6 frames, 4 h of them at 60 Hz."""

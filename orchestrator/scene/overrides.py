@@ -9,7 +9,7 @@ from itertools import zip_longest
 from pathlib import PurePath
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import InputFault, shortened, unknown
+from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
 from hapticlink.orchestrator.scene.toml import DEEPEST, loads
 from hapticlink.orchestrator.scene.toml_keys import ASSIGNMENT, Path, parts, whole
 

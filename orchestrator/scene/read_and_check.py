@@ -10,8 +10,8 @@ from pathlib import Path as FilePath
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator.base.faults import COUNTED, InputFault, SceneFault
-from hapticlink.orchestrator.scene import checks, families, overrides, read_parts
+from hapticlink.orchestrator.base.errors import COUNTED, InputFault, SceneFault
+from hapticlink.orchestrator.scene import checks, families, overrides, read_registry_tables
 from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
 from hapticlink.orchestrator.scene.frame_trace import frame_times
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
@@ -56,7 +56,7 @@ def from_source(source: Source) -> Scene:
                 fmu[key] = dict(flat(fmu[key]))
 
     origin = Origin(source, data, set_by)
-    parts, unread = read_parts.read(data)
+    parts, unread = read_registry_tables.read(data)
     wrong += unread
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
@@ -68,5 +68,5 @@ def from_source(source: Source) -> Scene:
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
     if wrong := checks.check(scene):
         raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
-    scene = read_parts.put(scene, parts)
+    scene = read_registry_tables.put(scene, parts)
     return WrittenScene(**vars(scene), origin=origin, written=scene)

@@ -25,9 +25,9 @@ from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
-from hapticlink.orchestrator.base.faults import Finding
-from hapticlink.orchestrator.base.loop_names import DEVICE, WORKSPACE_MARGIN
+from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.base.plain_data import plain
+from hapticlink.orchestrator.base.signal_names import DEVICE, WORKSPACE_MARGIN
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import Finding
+from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.scene.overrides import as_typed
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, place_of
 

@@ -12,7 +12,7 @@ from typing import Any
 from hapticlink.components.registry import Names
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.scene import part_tables
+from hapticlink.orchestrator.scene import registry_tables
 from hapticlink.orchestrator.scene.extends import SceneFile
 from hapticlink.orchestrator.scene.families import FamilyLinkage
 from hapticlink.orchestrator.scene.frame_trace import Trace
@@ -49,7 +49,7 @@ def annotations_at(path: Path, data: Any = None) -> list[Any]:
     that its tables select by their `type`."""
     if not path:
         return [Scene]
-    if record := part_tables.record_of(path, data):
+    if record := registry_tables.record_of(path, data):
         return [record]
     above, part = chosen(types_at(path[:-1], data), value(data, path[:-1])), path[-1]
     if isinstance(part, int):

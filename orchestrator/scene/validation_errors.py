@@ -11,7 +11,7 @@ from typing import Any
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator.base.faults import COUNTED, near, shortened, unknown
+from hapticlink.orchestrator.base.errors import COUNTED, near, shortened, unknown
 from hapticlink.orchestrator.scene import checks, key_descriptions, schema
 from hapticlink.orchestrator.scene.scene import adapter
 from hapticlink.orchestrator.scene.toml_keys import Path, value

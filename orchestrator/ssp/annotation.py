@@ -11,7 +11,7 @@ from pathlib import Path as FilePath
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.scene.extends import traced
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem

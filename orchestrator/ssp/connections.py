@@ -14,7 +14,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 from hapticlink.orchestrator.ssp.tree import Line, Node, Part, Place, dotted

@@ -17,7 +17,7 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element, tostring
 
-from hapticlink.orchestrator.base.faults import SHOWN, InputFault
+from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.base.terminal_output import printable
 from hapticlink.orchestrator.fmi.archive import read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion

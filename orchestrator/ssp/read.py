@@ -24,7 +24,7 @@ from xml.etree.ElementTree import Element
 
 from hapticlink.fmus import cache
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import Description, describe

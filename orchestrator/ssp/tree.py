@@ -14,7 +14,7 @@ from fmpy.ssp.ssd import validate_tree
 from lxml import etree
 
 from hapticlink.components.base_units import BASES
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
 from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD, SSP1
 

@@ -19,7 +19,7 @@ import pydantic
 
 from hapticlink.components.base_units import BASES
 from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks

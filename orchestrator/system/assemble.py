@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from hapticlink.orchestrator.base.faults import SceneFault
-from hapticlink.orchestrator.base.loop_names import HAND
+from hapticlink.orchestrator.base.errors import SceneFault
+from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.scene.blocks import Blocks

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from hapticlink.orchestrator.base.faults import near
+from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
 from hapticlink.orchestrator.fmi.kind_check import misfit

@@ -10,7 +10,7 @@ from hapticlink.fmus.blocks import Starts, build_block
 from hapticlink.fmus.cache import remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.scene import Scene

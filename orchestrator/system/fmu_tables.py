@@ -10,7 +10,7 @@ from operator import attrgetter
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.fmi.start_values import Starts, fitting

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency

@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from hapticlink.components.ports import Kind
-from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.kind_check import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS

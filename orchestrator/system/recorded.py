@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from hapticlink.orchestrator.base.faults import near
+from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.scene.records import Record
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import Connection, Fmu

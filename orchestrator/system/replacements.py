@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import FmuError
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.blocks import BlockPlan
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene

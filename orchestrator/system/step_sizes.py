@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from hapticlink.orchestrator.base.loop_names import ENVIRONMENT
+from hapticlink.orchestrator.base.signal_names import ENVIRONMENT
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.system.system import Fmu
 

@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 
-from hapticlink.orchestrator.base.faults import shortened
+from hapticlink.orchestrator.base.errors import shortened
 from hapticlink.orchestrator.base.ticks import Timeline, exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS

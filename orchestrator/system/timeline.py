@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from hapticlink.orchestrator.base.communication_points import Frames
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.base.ticks import (
     Clock,
     Timeline,

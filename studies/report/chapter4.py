@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.loop_names import ENVIRONMENT_WRENCH
+from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH
 from hapticlink.orchestrator.results.tables import Results
 from studies.report import draw
 from studies.report.entry import Entry, Runs, command

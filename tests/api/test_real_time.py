@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 from tests.orchestrator.wall_clock import MS, WallClock

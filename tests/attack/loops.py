@@ -1,7 +1,7 @@
 """Random scenes on both event loops: the tables of the compiled loop have the bits of Python's,
-where a hold extrapolates matrices its digits (`holds/manifolds.py`), and a run that faults ends in
-both with the same words. A part of them runs with the C of the loop
-compiled by gcc with its address and undefined-behaviour sanitizers, which report nothing.
+where a hold extrapolates matrices its digits (`holds/holds_on_manifolds.py`), and a run that faults
+ends in both with the same words. A part of them runs with the C of the loop compiled by gcc with
+its address and undefined-behaviour sanitizers, which report nothing.
 
 python -m tests.attack.loops --cases 300
 """
@@ -38,7 +38,7 @@ if sys.argv[2]:
     from hapticlink.orchestrator.run.compiled import build
     build.name = lambda: sys.argv[2] + "/loop.so"
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.errors import Fault
 for scene in json.loads(sys.argv[1]):
     for loop in sys.argv[3:]:
         os.environ["HAPTICLINK_LOOP"] = loop

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import Fault
+from hapticlink.orchestrator.base.errors import Fault
 from tests.attack.cases import Made, command, seeded
 from tests.attack.processes import own_folder
 

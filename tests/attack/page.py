@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import Fault
-from hapticlink.visualization.served import messages
-from hapticlink.visualization.served.session import Session
+from hapticlink.orchestrator.base.errors import Fault
+from hapticlink.visualization.live_page import messages
+from hapticlink.visualization.live_page.session import Session
 from tests.attack.cases import Made, command, seeded
 from tests.attack.processes import own_folder
 

@@ -27,7 +27,7 @@ from hapticlink.analysis.stability.hand_cases import Case
 from hapticlink.analysis.stability.hands import OWN, standing
 from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.components.specs.hand import ArmHand, SpringHand
-from hapticlink.orchestrator.base.loop_names import HANDLE_VELOCITY
+from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
 
 SECONDS = 60.0
 EARLY, LATE = (0.25, 2.0), 5.0

@@ -88,7 +88,7 @@ def test_bad_input_is_status_2(
     assert message in " ".join("".join(capsys.readouterr()).split())
 
 
-EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.archive", "scipy")
+EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.python_fmu", "scipy")
 
 
 @pytest.mark.parametrize(

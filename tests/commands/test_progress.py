@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.commands import progress
-from hapticlink.orchestrator.base.faults import Fault, Interrupted
+from hapticlink.orchestrator.base.errors import Fault, Interrupted
 
 
 def test_a_long_command_tells_how_long_it_took(

@@ -21,7 +21,6 @@ import hapticlink as hl
 from hapticlink.analysis.sweep.grid import grid, parse
 from hapticlink.commands import COMMANDS, _commands, app
 from hapticlink.commands.json_schema import json_schema
-from hapticlink.orchestrator.plan import schemes  # noqa: F401 (registers the schemes)
 from tests.docs.pages import PAGES, ROOT, Block, blocks, name, prose
 from tests.plugins import hapticlink
 
@@ -81,7 +80,7 @@ NOT_RUN = {
 }  # fmt: skip
 """Commands that are parsed, with their scene, keys and values, but not run; the reason."""
 UNTIL_STOPPED = re.compile("hapticlink (view (?!.*--export)|serve )")
-"""Commands that run until Ctrl-C, parsed but not run; tests/visualization/served."""
+"""Commands that run until Ctrl-C, parsed but not run; tests/visualization/live_page."""
 TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""
 

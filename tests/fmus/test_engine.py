@@ -13,7 +13,7 @@ from hapticlink.fmus.blocks import build_block, component
 from hapticlink.fmus.check import check_fmu
 from hapticlink.fmus.engine import mujoco_fmu
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.blocks import blocks
 from tests.shared_fixtures import run_once
 

@@ -13,9 +13,9 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from hapticlink.components.component import Block, Variable
-from hapticlink.fmus.archive import write
 from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.check import Session, check_fmu, session
+from hapticlink.fmus.reproducible_zip import write
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.holds import HOLDS
 from tests.programs.built import program
 from tests.programs.comparison import differing, outputs, run

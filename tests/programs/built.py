@@ -15,7 +15,7 @@ import pytest
 from fmpy import platform, platform_tuple, sharedLibraryExtension
 from fmpy.validation import validate_fmu
 
-from hapticlink.fmus.archive import write
+from hapticlink.fmus.reproducible_zip import write
 from hapticlink.orchestrator import open_scene
 from hapticlink.programs.build import OPTIONS, program_files
 

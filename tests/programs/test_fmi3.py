@@ -20,7 +20,7 @@ from fmpy.fmi3 import FMU3Slave
 from lxml import etree
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from tests.programs.built import needs_compiler, program
 from tests.programs.comparison import Outputs, differing, run
 

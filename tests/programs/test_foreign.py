@@ -15,10 +15,10 @@ from fmpy.fmi1 import FMICallException
 
 from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.programs.build import build_program, program_files
-from hapticlink.visualization.interactive.viewed_scene import viewed
+from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
 from tests.orchestrator import foreign_fmus, native_mass
 from tests.programs import test_page_program

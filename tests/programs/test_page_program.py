@@ -29,12 +29,12 @@ from hapticlink.orchestrator.system.build_system import built
 from hapticlink.programs.build import components
 from hapticlink.programs.page_program import webassembly_files
 from hapticlink.programs.ports import ports
-from hapticlink.programs.resolved import resolved
-from hapticlink.visualization.interactive.viewed_scene import STIFFNESS, viewed
-from hapticlink.visualization.page import one_file
+from hapticlink.programs.resolve_scene import resolved
+from hapticlink.visualization.browser_code import one_file
+from hapticlink.visualization.interactive_scene.viewed_scene import STIFFNESS, viewed
 from hapticlink.visualization.standalone import page
 from hapticlink.visualization.standalone.description import Description
-from tests.visualization.page.javascript import javascript
+from tests.visualization.browser_code.javascript import javascript
 
 P_C = "virtual_environment.P_c -> controller.P_c"
 CHANGES: list[tuple[int, dict[str, Any]]] = [
@@ -104,7 +104,7 @@ def changed_run(scene: Scene, folder: Path, apply: Callable[[LiveRun, Any], None
 
 
 def apply(live: LiveRun, message: dict[str, Any]) -> None:
-    """As visualization/served/controls.py does, written out for these gains."""
+    """As visualization/live_page/controls.py does, written out for these gains."""
     match message:
         case {"type": "hand", "at": None}:
             live.set("hand.stiffness", (0.0, 0.0, 0.0))

@@ -15,7 +15,7 @@ from fmpy.fmi1 import FMICallException
 
 from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.programs.build import build_program, program_files
 from tests.programs.built import COMPILER, FLAGS, needs_compiler, program
 from tests.programs.comparison import differing, outputs, run

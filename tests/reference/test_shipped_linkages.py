@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from tests.blocks import Running, virtual_mechanism
 
 H = 1 / 512

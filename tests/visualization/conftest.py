@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.visualization.page.served_page import Served
+from tests.visualization.browser_code.served_page import Served
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import numpy as np
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
-from hapticlink.orchestrator.base.loop_names import POINT_POSE
+from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare.settings import one_mechanism

@@ -15,7 +15,7 @@ from hapticlink.analysis.findings.tracking import (
     pose_error,
 )
 from hapticlink.analysis.findings.user_port import user_port
-from hapticlink.orchestrator.base.loop_names import POINT_POSE
+from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.visualization.figure_axes import plain

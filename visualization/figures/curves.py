@@ -1,5 +1,5 @@
-"""Curves over a run: every sample of it, or, of a run of several windows, those that are the least
-or the most of a stretch, which are as many as a screen can show."""
+"""Curves over a run: every sample of a short one; of a long one the minimum and the maximum of each
+of STRETCHES intervals, which is what a screen can show."""
 
 from __future__ import annotations
 

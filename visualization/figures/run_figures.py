@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hapticlink.analysis.findings import summary, words
+from hapticlink.analysis.findings import labels, summary
+from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
-from hapticlink.analysis.findings.limits import NOTICEABLE_J
 from hapticlink.analysis.findings.tracking import (
     constrained,
     constraint_counts,
@@ -29,7 +29,7 @@ from hapticlink.analysis.findings.user_port import UserPort
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
     HANDLE_POSE,
@@ -38,7 +38,7 @@ from hapticlink.orchestrator.base.loop_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import last_time, short
-from hapticlink.orchestrator.results.scene_part import all_devices, scene_part
+from hapticlink.orchestrator.results.recorded_scene import all_devices, scene_part
 from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figure_axes import framed, plain, png, titled
@@ -374,7 +374,7 @@ def _generated(results: Results) -> dict[str, float]:
     """Energy (J) that the hold of each connection between rates generated, of all connections where
     none is between rates; none that is rounding."""
     meters = results.record.across or results.record.meters
-    said = words.connections(meters)
+    said = labels.connections(meters)
     return {
         said[name]: energy.generated
         for name, energy in meters.items()

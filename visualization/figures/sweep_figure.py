@@ -13,7 +13,7 @@ import numpy as np
 from hapticlink.analysis.sweep.grid import number
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.table import columns
-from hapticlink.orchestrator.base.faults import InputFault, unknown
+from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.figure_axes import plain

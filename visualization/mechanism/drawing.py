@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.results.scene_part import by_user
+from hapticlink.orchestrator.results.recorded_scene import by_user
 from hapticlink.visualization.figure_axes import plain
 from hapticlink.visualization.mechanism import workspace_drawing
 from hapticlink.visualization.mechanism.marks import (

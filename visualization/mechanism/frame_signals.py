@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hapticlink.orchestrator.base.loop_names import (
+from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
     CONTACT_GAP,

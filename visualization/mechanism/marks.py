@@ -1,7 +1,7 @@
 """A drawing of a mechanism as a list of marks: what is drawn where, in which order and how.
 
 It is the one description of figures, live page, replays and animations. Their painters,
-`drawing.py` and `page/painter.js`, know lines and colours, but no linkage.
+`drawing.py` and `browser_code/painter.js`, know lines and colours, but no linkage.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.limits import EPISODES
+from hapticlink.analysis.findings.episode_thresholds import EPISODES
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Body, Linkage
 

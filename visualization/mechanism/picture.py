@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from hapticlink.analysis.findings.limits import FULL_TORQUE, NOTICEABLE_J
+from hapticlink.analysis.findings.episode_thresholds import FULL_TORQUE, NOTICEABLE_J
 from hapticlink.components.device.numeric_torques import torque_function
 from hapticlink.components.device.workspace import link_function
 from hapticlink.components.linkage.poses import pose_function

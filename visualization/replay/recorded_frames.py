@@ -21,9 +21,9 @@ from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.base.loop_names import JOINT_COORDINATES, POINT_POSE
-from hapticlink.orchestrator.results.scene_part import by_user, scene_part
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_POSE
+from hapticlink.orchestrator.results.recorded_scene import by_user, scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector, load
 from hapticlink.visualization.mechanism.frame_signals import candidates
 from hapticlink.visualization.mechanism.picture import PORT, Picture

@@ -9,7 +9,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socket import AF_INET, AF_INET6
 
-from hapticlink.visualization.page.one_file import POLICY
+from hapticlink.visualization.browser_code.one_file import POLICY
 
 HEADERS = {
     "Content-Type": "text/html; charset=utf-8",

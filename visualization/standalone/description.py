@@ -8,13 +8,13 @@ from typing import Any
 
 import casadi as ca
 
-from hapticlink.orchestrator.base.loop_names import MECHANISM_ENERGY
-from hapticlink.orchestrator.results.scene_part import by_user
+from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
+from hapticlink.orchestrator.results.recorded_scene import by_user
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
-from hapticlink.programs.resolved import Resolved
-from hapticlink.visualization.interactive import scene_message
-from hapticlink.visualization.interactive.offered_controls import (
+from hapticlink.programs.resolve_scene import Resolved
+from hapticlink.visualization.interactive_scene import scene_message
+from hapticlink.visualization.interactive_scene.offered_controls import (
     Offered,
     Settings,
     stiffness,

@@ -6,21 +6,21 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from hapticlink.fmus import archive, cache
+from hapticlink.fmus import cache, reproducible_zip
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler import WEBASSEMBLY_FLAGS, compiler_version
 from hapticlink.orchestrator.base import interrupt, temporary_folders
-from hapticlink.orchestrator.base.faults import Fault, InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.build import components
 from hapticlink.programs.page_program import webassembly, webassembly_files
 from hapticlink.programs.ports import ports
-from hapticlink.programs.resolved import resolved
-from hapticlink.visualization.interactive.offered_controls import Settings
-from hapticlink.visualization.interactive.prediction import predicted
-from hapticlink.visualization.page import one_file
+from hapticlink.programs.resolve_scene import resolved
+from hapticlink.visualization.browser_code import one_file
+from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.prediction import predicted
 from hapticlink.visualization.standalone.description import Description
 
 POLICY = (
@@ -70,7 +70,7 @@ def _compiled(files: Mapping[str, str], room: Path) -> bytes:
         def make(folder: Path) -> Path:
             path = folder / "page.fmu"
             with path.open("xb") as file:
-                archive.write({MODULE: webassembly(files, folder)}, file)
+                reproducible_zip.write({MODULE: webassembly(files, folder)}, file)
             return path
 
         path = cache.cached(material, make, room, interrupt.check)

@@ -9,24 +9,24 @@ period. A loop by direct feed-through alone is an error.
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.base.faults import InputFault
-from hapticlink.orchestrator.plan import building_blocks, dependency_order
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.plan import dependency_order, operation_sequences
 from hapticlink.orchestrator.plan.operations import Event, Operation
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
-    sampled, continuous = building_blocks.firing(system, event)
-    operations: list[Operation] = [*building_blocks.publish_ended(system, event, continuous)]
+    sampled, continuous = operation_sequences.firing(system, event)
+    operations: list[Operation] = [*operation_sequences.publish_ended(system, event, continuous)]
     for fmu in in_order(system, sampled):
-        operations += building_blocks.feed(system, event, fmu)
-        operations += building_blocks.step(system, event, fmu)
-        operations += building_blocks.publish(system, fmu)
-    operations += building_blocks.record(system, event)
-    for fmu in building_blocks.starting(event, continuous):
-        operations += building_blocks.feed(system, event, fmu)
-        operations += building_blocks.step(system, event, fmu)
+        operations += operation_sequences.feed(system, event, fmu)
+        operations += operation_sequences.step(system, event, fmu)
+        operations += operation_sequences.publish(system, fmu)
+    operations += operation_sequences.record(system, event)
+    for fmu in operation_sequences.starting(event, continuous):
+        operations += operation_sequences.feed(system, event, fmu)
+        operations += operation_sequences.step(system, event, fmu)
     return tuple(operations)
 
 

@@ -9,7 +9,7 @@ comparison with the literature on continuous coupling.
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.plan import building_blocks, dependency_order
+from hapticlink.orchestrator.plan import dependency_order, operation_sequences
 from hapticlink.orchestrator.plan.operations import Event, Operation
 from hapticlink.orchestrator.plan.schemes import gauss_seidel
 from hapticlink.orchestrator.system.system import Fmu, System
@@ -17,12 +17,14 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
-    operations = [*gauss_seidel.block(system, building_blocks.without_steps(event))]
-    starting = building_blocks.starting(event, building_blocks.firing(system, event)[1])
+    operations = [*gauss_seidel.block(system, operation_sequences.without_steps(event))]
+    starting = operation_sequences.starting(event, operation_sequences.firing(system, event)[1])
     for unit in (u for group in dependency_order.plants(system, starting) for u in group):
-        operations += building_blocks.feed(system, event, unit)
-        operations += building_blocks.step(system, event, unit)
-        operations += building_blocks.publish(system, unit, building_blocks.dticks(event, unit))
+        operations += operation_sequences.feed(system, event, unit)
+        operations += operation_sequences.step(system, event, unit)
+        operations += operation_sequences.publish(
+            system, unit, operation_sequences.dticks(event, unit)
+        )
     return tuple(operations)
 
 

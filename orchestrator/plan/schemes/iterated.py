@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from math import sqrt
 
-from hapticlink.orchestrator.plan import building_blocks, dependency_order
+from hapticlink.orchestrator.plan import dependency_order, operation_sequences
 from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
@@ -40,13 +40,13 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks, and
     for FMUs of a loop that do not support rollback."""
-    operations = [*gauss_seidel.block(system, building_blocks.without_steps(event))]
+    operations = [*gauss_seidel.block(system, operation_sequences.without_steps(event))]
     for group in groups(system, event):
         if len(group) > 1:
             operations += _repeat(system, event, group)
         else:
             operations += _step(system, event, group[0], [])
-            operations.append(Get(group[0].name, building_blocks.dticks(event, group[0])))
+            operations.append(Get(group[0].name, operation_sequences.dticks(event, group[0])))
         operations += _push_on(system, event, group)
     return tuple(operations)
 
@@ -60,7 +60,7 @@ def ordered(system: System) -> list[list[Fmu]]:
 
 def groups(system: System, event: Event) -> list[list[Fmu]]:
     """The plants that start a step, in order; those of a loop are in one group."""
-    starting = building_blocks.starting(event, building_blocks.firing(system, event)[1])
+    starting = operation_sequences.starting(event, operation_sequences.firing(system, event)[1])
     clock = {u.name: u.clock for u in starting}
     feeds = {
         u.name: {c.source for c in system.into(u.name) if clock.get(c.source) == u.clock}
@@ -71,9 +71,9 @@ def groups(system: System, event: Event) -> list[list[Fmu]]:
 
 def _repeat(system: System, event: Event, group: list[Fmu]) -> Iterator[Operation]:
     names = [u.name for u in group]
-    building_blocks.require_rollback(system, names, "coupling = 'iterated'")
+    operation_sequences.require_rollback(system, names, "coupling = 'iterated'")
     loop = [c for n in names for c in system.into(n) if c.source in names]
-    dticks = building_blocks.dticks(event, group[0])
+    dticks = operation_sequences.dticks(event, group[0])
     body = [op for fmu in group for op in _step(system, event, fmu, loop)]
     # The signal vector still contains the guess, which direct feed-through is evaluated with.
     body += [Set(n, now=True) for n in names if n in system.coupling.get_after_set]
@@ -94,15 +94,18 @@ def _push_on(system: System, event: Event, group: list[Fmu]) -> Iterator[Operati
     plants = [u.name for u in system.fmus if u.clock == clock and not u.sampled]
     for c in (c for n in names for c in system.out_of(n) if c.hold):
         if c.target in plants and c.target not in names:
-            yield Push(c.name, building_blocks.dticks(event, group[0]))
+            yield Push(c.name, operation_sequences.dticks(event, group[0]))
 
 
 def _step(system: System, event: Event, fmu: Fmu, loop: list[Connection]) -> Iterator[Operation]:
     """The step of a plant; each substep uses mean and first moment of the inputs from `loop`."""
-    parts, dticks = system.coupling.substeps.get(fmu.name, 1), building_blocks.dticks(event, fmu)
+    parts, dticks = (
+        system.coupling.substeps.get(fmu.name, 1),
+        operation_sequences.dticks(event, fmu),
+    )
     inside = {c.name for c in loop}
     for part in range(parts):
-        for operation in building_blocks.feed(system, event, fmu, part):
+        for operation in operation_sequences.feed(system, event, fmu, part):
             match operation:
                 case Evaluate(name, order=0) if name in inside:
                     yield Blend(name, substep(part, parts, dticks))

@@ -6,26 +6,26 @@ t reaches the others one event later. Sampled outputs are read and recorded with
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.plan import building_blocks
+from hapticlink.orchestrator.plan import operation_sequences
 from hapticlink.orchestrator.plan.operations import Event, Operation
 from hapticlink.orchestrator.system.system import System
 
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
-    sampled, continuous = building_blocks.firing(system, event)
-    started = building_blocks.starting(event, continuous)
-    operations: list[Operation] = [*building_blocks.publish_ended(system, event, continuous)]
+    sampled, continuous = operation_sequences.firing(system, event)
+    started = operation_sequences.starting(event, continuous)
+    operations: list[Operation] = [*operation_sequences.publish_ended(system, event, continuous)]
     for unit in [*sampled, *started]:
-        operations += building_blocks.feed(system, event, unit)
+        operations += operation_sequences.feed(system, event, unit)
     for unit in sampled:
-        operations += building_blocks.step(system, event, unit)
+        operations += operation_sequences.step(system, event, unit)
     divided = [unit for unit in started if unit.name in system.coupling.substeps]
     for unit in divided:  # all its substeps take what the first one does
-        operations += building_blocks.step(system, event, unit)
+        operations += operation_sequences.step(system, event, unit)
     for unit in sampled:
-        operations += building_blocks.publish(system, unit)
-    operations += building_blocks.record(system, event)
+        operations += operation_sequences.publish(system, unit)
+    operations += operation_sequences.record(system, event)
     for unit in started:
         if unit not in divided:
-            operations += building_blocks.step(system, event, unit)
+            operations += operation_sequences.step(system, event, unit)
     return tuple(operations)

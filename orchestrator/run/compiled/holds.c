@@ -101,7 +101,7 @@ static void take(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     keep(h, y, stamp);
 }
 
-/* manifolds.Unwrapped; `y` is the caller's to change. */
+/* holds_on_manifolds.Unwrapped; `y` is the caller's to change. */
 static void unwrap(Hold *h, double *y) {
     for (int64_t i = 0; i < h->n_angles; i++) {
         double *angle = y + h->angles[i];

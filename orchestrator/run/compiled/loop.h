@@ -99,7 +99,7 @@ typedef struct {
 
 /* --- holds ------------------------------------------------------------------------------------ */
 
-/* Samples in transit: latency.py. `late` are latencies (ticks) drawn in advance, -1 for a lost
+/* Samples in transit: latency_and_loss.py. `late` are latencies (ticks) drawn in advance, -1 for a lost
  * sample. */
 typedef struct {
     int64_t started, newest, sent, lost, overtaken;

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import Hold
@@ -25,7 +25,7 @@ from hapticlink.orchestrator.plan.operations import (
 )
 from hapticlink.orchestrator.run.bind_operations import Bound, Stop
 from hapticlink.orchestrator.run.compiled import fmus, structures
-from hapticlink.orchestrator.run.compiled.holds import (
+from hapticlink.orchestrator.run.compiled.hold_structures import (
     CompiledHold,
     CompiledTank,
     can,

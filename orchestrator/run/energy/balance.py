@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hapticlink.orchestrator.base.faults import Diverged
-from hapticlink.orchestrator.base.loop_names import CONTROLLER, MECHANISM
+from hapticlink.orchestrator.base.errors import Diverged
+from hapticlink.orchestrator.base.signal_names import CONTROLLER, MECHANISM
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, islice
 
-from hapticlink.orchestrator.base.faults import COUNTED
+from hapticlink.orchestrator.base.errors import COUNTED
 from hapticlink.orchestrator.scene.blocks import blocks as plan_blocks
 from hapticlink.orchestrator.scene.checks import (
     blocks,

@@ -7,8 +7,8 @@ import re
 from collections.abc import Collection, Iterator
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.faults import unknown
-from hapticlink.orchestrator.base.loop_names import SHARED
+from hapticlink.orchestrator.base.errors import unknown
+from hapticlink.orchestrator.base.signal_names import SHARED
 from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene

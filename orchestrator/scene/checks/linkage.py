@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from hapticlink.components.specs.drives import ConstantDrive
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from hapticlink.orchestrator.base.faults import unknown
+from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene.blocks import Blocks
 from hapticlink.orchestrator.scene.rates import AnyRate, Seconds, VariableRate

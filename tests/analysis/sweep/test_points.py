@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def _as_it_was() -> Iterator[None]:
         ("components/component.py", True),
         ("analysis/sweep/row.py", True),
         ("visualization/figure_axes.py", False),
-        ("visualization/served/server.py", False),
+        ("visualization/live_page/server.py", False),
     ],
 )
 def test_a_changed_byte_changes_the_key_of_what_computes_a_row(

@@ -24,7 +24,7 @@ from hapticlink.analysis.sweep.grid import Axis, listed, parse
 from hapticlink.analysis.sweep.job import Job
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.results.run_record import Energy

@@ -25,7 +25,7 @@ from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.overrides import written
 from tests.analysis.stability.own_hand import linearised
 

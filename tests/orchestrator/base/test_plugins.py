@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.orchestrator.base import plugins
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from tests.plugins import hapticlink
 
 HOLD = """

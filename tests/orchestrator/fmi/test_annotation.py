@@ -9,7 +9,7 @@ from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.ports import Power, Spring
 from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.errors import FmuError
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import describe
 from tests.orchestrator.foreign_fmus import edited, python_fmu
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.fmi.description import describe
 from tests.orchestrator.foreign_fmus import (
     ISOLATED,

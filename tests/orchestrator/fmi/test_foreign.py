@@ -10,7 +10,7 @@ import pythonfmu
 from pythonfmu.builder import FmuBuilder
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion

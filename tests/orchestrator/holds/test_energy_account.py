@@ -16,7 +16,7 @@ from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.scene.records import Latency
-from hapticlink.orchestrator.system.latency import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 Vector = NDArray[np.float64]
 LARGEST = 5.0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 
 Vector = NDArray[np.float64]
 stamps = st.lists(st.integers(1, 40), min_size=3, max_size=8).map(np.cumsum)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import hapticlink as hl
 from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd

@@ -13,10 +13,10 @@ from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.manifolds import Unwrapped
+from hapticlink.orchestrator.holds.holds_on_manifolds import Unwrapped
 from hapticlink.orchestrator.run.spring_holds import WithFurther
 from hapticlink.orchestrator.scene.records import Latency
-from hapticlink.orchestrator.system.latency import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 Vector = NDArray[np.float64]
 N, TICK, TURN = 3, 1e-3, 2 * np.pi

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.network import parts, server
+from hapticlink.orchestrator.network import served_part, server
 from hapticlink.orchestrator.network.messages import Answer, Request, answer_of
 from hapticlink.orchestrator.network.server import Server
 from hapticlink.orchestrator.system.build_system import built
@@ -64,7 +64,7 @@ def run(tmp_path: Path) -> Iterator[Run]:
     read = open_scene.load(scene(tmp_path, '[[fmu]]\nname = "slow"\npath = "Slow.fmu"\n'), ())
     with built(read) as system:
         fmu = system.fmu["slow"]
-        identity = parts.identity(read, fmu)
+        identity = served_part.identity(read, fmu)
         serving = Server({"slow": (fmu, identity)}, read.faults, lambda text: None)
         yield Run(serving, ONE, identity)
         serving.close()
@@ -134,7 +134,7 @@ def test_a_fault_of_the_fmu_is_the_answer(tmp_path: Path) -> None:
     python_fmu(tmp_path, "Slow", "raise ValueError('three')")
     read = open_scene.load(scene(tmp_path, '[[fmu]]\nname = "slow"\npath = "Slow.fmu"\n'), ())
     with built(read) as system:
-        identity = parts.identity(read, system.fmu["slow"])
+        identity = served_part.identity(read, system.fmu["slow"])
         serving = Server({"slow": (system.fmu["slow"], identity)}, read.faults, lambda text: None)
         answer = Run(serving, ONE, identity).started().call("step", 0.0, 0.25, 0.25)
         serving.close()

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.network import key_file
 from hapticlink.orchestrator.results.tables import read_table
 from tests.orchestrator.foreign_fmus import python_fmu, scene

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import folder_lock, tables
 from tests.orchestrator.foreign_fmus import RUN as COMMAND

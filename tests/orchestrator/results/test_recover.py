@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
 from hapticlink.orchestrator.results.files import FileRecorder

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import tables
 from hapticlink.orchestrator.results.recover import recover
 from tests.shared_fixtures import status

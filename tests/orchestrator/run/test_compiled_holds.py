@@ -15,13 +15,18 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run.compiled import structures
-from hapticlink.orchestrator.run.compiled.holds import KINDS, CompiledHold, CompiledTank, parts
+from hapticlink.orchestrator.run.compiled.hold_structures import (
+    KINDS,
+    CompiledHold,
+    CompiledTank,
+    parts,
+)
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.scene.records import Latency
-from hapticlink.orchestrator.system.latency import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 NUMERATOR, DENOMINATOR = 3, 7680
 SIZE = 3
@@ -238,7 +243,7 @@ import ctypes, threading
 import numpy as np
 from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.run.compiled import structures
-from hapticlink.orchestrator.run.compiled.holds import CompiledHold
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.library import load
 
 N = 100_000

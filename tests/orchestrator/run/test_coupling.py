@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator import experiment
-from hapticlink.orchestrator.base.faults import FmuFault, InputFault
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays

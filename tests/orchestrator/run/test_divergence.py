@@ -2,7 +2,7 @@
 
 import pytest
 
-from hapticlink.orchestrator.base.faults import Diverged
+from hapticlink.orchestrator.base.errors import Diverged
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.foreign_fmus import (
     ISOLATED,

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
 from tests.orchestrator.foreign_fmus import (

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.faults import Interrupted
+from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
 from tests.orchestrator.foreign_fmus import ISOLATED, RUN, c_fmu, fmu_table, python_fmu, scene

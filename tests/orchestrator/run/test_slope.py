@@ -9,7 +9,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from tests.orchestrator.foreign_fmus import fmu_table, wire_table
 
 RATE = 7.3

@@ -8,7 +8,7 @@ from contextlib import suppress
 import pytest
 
 from hapticlink.analysis.sweep import grid
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.scene import overrides, read_and_check
 from tests.orchestrator.scene.test_refused_scenes import refused
 from tests.orchestrator.scene.test_scene import GOOD, findings

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene import read_and_check
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.find_scene import shipped
 from tests.shared_fixtures import BAR

@@ -66,7 +66,7 @@ def asked(monkeypatch):
         library.write_bytes(platform.encode())
         return library
 
-    monkeypatch.setattr("hapticlink.fmus.native.archive.compile_library", compiled)
+    monkeypatch.setattr("hapticlink.fmus.native.native_fmu.compile_library", compiled)
     return platforms
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticlink.commands.json_schema import json_schema
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.scene import overrides, read_and_check
 from hapticlink.orchestrator.scene.scene_source import Source
 from tests.orchestrator.scene_numbers import SCENES, beyond, key, of_scene, put, tables, toml

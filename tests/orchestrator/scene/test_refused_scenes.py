@@ -5,7 +5,7 @@ system/test_refused_systems.py; several faults of one file, with their lines, in
 import pytest
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene import read_and_check
 from tests.orchestrator.scene.test_scene import GOOD
 

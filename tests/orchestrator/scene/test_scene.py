@@ -5,7 +5,7 @@ import pytest
 from hapticlink.components.specs.hand import SpringHand
 from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.scene import find_scene, read_and_check
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate

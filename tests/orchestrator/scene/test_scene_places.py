@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene import overrides, read_and_check
 from hapticlink.orchestrator.ssp import names

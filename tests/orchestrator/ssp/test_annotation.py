@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.foreign_fmus import edited, edited_entries, python_fmu
 from tests.orchestrator.ssps import foreign

@@ -9,7 +9,7 @@ from fmpy.ssp.ssd import read_ssd
 
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
 from tests.orchestrator.foreign_fmus import (

@@ -7,7 +7,7 @@ import pytest
 from fmpy.ssp.simulation import simulate_ssp
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from tests.orchestrator.ssps import (
     ON,
     TABLE,

@@ -10,7 +10,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.components.blocks import BLOCKS as BUILDERS
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.foreign_fmus import (
     fmu_table,

@@ -4,7 +4,7 @@ scene/test_refused_scenes.py."""
 
 import pytest
 
-from hapticlink.orchestrator.base.faults import InputFault
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 
 NO_POWER = "no connection across rates carries power"

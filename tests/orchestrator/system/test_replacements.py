@@ -8,7 +8,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.commands.options import Changes
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.scene import overrides
 from tests.orchestrator.foreign_fmus import entries, slave
 from tests.orchestrator.results.records import tables_of

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from hapticlink.orchestrator.base.faults import SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan

@@ -12,7 +12,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.visualization.replay import replay_page
 from hapticlink.visualization.replay.recorded_frames import Recorded
-from tests.visualization.page.chromium import Page, chromium
+from tests.visualization.browser_code.chromium import Page, chromium
 
 LINK = 0.042
 """Length (m) of link 1 of Table 6.1, which turns about the origin."""

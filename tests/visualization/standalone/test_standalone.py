@@ -12,8 +12,8 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.commands import main
-from tests.visualization.page.chromium import AT, Page, chromium
-from tests.visualization.page.compared_runs import differ_without_topology
+from tests.visualization.browser_code.chromium import AT, Page, chromium
+from tests.visualization.browser_code.compared_runs import differ_without_topology
 
 
 @pytest.fixture(scope="module")

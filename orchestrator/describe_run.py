@@ -1,0 +1,111 @@
+"""What run.json says of a run before it begins: scene, versions, rates, holds, connections."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable
+
+from hapticlink.fmus.versions import version
+from hapticlink.orchestrator.base import plugins
+from hapticlink.orchestrator.base.signal_names import MECHANISM
+from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_record import (
+    ClockSteps,
+    RecordedFmu,
+    RefusedHold,
+    RunSetup,
+)
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.scene.rates import VariableRate
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.ports import power_across_rates
+from hapticlink.orchestrator.system.system import System
+
+PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
+"""Those whose versions are recorded."""
+
+
+def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[str]) -> RunSetup:
+    """The record of a run that has not begun. tables: names of its tables, without their ending;
+    not_recorded: outputs of which an entry is not written."""
+    system, timeline = plan.system, plan.system.timeline
+    seconds, base = timeline.seconds, timeline.base
+    held = [c for c in system.connections if c.hold]
+    return RunSetup(
+        scene=scene.tables(),
+        options=list(scene.source.options) if scene.source else [],
+        versions={name: version(name) for name in (*PACKAGES, *_compilers(scene))}
+        | {"python": platform.python_version()},
+        plugins=plugins.loaded(),
+        seeds=_seeds(scene, system),
+        files=["run.json", *(f"{table}.{scene.record.format}" for table in tables)],
+        rates=[c.name for c in timeline.clocks],
+        clocks={
+            c.name: ClockSteps(seconds(c.first), seconds(c.shortest), seconds(c.longest))
+            for c in timeline.clocks
+        },
+        stop_when=str(system.ends_when or ""),
+        base=f"{base.numerator}/{base.denominator} s",
+        fmus={
+            u.name: RecordedFmu(u.clock, u.description.timing, system.block(u.name))
+            for u in system.fmus
+        },
+        friction_speeds=_friction_speeds(scene, system),
+        coupling=system.coupling.scheme,
+        loops=list(plan.loops()),
+        connections=[c.name for c in system.connections],
+        replaced=dict(system.replacements),
+        holds={c.name: c.hold for c in held if c.hold},
+        holds_that_did_not_fit={
+            r.connection.name: RefusedHold(r.hold, r.reason) for r in system.refused
+        },
+        held_as={c.name: c.kind for c in held if c.kind},
+        latencies={c.name: c.latency for c in held if c.latency},
+        substeps={
+            u.name: system.coupling.substeps.get(u.name, 1) for u in system.fmus if not u.sampled
+        },
+        within_a_step={
+            c.name: _within_a_step(
+                held_polynomials.order(system, c), system.coupling.substeps.get(c.target, 1)
+            )
+            for c in system.connections
+            if held_polynomials.degree(system, c)
+        },
+        get_after_set=list(system.coupling.get_after_set),
+        power_across_rates=power_across_rates(system),
+        events=[(change.begin, change.text) for change in system.changes],
+        not_recorded=not_recorded,
+    )
+
+
+def _within_a_step(order: int, substeps: int) -> str:
+    """How a plant takes an input whose hold varies within its step."""
+    if order:
+        renewed = f", renewed in {substeps} substeps" if substeps > 1 else ""
+        return f"derivatives to order {order}{renewed}"
+    if substeps > 1:
+        return f"constant in each of {substeps} substeps"
+    return "constant, the hold at the middle (half-step lead)"
+
+
+def _friction_speeds(scene: Scene, system: System) -> dict[str, float]:
+    """v_f (rad/s or m/s) of the mechanism's joints with friction, by name."""
+    if MECHANISM not in system.fmu or not (scene.linkage and scene.linkage.rubbing):
+        return {}
+    from hapticlink.components.dynamics import friction_scale  # loads CasADi
+
+    timeline = system.timeline
+    period = timeline.seconds(timeline.clock(system.fmu[MECHANISM].clock).longest)
+    return friction_scale.speeds(scene.linkage, period / scene.mechanism.substeps)
+
+
+def _compilers(scene: Scene) -> tuple[str, ...]:
+    return ("ziglang",) if scene.packaging == "native" and blocks(scene).built else ()
+
+
+def _seeds(scene: Scene, system: System) -> dict[str, int]:
+    rates = {"graphics.rate": scene.graphics.rate} if scene.graphics else {}
+    rates |= {f"fmu.{fmu.name}.rate": fmu.rate for fmu in scene.fmu if fmu.rate}
+    seeds = {name: r.seed for name, r in rates.items() if isinstance(r, VariableRate)}
+    return seeds | {c.name: c.latency.seed for c in system.connections if c.latency}

@@ -1,0 +1,117 @@
+"""Sequences of operations that all schemes share: publish, feed, step, record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi.capabilities import STATE, restores_state
+from hapticlink.orchestrator.plan.operations import (
+    Evaluate,
+    Event,
+    Get,
+    Operation,
+    Push,
+    Record,
+    Set,
+    Step,
+    StopWhen,
+)
+from hapticlink.orchestrator.system import held_polynomials
+from hapticlink.orchestrator.system.system import Fmu, System
+
+
+def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
+    """The FMUs whose clocks fire at this event, as (sampled, continuous)."""
+    clocks = {f.clock for f in event.firings}
+    due = [u for u in system.fmus if u.clock in clocks]
+    return [u for u in due if u.sampled], [u for u in due if not u.sampled]
+
+
+def without_steps(event: Event) -> Event:
+    """The event with the steps of all plants left out."""
+    return event._replace(firings=tuple(f._replace(final=True) for f in event.firings))
+
+
+def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
+    """The plants that start a step; steps that would pass the end of the run are not started."""
+    started = {f.clock for f in event.firings if not f.final}
+    return [u for u in continuous if u.clock in started]
+
+
+def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:
+    """Read the outputs of an FMU and push them into the holds of its connections."""
+    yield Get(fmu.name, ahead)
+    for connection in system.out_of(fmu.name):
+        if connection.hold:
+            yield Push(connection.name, ahead)
+
+
+def publish_ended(system: System, event: Event, continuous: list[Fmu]) -> Iterator[Operation]:
+    """Publish the outputs of the plants whose steps end at this event (initialisation has read
+    those of t = 0). Plants in `get_after_set` take their new inputs and are read once more, so that
+    direct feed-through acts within the tick."""
+    if not event.first:
+        for fmu in continuous:
+            yield from publish(system, fmu)
+        for fmu in continuous:
+            if fmu.name in system.coupling.get_after_set and system.into(fmu.name):
+                yield Set(fmu.name, now=True)
+                yield from publish(system, fmu)
+
+
+def feed(system: System, event: Event, fmu: Fmu, part: int = 0) -> Iterator[Operation]:
+    """Evaluate the holds in front of an FMU and set its inputs.
+
+    A plant keeps an input constant over its step or substep, so it gets the hold's value at the
+    middle of it, or, where it interpolates inputs, the value and the derivatives at the beginning.
+    A sampled block gets the value at this tick.
+    """
+    incoming = system.into(fmu.name)
+    width = Fraction(0)
+    if not fmu.sampled:
+        width = Fraction(dticks(event, fmu), system.coupling.substeps.get(fmu.name, 1))
+    orders = {c.name: held_polynomials.order(system, c) for c in incoming if c.hold}
+    for name, order in orders.items():
+        if order:
+            yield Evaluate(name, part * width, order, width)
+        else:
+            yield Evaluate(name, part * width + width / 2)
+    if incoming:
+        yield Set(fmu.name, derivatives=any(orders.values()))
+
+
+def dticks(event: Event, fmu: Fmu) -> int:
+    return next(f.dticks for f in event.firings if f.clock == fmu.clock)
+
+
+def step(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
+    """Step an FMU whose inputs are set; inputs of a plant are updated before each substep."""
+    parts = 1 if fmu.sampled else system.coupling.substeps.get(fmu.name, 1)
+    for part in range(parts):
+        if part:
+            yield from feed(system, event, fmu, part)
+        yield Step(fmu.name, dticks(event, fmu), part, parts)
+
+
+def record(system: System, event: Event) -> Iterator[Operation]:
+    """Record a row for each clock that fires, then test the stop condition."""
+    for f in event.firings:
+        yield Record(f.clock)
+    condition = system.ends_when
+    if condition and any(f.clock == system.fmu[condition.fmu].clock for f in event.firings):
+        yield StopWhen()
+
+
+def require_rollback(system: System, names: Iterable[str], what: str) -> None:
+    """Raises InputFault with the FMUs of `names` that cannot save and restore their state; `what`
+    needs it."""
+    unable = [n for n in names if not restores_state(system.fmu[n].description)]
+    if unable:
+        flags = {STATE[system.fmu[n].description.fmi] for n in unable}
+        raise InputFault(
+            f"{what} takes steps back, and {', '.join(unable)} cannot save and restore its state "
+            f"({' or '.join(sorted(flags))} is not true); take coupling = 'gauss-seidel' or "
+            "'jacobi' with a higher rate"
+        )

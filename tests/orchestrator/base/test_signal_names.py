@@ -1,0 +1,40 @@
+"""The names that results and views look up are those of the FMUs."""
+
+from collections.abc import Iterator
+
+from hapticlink.components.blocks import BLOCKS
+from hapticlink.orchestrator.base import signal_names
+from hapticlink.orchestrator.base.signal_names import block_of_user, signal_of_user, user_of_block
+from tests.orchestrator.systems import system_of
+
+
+def _constants() -> Iterator[str]:
+    for name, value in vars(signal_names).items():
+        if name.isupper():
+            yield from (value,) if isinstance(value, str) else value
+
+
+def _outputs(scene: str, options: tuple[str, ...]) -> Iterator[str]:
+    for fmu in system_of(scene, *options).fmus:
+        yield from (f"{fmu.name}.{s.port}" for s in fmu.description.outputs)
+
+
+def test_every_name_is_a_block_or_an_output_of_one():
+    options = ("mechanism.directions=true", "controller.passivity=true")
+    midpoint = ("mechanism.integrator=passive-midpoint",)
+    scenes = {"closed-loop": (), "obstacles": options, "pendulum": midpoint}
+    known = {*BLOCKS, *(name for item in scenes.items() for name in _outputs(*item))}
+    missing = sorted({*_constants()} - known)
+    assert not missing, missing
+
+
+def test_names_of_users():
+    assert block_of_user("controller", "left") == "controller_left"
+    assert block_of_user("virtual_mechanism", "left") == "virtual_mechanism"
+    assert signal_of_user("controller.F_drift", "left") == "controller_left.F_drift"
+    assert signal_of_user("virtual_mechanism.F_env", "left") == "virtual_mechanism.left.F_env"
+    assert signal_of_user("virtual_mechanism.F_env", "") == "virtual_mechanism.F_env"
+    assert user_of_block("hand_left", "hand") == "left"
+    assert user_of_block("hand", "hand") == ""
+    assert user_of_block("handle", "hand") is None
+    assert user_of_block("my_hand_left", "hand") is None

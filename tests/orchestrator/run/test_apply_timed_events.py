@@ -1,0 +1,114 @@
+"""What happens at given times: in both loops, against closed forms and the run's own signals."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator.base.errors import InputFault
+from tests.orchestrator.results.records import tables_of
+
+K, B = np.array([100.0, 100.0, 0.5]), np.array([70.0, 70.0, 0.375])  # of F_drift, by default
+
+PULLED = {
+    "duration": 1.0, "linkage.body.bar.mass": 2.0, "linkage.start_velocity.slide": 0.0,
+    "hand.wrench": [1.0, 0.0, 0.0], "at": [{"time": 0.5, "set": {"hand.wrench": [0.0, 0.0, 0.0]}}],
+}  # fmt: skip
+"""A mass of 2 kg at rest, pulled until the hand lets go."""
+FREEZE = 'at=[{time=0.2, until=0.3, freeze=["controller.x_D"]}]'
+
+
+def vectors(run, name):
+    return np.column_stack([run[f"{name}[{i}]"] for i in (1, 2, 3)])
+
+
+def seen(run, at=slice(None)):
+    """What the virtual coupling saw of the handle: x_D and v_D in F_drift, entry by entry, as
+    K (x_S - x_D) + B (v_S - v_D) - F_drift is 0 for those that the controller has."""
+    known = [vectors(run, f"virtual_mechanism.{p}")[at] for p in ("x", "v")]
+    force = vectors(run, "controller.F_drift")[at]
+    v_D = vectors(run, "haptic_device.v")[at]
+    return known[0] - (force - B * (known[1] - v_D)) / K
+
+
+def test_both_loops_write_the_same_bytes(tmp_path, monkeypatch):
+    compiled = hl.run("scenario", out=tmp_path / "c", figures=False)
+    monkeypatch.setenv("HAPTICLINK_LOOP", "python")
+    python = hl.run("scenario", out=tmp_path / "python", figures=False)
+    assert tables_of(compiled.folder) == tables_of(python.folder)
+
+
+@pytest.mark.parametrize(
+    ("options", "happened"),
+    [
+        ({}, 0.5),
+        ({"at.0.time": 0.5001}, 257 / 512),  # with the first step from its time on
+        ({"duration": 0.5}, None),  # what comes after the end does not happen
+    ],
+)
+def test_a_hand_that_lets_go_leaves_a_mass_at_its_speed(bar, options, happened):
+    found = hl.run(bar, PULLED | options)
+    time, speed = found.haptics["time"], found.haptics["virtual_mechanism.v[1]"]
+    np.testing.assert_allclose(speed, np.minimum(time, happened or 0.5) / 2.0, atol=1e-12)
+    events = [(happened, "hand.wrench = (0.0, 0.0, 0.0)")]
+    assert found.run["events"] == (events if happened else [])
+
+
+def test_without_events_nothing_runs_in_python():
+    found = hl.run("closed-loop", ["duration=0.1"])
+    assert found.run["events"] == []
+    assert found.run["in_python"] == {}
+
+
+def around(table, begin, end):
+    time = table["time"]
+    return (time >= begin) & (time < end)
+
+
+def test_a_frozen_input_keeps_what_it_had():
+    run = hl.run("closed-loop", ["duration=0.5", FREEZE]).haptics
+    x_D, inside = vectors(run, "haptic_device.x"), around(run, 0.2, 0.3)
+    begin = np.flatnonzero(inside)[0]
+    np.testing.assert_allclose(seen(run)[inside], np.tile(x_D[begin], (inside.sum(), 1)), atol=1e-9)
+    np.testing.assert_allclose(seen(run)[~inside][:-1], x_D[~inside][:-1], atol=1e-9)
+    assert np.abs(x_D[inside] - x_D[begin]).max() > 1e-4
+
+
+def test_an_overridden_input_has_the_value_given():
+    at = 'at=[{time=0.2, until=0.3, override={"controller.x_D"=[0.05, 0.01, 0.1]}}]'
+    run = hl.run("closed-loop", ["duration=0.5", at, "stop_when="]).haptics
+    inside = around(run, 0.2, 0.3)
+    np.testing.assert_allclose(seen(run)[inside], [[0.05, 0.01, 0.1]] * inside.sum(), atol=1e-9)
+
+
+def test_noise_has_its_standard_deviation_and_its_seed():
+    at = 'at=[{time=0.1, until=0.4, noise={"controller.x_D"=1e-6}, seed=7}]'
+    run = hl.run("closed-loop", ["duration=0.5", at]).haptics
+    off, inside = seen(run) - vectors(run, "haptic_device.x"), around(run, 0.1, 0.4)
+    drawn = np.random.Generator(np.random.PCG64(7)).standard_normal((inside.sum(), 3)) * 1e-6
+    np.testing.assert_allclose(off[inside], drawn, atol=1e-10)
+    assert np.abs(off[~inside][:-1]).max() < 1e-10
+
+
+def test_graphics_go_on_at_another_rate():
+    at = 'at=[{time=0.5, set={"graphics.rate"=10}}, {time=0.75, set={"graphics.rate"=60}}]'
+    run = hl.run("closed-loop", ["duration=1.0", at])
+    times = run.graphics["time"]
+    assert math.isclose(times[times <= 0.5][-1], 0.5)
+    slow, fast = (np.diff(times[(times >= a) & (times <= b)]) for a, b in ((0.5, 0.79), (0.85, 1)))
+    assert np.abs(slow - 0.1).max() <= 1 / 512
+    assert np.abs(fast - 1 / 60).max() <= 1 / 512
+    assert [time for time, _ in run.run["events"]] == [0.5, times[times >= 0.75][0]]
+
+
+def test_lines_in_the_figures():
+    at = 'at=[{time=0.25, set={"graphics.rate"=15}}]'
+    found = hl.run("closed-loop", ["duration=0.6", at])
+    axes = found.figures()["distance"].axes[0]
+    assert any(list(line.get_xdata()) == [found.run["events"][0][0]] * 2 for line in axes.lines)
+
+
+def test_one_program_of_a_scene_with_events_is_refused(tmp_path):
+    with pytest.raises(InputFault, match="at given times"):
+        hl.build("scenario", as_one=True, out=tmp_path)

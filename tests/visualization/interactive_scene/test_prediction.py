@@ -1,0 +1,120 @@
+"""The stability verdict on the page is that of `stability`; its process leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.prediction import predicted
+from hapticlink.visualization.interactive_scene.viewed_scene import STIFFNESS, viewed
+from tests.analysis.stability.own_hand import own_hand
+from tests.visualization.browser_code.chromium import Page, chromium
+from tests.visualization.browser_code.served_page import Served
+
+SCENE, OPTIONS = "closed-loop-direct", ("graphics.rate=12.8",)
+HELD = {"x": "x_S", "v": "v_S", "Lambda_inv": "Lambda_inv", "P_c": "P_c"}
+"""What the mechanism sends to the controller."""
+QUICK = 120.0
+"""Time (s) within which a verdict is computed even beside other tests."""
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Iterator[Served]:
+    with Served(tmp_path, *(f"--set={option}" for option in OPTIONS), scene=SCENE) as served:
+        yield served
+
+
+def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
+    """At 12.8 Hz the mouse holds a stable loop with zero-order holds, and an unstable one with
+    first-order ones, by the growth of its equilibrium. Time stands still meanwhile."""
+    with chromium() as browser:
+        window = Page(browser, page.url)
+        window.page.click("#pause")
+        window.page.wait_for_function("view.map?.verdict", timeout=1e3 * QUICK)
+        before = window.get("view.map.why")
+        for port, target in HELD.items():
+            name = f"virtual_mechanism.{port} -> controller.{target}"
+            window.page.select_option(f'[data-control="{name}"]', "foh")
+        window.until("view.map.said === 'computing'")
+        window.page.wait_for_function("view.map.verdict === 'unstable'", timeout=1e3 * QUICK)
+        assert window.page.get_attribute("#verdict", "class") == "light red"
+        assert window.get("view.energy") != "red"
+        told, handle = window.get("view.map.why"), window.get("view.frame.handle")
+        assert window.faults == []
+    held = {"hand.stiffness": [100.0, 100.0, 0.0], "hand.target": [[0.0, *handle]]}
+    for text, hold, verdict in ((before, "zoh", "stable"), (told, "foh", "unstable")):
+        options = held | {"hold": hold, "duration": 3.0}
+        found = own_hand(viewed(SCENE, OPTIONS), options)
+        mouse = text.partition("\n")[0]
+        assert mouse.startswith(f"the mouse: {verdict}, growth rate ")
+        growth = float(mouse.partition("growth rate ")[2].partition(" ")[0])
+        assert found.verdict == verdict
+        assert growth == pytest.approx(found.growth, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [(Settings(rate=30.1), "30.1 Hz repeats only after 5120 ticks, 30 Hz would be fast"),
+     (Settings(jitter=0.1), "with jitter the system never repeats")],
+)  # fmt: skip
+def test_what_would_take_long_is_refused(settings: Settings, said: str) -> None:
+    found = predicted(viewed(SCENE, OPTIONS), settings, {})
+    assert (found["verdict"], found["said"]) == ("", f"not computed: {said}")
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
+def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
+    """Once the new rate is shown, every verdict is on it, and one process computes all."""
+    with page.window() as window:
+        window.until(lambda new: "controls" in new)
+        window.send(type="rate", value=31)
+        server = _children(page.process.pid, "served.server")[0]
+        (computing,) = _until(lambda: _children(server, "served.stability_process"))
+        window.until(lambda new: new["controls"]["rate"]["value"] == 31)
+        window.send(type="rate", value=12.8)
+        window.until(lambda new: new["controls"]["rate"]["value"] == 12.8)
+        window.newest.pop("map", None)
+        found = window.until(lambda new: new.get("map", {}).get("verdict"), QUICK)["map"]
+        assert _children(server, "served.stability_process") == [computing]
+        handle = window.until(lambda new: True)["frame"]["handle"]
+    parameters = {"hand.stiffness": [*STIFFNESS], "hand.target": handle}
+    mouse = predicted(viewed(SCENE, OPTIONS), Settings(), parameters)["why"].partition("\n")[0]
+    assert found["why"].startswith(mouse)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
+@pytest.mark.parametrize("end", ["ctrl-c", "server", "loop"])
+def test_nothing_is_left_of_a_map_that_nobody_waits_for(page: Served, end: str) -> None:
+    with page.window() as window:
+        window.until(lambda new: "controls" in new)
+        window.send(type="rate", value=31)  # takes long
+        server = _children(page.process.pid, "served.server")[0]
+        computing = _until(lambda: _children(server, "served.stability_process"))
+        match end:
+            case "ctrl-c":
+                assert page.end()[0] == 0
+            case "server":
+                os.kill(server, signal.SIGKILL)
+            case "loop":
+                page.process.kill()
+        _until(lambda: not any(Path(f"/proc/{process}").exists() for process in computing))
+
+
+def _children(process: int, module: str) -> list[int]:
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return [int(c) for c in children if module in Path(f"/proc/{c}/cmdline").read_text()]
+
+
+def _until(holds: Callable[[], Any]) -> Any:
+    end = time.monotonic() + QUICK
+    while not (found := holds()):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    return found

@@ -1,0 +1,28 @@
+"""The scene that a page shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+
+
+def test_a_scene_without_a_mechanism_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "device.toml"
+    path.write_text('title = "A device"\nduration = 1.0\n[device]\n')
+    with pytest.raises(InputFault, match=r"device.toml: has no \[linkage\].*closed-loop"):
+        viewed(str(path))
+
+
+def test_the_mouse_takes_the_place_of_the_hand() -> None:
+    scene = viewed("two-hands", ["graphics.rate=20"])
+    assert scene.hand
+    assert scene.hand.type == "spring"
+    assert scene.hands["left"].type == "arm"
+    assert scene.packaging == "native"
+    two = viewed("two-users")
+    assert two.hands["left"] == two.hand
+    assert viewed("closed-loop", ["packaging=python"]).packaging == "python"

@@ -1,0 +1,51 @@
+"""What a frame says, against the results of the same run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.visualization.interactive_scene.scene_message import power
+from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_page.frames import Frames
+from tests.visualization.browser_code.javascript import javascript
+
+
+def test_the_energy_at_the_users_port_is_that_of_the_results() -> None:
+    frames: list[Frames] = []
+    said: list[dict[str, Any]] = []
+    seen: list[dict[str, Any]] = []
+
+    def turn(live: hl.RealTime) -> None:
+        if not frames:
+            frames.append(Frames(live))
+            said.extend(power(live.system, live.energies()))
+            live.set("hand.stiffness", (100.0, 100.0, 0.0))
+            live.set("hand.target", (0.03, 0.03, 0.0))
+        seen.append(frames[0].frame(live))
+        if live.time > 0.3 and "booked" in seen[-1]:
+            live.stop()
+
+    made = hl.RealTime(viewed("closed-loop", ["haptics.rate=512"])).run(turn)
+    x = made["virtual_mechanism.x"][made.time("virtual_mechanism.x") == seen[-1]["t"]]
+    assert seen[-1]["x"] == x[0].tolist()
+    shown = [{"t": f["t"], "booked": f["booked"], "stored": f["stored"], "states": []}
+             for f in seen if "booked" in f]  # fmt: skip
+    port = javascript(
+        "energies.js",
+        """const energies = new Energies({ power: given.power, port: "port", noticeable: 1e-3 });
+        for (const frame of given.shown) energies.add(frame);
+        answer = given.shown.at(-1).energy.port;""",
+        {"power": said, "shown": shown},
+    )
+    assert abs(port) > 1e-6
+    assert port == pytest.approx(made.run["user_port"]["generated"], rel=1e-9)
+
+
+def test_the_light_compares_what_was_generated_with_what_was_put_in() -> None:
+    cases = [(0.0, 0.0, "green"), (-1.0, 0.5, "green"), (5e-5, 0.0, "green"), (5e-4, 0.0, "amber"),
+             (0.2, 1.0, "amber"), (1.1, 1.0, "red"), (0.1, -1.0, "red")]  # fmt: skip
+    expression = "answer = given.map(([generated, put_in]) => light(generated, put_in, 1e-3));"
+    assert javascript("energies.js", expression, cases) == [color for *_, color in cases]

@@ -1,0 +1,192 @@
+"""The page in Chromium: what the mouse does to the run, and what the page shows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.visualization.browser_code.chromium import Page, chromium
+from tests.visualization.browser_code.served_page import CONSTRAINED, FREE, Served
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.mark.parametrize(("way", "moved"), [(FREE, 0.02), (CONSTRAINED, 0.0)])
+def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
+    served: Served, browser: Any, way: tuple[float, float], moved: float
+) -> None:
+    page = Page(browser, served.url)
+    page.until("view.frame?.t > 0.4")
+    page.page.click("#reset")
+    page.until("view.frame?.t < 0.3 && view.stage.limits")
+    start = np.array(page.get("view.frame.x.slice(0, 2)"))
+    page.pull(*(0.02 * np.array(way)))
+    page.run_for(1.5)
+    found = np.array(page.get("view.frame.x.slice(0, 2)")) - start
+    assert way @ found == pytest.approx(moved, abs=2e-3)
+    if not moved:
+        assert np.hypot(*page.get("view.frame.F_hand.slice(0, 2)")) > 1
+    page.page.mouse.up()
+    page.run_for(1.0)
+    assert np.hypot(*page.get("view.frame.F_hand.slice(0, 2)")) < 0.1
+    assert page.faults == []
+    page.page.close()
+
+
+def test_the_page_says_what_to_do_until_somebody_does_it(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    assert page.page.inner_text("#door").startswith(
+        "Press and drag anywhere. Along the dotted line it resists."
+    )
+    page.pull(0.0, 0.0)
+    page.until("document.getElementById('door').hidden")
+    page.page.mouse.up()
+    assert page.faults == []
+    page.page.close()
+
+
+def test_arrow_keys_pull_and_let_go(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.page.keyboard.down("ArrowUp")
+    page.until("view.frame.F_hand[1] > 0.1")
+    page.page.keyboard.up("ArrowUp")
+    page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.1")
+    page.page.close()
+
+
+def test_the_wheel_zooms_about_the_pointer_and_shift_moves(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    box = page.page.locator("#scene").bounding_box()
+    x, y = box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"]
+    under = f"view.stage.toWorld({x - box['x']}, {y - box['y']})"
+    before, scale = page.get(under), page.get("view.stage.scale")
+    page.page.mouse.move(x, y)
+    page.page.mouse.wheel(0, -200)
+    page.until(f"view.stage.scale > 1.2 * {scale}")
+    wide = page.get("(([a, b]) => b - a)(view.stage.limits[0])")
+    assert page.get(under) == pytest.approx(before, abs=0.02 * wide)
+    page.page.keyboard.down("Shift")
+    page.page.mouse.down()
+    page.page.mouse.move(x + 60, y, steps=3)
+    page.page.mouse.up()
+    page.page.keyboard.up("Shift")
+    moved = 60 / page.get("view.stage.scale")
+    page.until(f"Math.abs({under}[0] + {moved} - {before[0]}) < {0.02 * wide + 0.1 * moved}")
+    assert page.get("view.stage.pulls.size") == 0
+    page.page.close()
+
+
+def test_restore_sets_back_what_was_changed(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.page.fill("[data-control='controller.K_pc']", "0.5")
+    said = "document.querySelector('[data-control=\"controller.K_pc\"]').parentNode.textContent"
+    page.until(f"!{said}.includes(' 100 N/m') && {said}.includes('316')")
+    page.page.click("#restore")
+    page.until(f"{said}.includes('100 N/m')")
+    page.page.close()
+
+
+def test_idle_charts_are_scaled_by_what_can_be_felt(served: Served, browser: Any) -> None:
+    """No axis is shorter than 1 mm, 0.5 N, 1 mJ."""
+    page = Page(browser, served.url)
+    page.page.click("#reset")
+    page.until("view.frame?.t < 0.3 && view.stage.limits")
+    written = """new Promise((done) => {
+      const own = CanvasRenderingContext2D.prototype.fillText, found = [];
+      CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
+        if (this.canvas.closest("figure")) found.push(Number(text));
+        own.call(this, text, ...rest);
+      };
+      setTimeout(() => { CanvasRenderingContext2D.prototype.fillText = own; done(found); }, 300);
+    })"""
+    ticks = page.get(written)
+    assert ticks
+    assert min(abs(tick) for tick in ticks if tick) >= 0.25
+    page.page.close()
+
+
+MOVES = """{
+  const send = WebSocket.prototype.send, [id] = view.stage.pulls.keys();
+  window.sent = [];
+  WebSocket.prototype.send = function (text) {
+    sent.push(JSON.parse(text));
+    send.call(this, text);
+  };
+  for (const clientX of [300, 310, 320]) {
+    const move = { pointerId: id, clientX, clientY: 200 };
+    view.stage.canvas.dispatchEvent(new PointerEvent("pointermove", move));
+  }
+}"""
+"""Three moves of the pointer that pulls, at one instant."""
+
+
+def test_the_hand_pulls_to_where_the_mouse_has_stopped(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.pull(0.0, 0.0)
+    page.get(MOVES)
+    page.until("sent.length")
+    target = "[...view.stage.pulls.values()][0].target"
+    page.until(f"JSON.stringify(sent.at(-1).at) === JSON.stringify({target})")
+    page.page.mouse.up()
+    page.page.close()
+
+
+def test_a_control_changes_the_run_and_is_seen_in_a_second_window(
+    served: Served, browser: Any
+) -> None:
+    first, second = Page(browser, served.url), Page(browser, served.url)
+    first.page.fill("[data-control=rate]", "9")
+    said = "document.querySelector('[data-control=rate]').parentNode.textContent"
+    second.until(f"{said}.includes('10.0 Hz')")
+    first.page.uncheck("[data-control=topology]")
+    second.until("!document.querySelector('[data-control=topology]').checked")
+    second.page.check("[data-control=topology]")
+    first.until("document.querySelector('[data-control=topology]').checked")
+    first.page.close()
+    second.run_for(0.3)
+    assert first.faults == second.faults == []
+    second.page.close()
+
+
+def test_pause_and_step(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.page.click("#pause")
+    page.until("view.state.paused")
+    still = page.get("view.frame.t")
+    page.page.click("#step")
+    page.until(f"view.frame.t > {still}")
+    assert page.get("view.frame.t") < still + 0.1
+    page.page.click("#pause")
+    page.run_for(0.1)
+    page.page.close()
+
+
+@pytest.mark.parametrize("size", [(1600, 900), (800, 1000), (360, 640)])
+def test_nothing_is_cut_off_in_wide_and_narrow_windows(
+    served: Served, browser: Any, size: tuple[int, int]
+) -> None:
+    page = Page(browser, served.url, *size)
+    page.run_for(0.2)
+    boxes = {
+        name: page.page.locator(name).bounding_box() for name in ("#stage", "#charts", "#controls")
+    }
+    for box in boxes.values():
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+        assert min(box["width"], box["height"]) > 150
+    apart = [*boxes.values()]
+    for i, a in enumerate(apart):
+        for b in apart[i + 1 :]:
+            beside = a["x"] + a["width"] <= b["x"] or b["x"] + b["width"] <= a["x"]
+            above = a["y"] + a["height"] <= b["y"] or b["y"] + b["height"] <= a["y"]
+            assert beside or above
+    assert page.get("document.documentElement.scrollWidth") <= size[0]
+    assert page.faults == []
+    page.page.close()

@@ -1,0 +1,99 @@
+"""Presets and divergence: what the buttons change, and how the page goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_page.controls import Controls
+from tests.visualization.browser_code.chromium import Page, chromium
+from tests.visualization.browser_code.javascript import javascript
+from tests.visualization.browser_code.served_page import Served
+
+
+@pytest.fixture(scope="module")
+def direct(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with Served(tmp_path_factory.mktemp("direct"), scene="closed-loop-direct") as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def controls() -> dict[str, Any]:
+    """Those of the scene whose mechanism runs at the graphics rate."""
+    found: list[dict[str, Any]] = []
+
+    def turn(live: hl.RealTime) -> None:
+        found.append(Controls(live, Settings()).described())
+        live.stop()
+
+    hl.RealTime(viewed("closed-loop-direct", {"packaging": "python"})).run(turn, tables=False)
+    return found[0]
+
+
+def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str, Any]) -> None:
+    """Measured of the same spring hand, 25 mm to the right: the second generates at least ten times
+    what the third does."""
+    calm, buzz, mend = javascript("presets.js", "answer = presets(given);", controls)
+    assert calm["messages"] == [{"type": "rate", "value": 64}]
+    options = []
+    for preset in (buzz, mend):
+        rate, *holds = preset["messages"]
+        assert rate["type"] == "rate"
+        found = {f'holds."{each["connection"]}"': each["hold"] for each in holds}
+        options.append({"graphics.rate": rate["value"], **found})
+    assert set([*options[0].values()][1:]) == {"foh"}
+    assert set([*options[1].values()][1:]) == {"passive"}
+    hand = {"stiffness": [100.0, 100.0, 0.0], "target": [[0.0, 0.0245, 0.0148, -0.785]]}
+    peaks = []
+    for chosen in options:
+        scene = viewed("closed-loop-direct", {**chosen, "packaging": "python"})
+        given = {f"hand.{key}": value for key, value in hand.items()} | {"duration": 3.0}
+        port = hl.run(scene, given).measures().port
+        assert port
+        peaks.append(port.peak)
+    assert peaks[0] > 10 * peaks[1]
+
+
+def test_restored_is_what_differs_from_the_start(controls: dict[str, Any]) -> None:
+    statements = """
+      const now = structuredClone(given);
+      now.rate.value = 12; now.holds[0].hold = "foh"; now.gains[1].factor = 3;
+      answer = restored(now, given);
+    """
+    assert javascript("presets.js", statements, controls) == [
+        {"type": "rate", "value": 30},
+        {"type": "hold", "connection": controls["holds"][0]["connection"], "hold": "zoh"},
+        {"type": "gain", "name": controls["gains"][1]["name"], "factor": 1},
+    ]
+
+
+def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: Served) -> None:
+    with chromium() as browser:
+        page = Page(browser, direct.url)
+        page.until("document.querySelectorAll('#presets button').length === 3")
+        page.page.fill("[data-control=rate]", "9")  # 10 Hz
+        for port in ("x", "v"):
+            name = f"virtual_mechanism.{port} -> controller.{port}_S"
+            page.page.select_option(f"select[data-control='{name}']", "foh")
+        page.pull(0.02, -0.015)
+        page.until("view.state.ended")
+        said = page.page.inner_text("#ended")
+        assert said.startswith("Diverged at ")
+        assert "the run has diverged" in said
+        assert "red" in page.get("document.getElementById('light').className")
+        box, stage = (page.page.locator(x).bounding_box() for x in ("#ended", "#stage"))
+        assert box["y"] + box["height"] <= stage["y"]  # nothing covers it
+        page.page.mouse.up()
+        page.until("!view.state.ended && view.frame?.t < 5")
+        page.run_for(0.2)
+        assert page.page.inner_text("#ended") == said
+        page.page.click("#restore")
+        page.until(
+            "document.querySelector('[data-control=rate]').parentNode.innerText.includes('30')"
+        )
+        assert page.faults == []

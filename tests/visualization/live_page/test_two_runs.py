@@ -1,0 +1,93 @@
+"""Two runs under one mouse on the served page: the second is a session of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.visualization.browser_code.chromium import Page, chromium
+from tests.visualization.browser_code.compared_runs import differ_without_topology
+from tests.visualization.browser_code.served_page import Served
+
+NAME = "hapticlink.commands.compared_run"
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with Served(tmp_path_factory.mktemp("pair"), scene="closed-loop") as page:
+        yield page
+
+
+def second_runs(served: Served) -> list[int]:
+    """The processes of second runs below the page's server."""
+
+    def children(process: str) -> list[str]:
+        return Path(f"/proc/{process}/task/{process}/children").read_text().split()
+
+    below = [c for server in children(str(served.process.pid)) for c in children(server)]
+    return [int(c) for c in below if NAME in Path(f"/proc/{c}/cmdline").read_text()]
+
+
+def test_two_settings_run_under_one_mouse(pair: Served) -> None:
+    """Without its topology controller B follows the mouse further, has energies of its own, and the
+    controls that act on it leave A as it is."""
+    with chromium() as browser:
+        page = Page(browser, pair.url)
+        page.page.click("#compare")
+        page.until("view.frame?.b && view.frame.t < 1 && view.stage.limits")
+        page.pull(0.03, 0.03)
+        page.run_for(0.5)
+        for pulled in page.get("[view.frame, view.frame.b].map((f) => Math.hypot(...f.F_hand))"):
+            assert pulled > 0.3
+        page.page.mouse.up()
+        differ_without_topology(page)
+        page.page.mouse.up()
+        page.page.click("#acts")
+        page.until("document.querySelector('[data-control=topology]').checked")
+        page.page.click("#compare")
+        page.until("!view.frame?.b && view.frame?.t < 1")
+        assert page.faults == []
+
+
+def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(pair: Served) -> None:
+    with pair.window() as window:
+        window.until(lambda new: "controls" in new)
+        window.send(type="time", do="pause")
+        window.send(type="compare", on=True)
+        window.send(type="compare", on=True)
+        window.send(type="rate", value=10, b=True)
+        found = window.until(
+            lambda new: new["controls"].get("b", {}).get("rate", {}).get("value") == 10
+        )
+        assert found["controls"]["rate"]["value"] == 30
+        assert len(second_runs(pair)) == 1
+        window.until(lambda new: "b" in new["frame"] and new["scene"].get("runs") == 2)
+        times = set[tuple[float, float]]()
+        for _ in range(20):  # of the second one, before it begins anew and since
+            frame = window.until(lambda new: "b" in new["frame"])["frame"]
+            times.add((frame["t"], frame["b"]["t"]))
+        assert len(times) <= 2
+        window.send(type="time", do="resume")
+        window.until(lambda new: min(new["frame"]["t"], new["frame"]["b"]["t"]) > 0.2)
+        window.send(type="compare", on=False)
+        window.until(lambda new: "b" not in new["frame"] and new.get("scene", {}).get("runs") == 1)
+        window.until(lambda new: not second_runs(pair))
+
+
+def test_a_second_run_that_dies_ends_the_comparison(pair: Served) -> None:
+    """What it refuses is said before."""
+    with pair.window() as window:
+        window.send(type="compare", on=True)
+        window.until(lambda new: new.get("scene", {}).get("runs") == 2)
+        connection = "virtual_environment.Lambda_inv -> controller.Lambda_inv"
+        window.send(type="hold", connection=connection, hold="no such", b=True)
+        window.until(lambda new: "no such" in new.get("refused", {}).get("why", ""))
+        os.kill(second_runs(pair)[0], signal.SIGKILL)
+        window.until(
+            lambda new: "the second run has ended" in new.get("refused", {}).get("why", "")
+        )
+        window.until(lambda new: new.get("scene", {}).get("runs") == 1)

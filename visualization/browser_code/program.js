@@ -1,0 +1,150 @@
+// A scene compiled to WebAssembly (programs/page.c): one run of it, its frames, and what is changed of it.
+
+import { loudness } from "./loudness.js";
+
+// What a page has changed, as a run that begins anew gets it again.
+export const settings = () => ({ rate: null, jitter: 0, holds: {}, delays: {}, gains: {}, topology: true });
+
+// There are no files for what the C library would write to.
+const WASI = new Proxy({}, { get: () => () => 8 });
+
+export class Program {
+  // `data` describes the scene (visualization/standalone/description.py).
+  constructor(module, data, changed = settings()) {
+    this.c = new WebAssembly.Instance(module, { wasi_snapshot_preview1: WASI }).exports;
+    this.c._initialize();
+    this.data = data;
+    this.changed = changed;
+    this.m = this.c.create();
+    this.pulling = new Map();
+    if (changed.rate || changed.jitter) this.rate();
+    for (const name of new Set([...Object.keys(changed.holds), ...Object.keys(changed.delays)])) this.hold(name);
+    for (const { name } of data.controls.gains) this.gain(name);
+    this.require(this.c.begin_run(this.m));
+  }
+
+  require(done) {
+    if (!done) throw new Error(this.text(this.c.message()));
+  }
+
+  text(at) {
+    const bytes = new Uint8Array(this.c.memory.buffer, at);
+    return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
+  }
+
+  numbers(at, n) { return new Float64Array(this.c.memory.buffer, at, n); }
+
+  // Times (s) of the newest haptic event, and of the next one.
+  get time() { return this.c.newest(this.m); }
+  get due() { return this.c.due(this.m); }
+
+  run(ticks = 1) { this.require(this.c.run(this.m, ticks)); }
+
+  // --- what is changed: as visualization/live_page/controls.py does it --------------------------------
+
+  apply(message) {
+    const { changed } = this;
+    switch (message.type) {
+      case "hand": return this.pull(message.user ?? "", message.at);
+      case "rate": changed.rate = message.value; return this.rate();
+      case "jitter": changed.jitter = message.value; return this.rate();
+      case "hold": changed.holds[message.connection] = message.hold; return this.hold(message.connection);
+      case "delay": changed.delays[message.connection] = message.value; return this.hold(message.connection);
+      case "gain": changed.gains[message.name] = message.factor; return this.gain(message.name);
+      case "topology":
+        changed.topology = message.on;
+        return this.data.topology.forEach((name) => this.gain(name));
+    }
+    throw new Error(`there is no message ${message.type}`);
+  }
+
+  set(name, values) {
+    this.data.parameters[name].forEach((reference, i) => this.require(this.c.set(this.m, reference, values[i])));
+  }
+
+  gain(name) {
+    const { value } = this.data.controls.gains.find((gain) => gain.name === name);
+    const off = this.data.topology.includes(name) && !this.changed.topology;
+    const user = Object.keys(this.data.hands).find((each) => this.data.hands[each].stiffness === name);
+    if (user !== undefined && !this.pulling.get(user)) return; // it acts while the hand pulls
+    const factor = off ? 0 : this.changed.gains[name] ?? 1;
+    this.set(name, value.map((v) => v * factor));
+  }
+
+  rate() {
+    const rate = this.changed.rate ?? this.data.controls.rate.value;
+    if (!rate) throw new Error("the rate varies in this scene: set the rate first");
+    this.c.rate(this.m, rate, this.changed.jitter);
+  }
+
+  hold(name) {
+    const { choices, controls } = this.data;
+    const wanted = this.changed.holds[name] ?? controls.holds.find((hold) => hold.connection === name).hold;
+    const choice = choices.findIndex((each) => each.connection === name && each.hold === wanted);
+    if (choice < 0) throw new Error(`there is no hold ${wanted} of ${name} in this file`);
+    const delay = this.changed.delays[name];
+    this.require(this.c.hold(this.m, choice, delay === undefined ? -1 : Math.round(1e6 * delay)));
+  }
+
+  // A pointer pulls a user's handle to a place, null where it lets go.
+  pull(user, at) {
+    const hand = this.data.hands[user];
+    if (at) this.set(hand.target, [...at, 0]);
+    if (Boolean(at) === Boolean(this.pulling.get(user))) return;
+    this.pulling.set(user, Boolean(at));
+    if (at) this.gain(hand.stiffness);
+    else this.set(hand.stiffness, [0, 0, 0]);
+  }
+
+  // The controls with their values, as messages have them.
+  get controls() {
+    const { controls } = this.data, { rate, jitter, holds, delays, gains, topology } = this.changed;
+    return {
+      rate: controls.rate && { ...controls.rate, value: rate ?? controls.rate.value, jitter },
+      holds: controls.holds.map((h) => ({ ...h, hold: holds[h.connection] ?? h.hold, delay: delays[h.connection] ?? 0 })),
+      gains: controls.gains.map((gain) => ({ ...gain, factor: gains[gain.name] ?? 1 })),
+      topology: controls.topology === null ? null : topology,
+    };
+  }
+
+  // --- what is shown ------------------------------------------------------------------------------
+
+  // A frame as the server sends it.
+  get frame() {
+    const { data } = this, values = this.numbers(this.c.signal_values(this.m), data.n_values);
+    const frame = { t: this.time, states: [], stored: values[data.stored] };
+    const of = (user) => (user ? ((frame.others ??= {})[user] ??= {}) : frame);
+    for (const { user, name, places } of data.signals) of(user)[name] = places.map((place) => values[place]);
+    const drawn = this.numbers(this.c.drawn(this.m), data.n_drawn);
+    for (const part of data.parts) {
+      const found = entries(part, drawn);
+      if (part.is_state) { if (found[0][0]) frame.states.push(part.user ? `${part.gives} ${part.user}` : part.gives); }
+      else if (part.names.length) of(part.user)[part.gives] = Object.fromEntries(part.names.map((name, i) => [name, found[i]]));
+      else of(part.user)[part.gives] = found;
+    }
+    const work = this.numbers(this.c.work(this.m), 2 * data.scene.power.length);
+    frame.booked = data.scene.power.map((_, i) => [work[2 * i], work[2 * i + 1]]);
+    return frame;
+  }
+
+  // What is heard of the newest signals.
+  heard(signal) {
+    const values = this.numbers(this.c.signal_values(this.m), this.data.n_values);
+    this.places ??= Object.fromEntries(this.data.signals.filter(({ user }) => !user).map(({ name, places }) => [name, places]));
+    const of = (name) => this.places[name].map((place) => values[place]);
+    return loudness(signal, { F_hand: of("F_hand"), x: of("x"), handle: of("handle") });
+  }
+
+  // Time and all outputs at the newest haptic event.
+  get row() {
+    return this.data.tables.flatMap(({ columns }, i) =>
+      [...this.numbers(this.c.row(this.m, i), 1 + columns.length)].slice(i ? 1 : 0));
+  }
+}
+
+// The columns of a part's matrix; null where one is not finite, none of zeros where the part is sparse.
+function entries({ at, rows, columns, sparse }, drawn) {
+  const found = Array.from({ length: columns }, (_, k) => [...drawn.subarray(at + k * rows, at + (k + 1) * rows)]);
+  const known = found.map((entry) => (entry.every(Number.isFinite) ? entry : null));
+  return sparse ? known.filter((entry) => !entry || entry.some(Boolean)) : known;
+}

@@ -1,0 +1,126 @@
+"""What a page can change of a running scene, with names and ranges, and what its mice pull."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.analysis.findings import labels
+from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, MECHANISM, block_of_user
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.live_changes import choices_of_slower
+from hapticlink.orchestrator.system.springs import limited_gains
+from hapticlink.orchestrator.system.system import System
+from hapticlink.visualization.interactive_scene.viewed_scene import STIFFNESS
+
+GAINS = (HAND, CONTROLLER)
+"""Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""
+OTHERS = ("length_scale", "target", "rank_tolerance")
+"""Tunable parameters of theirs that are none."""
+TOPOLOGY = ("k_j", "b_j")
+"""The gains of the topology controller."""
+CLOCK = "graphics"
+"""The clock whose rate the page changes."""
+
+
+@dataclass
+class Settings:
+    """What was changed on the page, which a run that begins anew gets again."""
+
+    rate: float | None = None
+    jitter: float = 0.0
+    holds: dict[str, str] = field(default_factory=dict)
+    delays: dict[str, float] = field(default_factory=dict)
+    gains: dict[str, float] = field(default_factory=dict)
+    topology: bool = True
+
+
+class Offered:
+    """What can be changed of a scene that runs: `gains`, values and units by parameter; `holds` by
+    connection, the present one first; the graphics `rate`, None where there is none."""
+
+    def __init__(
+        self, scene: Scene, system: System, holds: Mapping[str, list[str]] | None = None
+    ) -> None:
+        self.gains = _gains(scene, system)
+        self.holds = choices_of_slower(system) if holds is None else holds
+        fmus = [f for f in system.fmus if f.clock == CLOCK]
+        of = dict.fromkeys(labels.block(f.name) or f.name for f in fmus)
+        self._of = " and ".join(of)
+        self.rate = scene.graphics.rate if scene.graphics and fmus else None
+        haptics = system.timeline
+        self._most = float(1 / (haptics.clocks[0].longest * haptics.base))
+
+    def described(self, s: Settings) -> dict[str, Any]:
+        """The controls with their ranges and values, as JSON has it."""
+        fixed = float(self.rate) if isinstance(self.rate, int | float) else None
+        return {
+            "rate": None
+            if self.rate is None
+            else {"value": s.rate or fixed, "max": self._most, "jitter": s.jitter}
+            | {"of": _titled(self._of)},
+            "holds": [
+                {"connection": name, "words": _titled(labels.connection(name))}
+                | {"hold": s.holds.get(name, choices[0]), "choices": choices}
+                | {"delay": s.delays.get(name, 0.0)}
+                for name, choices in self.holds.items()
+            ],
+            "gains": [
+                {"name": name, "value": value.tolist(), "units": units}
+                | {"factor": s.gains.get(name, 1.0)}
+                for name, (value, units) in self.gains.items()
+            ],
+            "topology": s.topology if self.topology else None,
+        }
+
+    @property
+    def topology(self) -> list[str]:
+        """The gains of the topology controllers of all users."""
+        names = [name for name in self.gains if name.rpartition(".")[2] in TOPOLOGY]
+        return names if len(names) >= len(TOPOLOGY) else []
+
+
+def _titled(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def users(scene: Scene) -> tuple[str, ...]:
+    """The users of a scene by their points; the first one's name is empty."""
+    return ("", *scene.devices)
+
+
+def stiffness(user: str) -> str:
+    """The stiffness with which a user's mouse pulls."""
+    return f"{block_of_user(HAND, user)}.stiffness"
+
+
+def target(user: str) -> str:
+    """The pose that a user's mouse pulls to."""
+    return f"{block_of_user(HAND, user)}.target"
+
+
+def _gains(scene: Scene, system: System) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
+    """Values and units of the parameters that a page can scale, by their name."""
+    gains: dict[str, tuple[NDArray[np.float64], list[str]]] = {}
+    fixed = limited_gains(system)
+    names = [MECHANISM, *(block_of_user(b, user) for user in users(scene) for b in GAINS)]
+    for fmu in (system.fmu[name] for name in names if name in system.fmu):
+        tunable = [
+            s
+            for s in fmu.description.scalars
+            if s.causality == "parameter" and s.variability == "tunable" and s.port not in OTHERS
+        ]
+        for port in dict.fromkeys(s.port for s in tunable):
+            if f"{fmu.name}.{port}" in fixed:
+                continue
+            entries = fmu.description.port(port, "parameter")
+            start = np.array([s.start for s in entries])
+            gains[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]
+    for name in (stiffness(user) for user in users(scene)):
+        if name in gains:
+            gains[name] = np.array(STIFFNESS), gains[name][1]
+    return gains

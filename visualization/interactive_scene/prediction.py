@@ -1,0 +1,153 @@
+"""The verdict on the run behind a page: of the FMUs of its scene with all that was changed on the
+page, where the handles are at the start, held by the mouse and by hands from soft to firm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hapticlink.analysis.stability import frozen_nonlinearities
+from hapticlink.analysis.stability.hand_cases import Case, InHands
+from hapticlink.analysis.stability.hands import HANDS
+from hapticlink.analysis.stability.lifted_map import hyperperiod
+from hapticlink.analysis.stability.mode_kinds import DRIFT
+from hapticlink.analysis.stability.resting_scene import resting_system
+from hapticlink.analysis.stability.state_vector import size
+from hapticlink.components.specs.hand import SpringHand
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.errors import Fault, InputFault
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.live_changes import held_by
+from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.timeline import timeline
+from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.viewed_scene import DAMPING, STIFFNESS
+
+MAX_COST = {"native": 2e8, "python": 1e7}
+"""Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
+is computed, by the packaging of the FMUs: some 2 s of processor time."""
+MOUSE = "the mouse"
+SO_FAR = 3
+"""Hands after which there is a first verdict: the mouse, a light touch and a firm grip."""
+RATES = range(1, 201)
+"""Graphics rates (Hz) that may be suggested in place of a slow one."""
+
+Parameters = Mapping[str, Sequence[float]]
+"""Tunable parameters, `fmu.port`, with their values."""
+
+
+def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
+    """`verdict` ("" where there is none), `said`, which is its one line on the page, and `why`, its
+    tooltip."""
+    *_, last = verdicts(scene, settings, parameters)
+    return last
+
+
+def verdicts(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[dict[str, str]]:
+    """As `predicted`, of the first hands so far, and then of all."""
+    cases: list[Case] = []
+    try:
+        for case in judged(scene, settings, parameters):
+            cases.append(case)
+            if len(cases) == SO_FAR:
+                yield _verdict(cases, ", so far")
+    except Fault as fault:
+        short = str(fault).partition(";")[0].partition("\n")[0]
+        yield {"verdict": "", "said": f"not computed: {short}", "why": str(fault)}
+    else:
+        yield _verdict(cases)
+
+
+def _verdict(cases: Sequence[Case], so_far: str = "") -> dict[str, str]:
+    worst = max(cases, key=lambda case: case.severity)
+    verdict = "marginal" if worst.drifts else worst.verdict
+    lines = (
+        f"{case.hand}: {case.verdict}, growth rate {case.growth:.4g} 1/s, {case.hertz:.3g} Hz"
+        for case in cases
+    )
+    return {"verdict": verdict, "said": _summary(worst) + so_far, "why": "\n".join(lines)}
+
+
+def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[Case]:
+    """The cases of the run, a hand each. Raises InputFault where its computation would take long,
+    and as `stability` does."""
+    if settings.jitter:
+        raise InputFault("with jitter the system never repeats; set the jitter to 0")
+    if scene.hand is None:
+        raise InputFault("nobody holds the mechanism")
+    changed = _at_rate(scene, settings.rate)
+    with (
+        interrupt.held(),
+        np.errstate(invalid="ignore", over="ignore"),
+        built(scene) as whole,
+    ):
+        _require_quick(changed, whole)
+        s = settings
+        system = replace(
+            whole,
+            timeline=timeline(changed),
+            fmus=tuple(_with_parameters(fmu, parameters) for fmu in whole.fmus),
+            connections=tuple(
+                held_by(c, s.holds.get(c.name), s.delays.get(c.name)) for c in whole.connections
+            ),
+        )
+        hands = {MOUSE: SpringHand(stiffness=STIFFNESS, damping=DAMPING), **HANDS}
+        without, _ = frozen_nonlinearities.without(system)
+        with resting_system(changed, without) as place:
+            in_hands = InHands(place)
+            for name, hand in hands.items():
+                yield from in_hands.cases("the start", {name: hand}, DRIFT)
+
+
+def _at_rate(scene: Scene, rate: float | None) -> Scene:
+    """The scene at a rate that was set on the page, at which steps end on haptic ticks, for as
+    short as its map allows."""
+    short = replace(scene, duration=1.0)
+    if rate is None or scene.graphics is None:
+        return short
+    graphics = replace(scene.graphics, rate=rate, phase=None, align="tick")
+    return replace(short, graphics=graphics)
+
+
+def _require_quick(scene: Scene, system: System) -> None:
+    """Raises InputFault where the lifted map would take long to compute, with the nearest rate at
+    which it would not, if there is one."""
+    most = MAX_COST[scene.packaging] / size(system) ** 2
+    if (count := _ticks(scene)) <= most:
+        return
+    if scene.graphics is None or not isinstance(scene.graphics.rate, int | float):
+        raise InputFault(f"the system repeats only after {count} ticks")
+    rate = scene.graphics.rate
+    quick = [r for r in RATES if _ticks(_at_rate(scene, r)) <= most]
+    nearest = min(quick, key=lambda r: abs(r - rate), default=None)
+    remedy = f", {nearest} Hz would be fast" if nearest else ""
+    raise InputFault(f"{rate:g} Hz repeats only after {count} ticks{remedy}")
+
+
+def _ticks(scene: Scene) -> int:
+    """The haptic ticks after which all repeats."""
+    time = timeline(scene)
+    return hyperperiod(time) // time.clocks[0].longest
+
+
+def _with_parameters(fmu: Fmu, parameters: Parameters) -> Fmu:
+    """An FMU with other start values of parameters."""
+    starts = {scalar.name: (scalar, value) for scalar, value in fmu.starts}
+    for name, values in parameters.items():
+        owner, _, port = name.partition(".")
+        if owner == fmu.name:
+            scalars = fmu.description.port(port, "parameter")
+            starts |= {s.name: (s, v) for s, v in zip(scalars, values, strict=True)}
+    return replace(fmu, starts=tuple(starts.values()))
+
+
+def _summary(worst: Case) -> str:
+    rate = f"{abs(worst.growth):.2g} 1/s"
+    if worst.verdict == "stable":
+        return f"stable in all hands, decays {rate}"
+    if worst.verdict == "marginal":
+        return f"marginal in {worst.hand}"
+    return f"{worst.kind} of {worst.hertz:.2g} Hz, grows {rate}, in {worst.hand}"

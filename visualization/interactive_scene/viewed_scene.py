@@ -1,0 +1,60 @@
+"""The scene that a page shows: the given one, with the mouse in place of its hand."""
+
+from __future__ import annotations
+
+import pickle
+
+from hapticlink.components import registry
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import plugins
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import HAND, block_of_user
+from hapticlink.orchestrator.scene.overrides import Options, written
+from hapticlink.orchestrator.scene.scene import Scene
+
+STIFFNESS, DAMPING = (100.0, 100.0, 0.0), (5.0, 5.0, 0.005)
+"""Of the mouse's spring and damper to the handle, which leave its turn free but damped."""
+DURATION = 600.0
+"""s after which a page begins anew, which bounds what a run keeps on the disk."""
+
+
+def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scene:
+    """The scene with a spring hand for each user that pulls nowhere yet, of compiled FMUs if the
+    options say nothing else, and without its end at the border of the workspace. Raises InputFault
+    for a scene without a linkage, or one that has an FMU of the user's in place of a hand."""
+    if open_scene.load(name, options).linkage is None:
+        raise InputFault(
+            f"{name}: has no [linkage], so that there is nothing to take hold of; view shows "
+            "mechanisms, for instance `hapticlink view closed-loop`"
+        )
+    read = open_scene.load(name, (*written({"packaging": "native"}), *written(options)))
+    hands = [block_of_user(HAND, user) for user in ("", *read.devices)]
+    if any(fmu.replaces in hands for fmu in read.fmu):
+        raise InputFault(
+            f"{name}: an FMU replaces the hand, which the mouse has to be: leave it out"
+        )
+    hand = {
+        "type": "spring",
+        "stiffness": [0.0, 0.0, 0.0],
+        "damping": DAMPING,
+        "target": [[0.0, 0.0, 0.0, 0.0]],
+    }
+    record = {"signals": "all"}  # what is not recorded is not read from its FMU
+    changes: dict[str, object] = {"hand": hand, "duration": duration, "record": record}
+    changes |= {f"hands.{user}": hand for user in read.devices}
+    if read.stop_when is None and read.ends_when:
+        changes["stop_when"] = ""
+    return open_scene.load(read, changes)
+
+
+def packed(scene: Scene) -> bytes:
+    """A scene for another process, with the plugins that it needs."""
+    return pickle.dumps((tuple(registry.origins()), pickle.dumps(scene)))
+
+
+def unpacked(content: bytes) -> Scene:
+    """The scene that was `packed`."""
+    modules, pickled = pickle.loads(content)
+    plugins.load(modules)
+    scene: Scene = pickle.loads(pickled)
+    return scene

@@ -1,0 +1,192 @@
+"""A scene that runs again and again behind a page: what the page asks for, what it is sent."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.errors import Fault, InputFault
+from hapticlink.orchestrator.real_time_session import LiveRun
+from hapticlink.orchestrator.results.recorded_scene import by_user
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system import fmu_files
+from hapticlink.visualization.interactive_scene import scene_message
+from hapticlink.visualization.interactive_scene.offered_controls import Settings, target
+from hapticlink.visualization.interactive_scene.viewed_scene import packed
+from hapticlink.visualization.live_page import messages
+from hapticlink.visualization.live_page.controls import Controls
+from hapticlink.visualization.live_page.frames import Frames
+from hapticlink.visualization.live_page.server_pipe import Pipe
+
+TURN, FRAME = 0.0035, 0.015
+"""Times (s) between two looks at the messages while the scene runs, every other tick at 512 Hz,
+and between two frames, at most."""
+WAIT = 0.02
+"""Time (s) between two looks at the messages while nothing runs."""
+
+
+class Building(logging.Handler):
+    """Tells the page which block is being built."""
+
+    def __init__(self, link: Pipe) -> None:
+        super().__init__()
+        self._link = link
+        fmu_files.LOG.addHandler(self)
+        fmu_files.LOG.setLevel(logging.INFO)
+        fmu_files.LOG.propagate = False  # the terminal shows the page's address
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._link.send({"type": "building", "said": f"{record.getMessage()} ..."})
+
+
+class Session:
+    """The runs of a scene behind a page. `recordings` get folders `<root>-1`, `<root>-2`, ...
+
+    real_time: `hl.RealTime`, which runs a scene and writes its folder as `hl.run` does. settings:
+    those with which the first run begins. paused: whether it waits at its start.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        link: Pipe,
+        root: Path,
+        real_time: Callable[[Scene], Any],
+        settings: Settings | None = None,
+        paused: bool = False,
+    ) -> None:
+        self._scene, self._link, self._root, self._real_time = scene, link, root, real_time
+        self._controls: Controls | None = None
+        self._settings = settings or Settings()
+        self._shown = 0.0
+        self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
+        self.recordings: list[Path] = []
+        Building(link)
+
+    def run(self) -> None:
+        """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has
+        ended, which raises Fault."""
+        while True:
+            out = self._begin()
+            live = self._real_time(self._scene)
+            self._live, self._controls, self._again = live, None, False
+            try:
+                result = live.run(self._turn, out, tables=False, every=TURN)
+            finally:
+                if out and (out / "run.json").exists():
+                    self.recordings.append(out)
+            if not self._again:
+                self._state["recording"] = None
+                if result.run["end"]["reason"] != "duration":
+                    self._wait(result)
+
+    def _begin(self) -> Path | None:
+        """The folder of the run that begins, None where it is not recorded."""
+        if not self._state["recording"]:
+            return None
+        free = (self._root.with_name(f"{self._root.name}-{i}") for i in count(1))
+        folder = next(path for path in free if not path.exists())
+        self._state["recording"] = str(folder)
+        return folder
+
+    def _turn(self, live: LiveRun) -> None:
+        if self._controls is None:
+            self._start(live)
+        assert self._controls
+        changed = False
+        for message in messages.newest(self._link.received()):
+            if isinstance(message, messages.Time):
+                self._time(message.do)
+                continue
+            try:
+                self._controls.apply(message)
+            except InputFault as fault:
+                self._refuse(message, fault)
+            changed = changed or not isinstance(message, messages.Hand)
+        if changed:
+            self._tell_controls()
+        self._require_server()
+        if (now := time.monotonic()) - self._shown > FRAME:
+            self._shown = now
+            self._link.send({"type": "frame"} | self._frames.frame(live), frame=True)
+
+    def _refuse(self, message: messages.Message, fault: InputFault) -> None:
+        """Say why; a hold that only a run that begins with it can have begins anew with it."""
+        self._link.send({"type": "refused", "why": str(fault)})
+        assert self._controls
+        if isinstance(message, messages.Hold) and self._controls.fits(message):
+            option = {f'holds."{message.connection}"': message.hold}
+            self._scene = open_scene.load(self._scene, option)
+            self._link.send(
+                {"type": "refused", "why": f"{message.hold} begins at t = 0: it runs in Python"}
+            )
+            self._anew(self._state["recording"] and "again")
+
+    def _start(self, live: LiveRun) -> None:
+        self._frames, self._controls = Frames(live), Controls(live, self._settings)
+        self._controls.restore()
+        scene = self._scene
+        self._held = {target(user): at for user, at in self._frames.handles(live).items()}
+        self._packed = packed(scene)
+        drawing = (scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
+        message = scene_message.running(scene, live.system, live.energies())
+        self._link.send(message | {"picture": drawing})
+        self._tell_controls()
+        if self._state["paused"]:
+            live.pause()
+        self._tell(ended=None)
+
+    def _time(self, do: str) -> None:
+        match do:
+            case "pause":
+                self._live.pause()
+                self._tell(paused=True)
+            case "resume":
+                self._live.resume()
+                self._tell(paused=False)
+            case "step":
+                self._live.step()
+                self._tell(paused=True)
+            case "reset":
+                self._anew(self._state["recording"] and "again")
+            case "record":
+                self._anew(None if self._state["recording"] else "new")
+
+    def _anew(self, recording: str | None) -> None:
+        """End this run, and begin one at t = 0."""
+        self._state["recording"], self._again = recording, True
+        self._live.stop()
+
+    def _wait(self, result: Any) -> None:
+        """Say how a run has ended by itself, and wait for a reset or recording."""
+        reason = result.run["end"]["reason"]
+        self._tell(ended=str(result.fault or f"the run has ended: {reason}"), recording=None)
+        while True:
+            interrupt.check()
+            self._require_server()
+            for message in self._link.received():
+                if isinstance(message, messages.Time) and message.do in ("reset", "record"):
+                    self._state["recording"] = "new" if message.do == "record" else None
+                    return
+            time.sleep(WAIT)
+
+    def _require_server(self) -> None:
+        if not self._link.alive:
+            raise Fault("the page's server has ended: start `hapticlink view` again")
+
+    def _tell_controls(self) -> None:
+        assert self._controls
+        self._link.send({"type": "controls"} | self._controls.described())
+        parameters = self._controls.parameters() | self._held
+        settings = {"settings": self._settings, "parameters": parameters}
+        self._link.send({"type": "settings", "scene": self._packed} | settings)
+
+    def _tell(self, **state: Any) -> None:
+        self._state |= state
+        self._link.send({"type": "state"} | self._state)
