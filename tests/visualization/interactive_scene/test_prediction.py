@@ -75,14 +75,14 @@ def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
     with page.window() as window:
         window.until(lambda new: "controls" in new)
         window.send(type="rate", value=31)
-        server = _children(page.process.pid, "served.server")[0]
-        (computing,) = _until(lambda: _children(server, "served.stability_process"))
+        server = _children(page.process.pid, "live_page.server")[0]
+        (computing,) = _until(lambda: _children(server, "live_page.stability_process"))
         window.until(lambda new: new["controls"]["rate"]["value"] == 31)
         window.send(type="rate", value=12.8)
         window.until(lambda new: new["controls"]["rate"]["value"] == 12.8)
         window.newest.pop("map", None)
         found = window.until(lambda new: new.get("map", {}).get("verdict"), QUICK)["map"]
-        assert _children(server, "served.stability_process") == [computing]
+        assert _children(server, "live_page.stability_process") == [computing]
         handle = window.until(lambda new: True)["frame"]["handle"]
     parameters = {"hand.stiffness": [*STIFFNESS], "hand.target": handle}
     mouse = predicted(viewed(SCENE, OPTIONS), Settings(), parameters)["why"].partition("\n")[0]
@@ -95,8 +95,8 @@ def test_nothing_is_left_of_a_map_that_nobody_waits_for(page: Served, end: str) 
     with page.window() as window:
         window.until(lambda new: "controls" in new)
         window.send(type="rate", value=31)  # takes long
-        server = _children(page.process.pid, "served.server")[0]
-        computing = _until(lambda: _children(server, "served.stability_process"))
+        server = _children(page.process.pid, "live_page.server")[0]
+        computing = _until(lambda: _children(server, "live_page.stability_process"))
         match end:
             case "ctrl-c":
                 assert page.end()[0] == 0
