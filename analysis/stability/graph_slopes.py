@@ -30,6 +30,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 FUNCTIONS, ABOUT = "resources/functions.casadi.json", "resources/component.json"
 KEPT = 32
 """Graphs that a process keeps, as many as FMUs."""
+_GENERATED: dict[str, GraphSlopes] = {}
+"""By the GUID of a native FMU, a hash of its content: those of the component that it is made of."""
 
 
 def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlopes | None:
@@ -39,12 +41,17 @@ def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlop
         return None
     if carried := _read(found.path, found.guid):
         return carried
+    if generated := _GENERATED.get(found.guid):
+        return generated
     block = next((b for b in blocks(scene).built if b.name == fmu), None) if scene else None
     if block is None:
         return None
     made = component(block.block, block.settings)
     functions = {f.name(): f for f in one_pass(made).functions}
-    return GraphSlopes(functions, made.timing == "sampled", made.substeps)
+    if len(_GENERATED) == KEPT:
+        _GENERATED.clear()
+    _GENERATED[found.guid] = GraphSlopes(functions, made.timing == "sampled", made.substeps)
+    return _GENERATED[found.guid]
 
 
 @lru_cache(KEPT)
