@@ -65,9 +65,9 @@ class Judged:
         """The row of the table."""
         taken = self.advice.taken
         limits = f" (keeps the limits in {taken.within} of {len(taken.error_mm)})"
-        told = "" if taken.admitted else limits
+        note = "" if taken.admitted else limits
         return (
-            f"| {self.seed} | {self.scene} | {taken.method.name}{told} | {self.kept} of {DRAWS} | "
+            f"| {self.seed} | {self.scene} | {taken.method.name}{note} | {self.kept} of {DRAWS} | "
             f"{self.best.name if self.best else f'none ({self.most} of {DRAWS} at most)'} | "
             f"{short(self.ratio) if self.best else '-'} |"
         )
@@ -123,12 +123,12 @@ def page(found: Sequence[Judged], command: str) -> Iterator[str]:
     yield from (one.line for one in found)
 
 
-def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> None:
     """Write README.md to `out`."""
     count = 2 if quick else COUNT
     found = []
     for i in range(count):
-        told(f"scene {i + 1}", i, count)
+        progress(f"scene {i + 1}", i, count)
         found.append(judged(FIRST + i, Path("sweeps/advise"), os.cpu_count() or 1))
     out.mkdir(parents=True, exist_ok=True)
     (out / "README.md").write_text("\n".join(page(found, command)) + "\n", encoding="utf-8")

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 import hapticlink as hl
 from hapticlink.orchestrator.base import temporary_folders
 
-Told = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 SCENES = ("closed-loop", "two-users", "serial")
 RATES = (10, 30, 60)
 COPIES = {
@@ -72,14 +72,16 @@ def ran(scene: str, options: list[str], block: str | None, folder: Path) -> Ran:
     return Ran(table["time"], path, energy, why, moved, found.run["timings"]["run"])
 
 
-def copies(quick: bool, told: Told, room: Path) -> dict[tuple[str, int, str], tuple[float, Ran]]:
+def copies(
+    quick: bool, progress: Progress, room: Path
+) -> dict[tuple[str, int, str], tuple[float, Ran]]:
     """By scene, rate and copy: the distance (mm) from the loop with our copy placed at the haptic
     rate, and the run."""
     scenes, rates = (SCENES[:1], RATES[1:2]) if quick else (SCENES, RATES)
     cases = [(s, r, c) for s in scenes for r in rates for c in COPIES]
     found, best = {}, {}
     for k, (scene, rate, name) in enumerate(cases):
-        told(f"engine: {scene}, {name}, {rate} Hz", k, len(cases))
+        progress(f"engine: {scene}, {name}, {rate} Hz", k, len(cases))
         options = [f"duration={DURATION}"]
         if scene not in best:
             haptics = f"graphics.rate={hl.scene(scene).haptics.rate}"
@@ -91,13 +93,13 @@ def copies(quick: bool, told: Told, room: Path) -> dict[tuple[str, int, str], tu
     return found
 
 
-def touching(quick: bool, told: Told, room: Path) -> dict[tuple[str, int, str], Ran]:
+def touching(quick: bool, progress: Progress, room: Path) -> dict[tuple[str, int, str], Ran]:
     """By scene, haptic rate and mechanism: contacts with walls and movable objects."""
     rates = (1024,) if quick else (512,)
     cases = [(s, r, m) for s in CONTACTS for r in rates for m in ("ours", "MuJoCo")]
     found = {}
     for k, (scene, rate, name) in enumerate(cases):
-        told(f"engine: {scene}, mechanism {name}, {rate} Hz", k, len(cases))
+        progress(f"engine: {scene}, mechanism {name}, {rate} Hz", k, len(cases))
         options = ["contacts.detection=haptics", f"haptics.rate={rate}"]
         block = None if name == "ours" else "virtual_mechanism"
         found[scene, rate, name] = ran(scene, options, block, room / f"contact{k}")
@@ -166,11 +168,11 @@ def figure(path: Path, found: dict[tuple[str, int, str], tuple[float, Ran]]) -> 
     drawn.savefig(path, dpi=110, metadata={"Software": None})
 
 
-def bench(out: Path, quick: bool, told: Told, command: str) -> None:
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
     """Write README.md and error.png to `out`."""
     with temporary_folders.room() as folder:
-        found = copies(quick, told, Path(folder))
-        touched = touching(quick, told, Path(folder))
+        found = copies(quick, progress, Path(folder))
+        touched = touching(quick, progress, Path(folder))
     page = [
         "# A physics engine in the place of our blocks\n",
         finding(found) + "\n",

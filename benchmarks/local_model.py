@@ -68,7 +68,7 @@ def tip(folder: Path, *options: str) -> tuple[np.ndarray, float]:
 
 
 def gaps(
-    rates: tuple[int, ...], told: Callable[[str, int, int], None]
+    rates: tuple[int, ...], progress: Callable[[str, int, int], None]
 ) -> dict[tuple[str, int], tuple[np.ndarray, float]]:
     """By integrator and rate of the frames: the distance (mm) of the operational point from that of
     the mechanism with its own matrices at each tick of 1 s, and the largest gap of the loop (m)."""
@@ -77,7 +77,7 @@ def gaps(
     with temporary_folders.room() as room:
         own, _ = tip(room / "own", "duration=1.0")
         for k, (integrator, rate) in enumerate(cases):
-            told(f"local model: {integrator} at {rate} Hz", k, len(cases))
+            progress(f"local model: {integrator} at {rate} Hz", k, len(cases))
             options = [*HELD, "duration=1.0", f"mechanism.integrator={integrator}"]
             options.append(f"graphics={{rate={rate}, sync='joint'}}")
             held, opened = tip(room / f"{k}", *options)
@@ -112,10 +112,10 @@ def figure(path: Path, found: dict[tuple[str, int], tuple[np.ndarray, float]]) -
     drawn.savefig(path, dpi=110, metadata={"Software": None})
 
 
-def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> None:
     """Write README.md and error.png to `out`."""
-    told("local model: cost of a step", 0, 1)
-    cost, found = list(costs()), gaps((30, 60) if quick else (10, 30, 60, 512), told)
+    progress("local model: cost of a step", 0, 1)
+    cost, found = list(costs()), gaps((30, 60) if quick else (10, 30, 60, 512), progress)
     ends = [gap[512] for gap, _ in found.values() if len(gap) > 512]
     lost = sorted({f"{rate} Hz" for (_, rate), (gap, _) in found.items() if len(gap) <= 512})
     page = [

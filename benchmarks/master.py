@@ -21,7 +21,7 @@ from benchmarks.peers.masters import MASTERS
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.base import temporary_folders
 
-Told = Callable[[str, int, int], object]
+Progress = Callable[[str, int, int], object]
 
 
 class Case(NamedTuple):
@@ -63,7 +63,7 @@ def measured(master: str, folder: Path) -> tuple[float, float, float]:
     return 1e6 * found["step"], found["start"], found["memory"]
 
 
-def bench(folder: Path, quick: bool, told: Told, command: str) -> None:
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> None:
     """Write README.md, the tables and a figure to `folder`."""
     code_version.begin(folder, ROWS, hapticlink.orchestrator)
     cases, rounds = (QUICK, 1) if quick else (CASES, ROUNDS)
@@ -76,12 +76,12 @@ def bench(folder: Path, quick: bool, told: Told, command: str) -> None:
                 turn = next((r for r in range(rounds) if (*case, master, r) not in rows), None)
                 if turn is None:
                     continue
-                told(f"{case.packaging}: {case.n} FMUs of {case.signals}", i, len(cases) + 1)
+                progress(f"{case.packaging}: {case.n} FMUs of {case.signals}", i, len(cases) + 1)
                 if not ring.exists():
                     ring.mkdir()
                     rings.make(*case, ring)
                 rows.add(*case, master, turn, *measured(master, ring))
-        told("closed-loop", len(cases), len(cases) + 1)
+        progress("closed-loop", len(cases), len(cases) + 1)
         closed_loop.measure(whole, rounds, room)
     on = f"{platform.machine()}, {os.cpu_count()} cores"
     master_page.write(folder, [*rows.rows.values()], [*whole.rows.values()], command, on)

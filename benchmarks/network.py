@@ -55,7 +55,9 @@ class Row(NamedTuple):
     error: Any
 
 
-def bench(folder: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+def bench(
+    folder: Path, quick: bool, progress: Callable[[str, int, int], None], command: str
+) -> None:
     """Write the page and its figure to `folder`."""
     options = ["packaging=native", f"duration={QUICK if quick else SECONDS}"]
     rows = []
@@ -68,7 +70,7 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], None], comm
         while "serves at" not in log.read_text():
             sleep(0.1)
         for i, (name, network) in enumerate(zip(NAMES, NETWORKS, strict=True)):
-            told(name, i, len(NAMES))
+            progress(name, i, len(NAMES))
             with ExitStack() as ends:
                 remote = {}
                 if network:

@@ -34,16 +34,16 @@ SCENES = (
 FORMS = {"run": 0, "one FMU, 1 tick a step": 1, "one FMU, 16 ticks a step": 16}
 COLUMNS = ("scene", "form", "tick_us", "times_real_time", "bytes", "build_s")
 ROUNDS = 15
-Told = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 
 
-def bench(folder: Path, quick: bool, told: Told, command: str) -> Path:
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> Path:
     """Measures all scenes, and writes README.md and runs.csv into `folder`."""
     (folder / "runs.csv").unlink(missing_ok=True)
     rows = Rows(folder / "runs.csv", COLUMNS, 2)
     scenes = SCENES[:1] if quick else SCENES
     for k, (scene, options) in enumerate(scenes):
-        told(" ".join((scene, *options)), k, len(scenes))
+        progress(" ".join((scene, *options)), k, len(scenes))
         for row in _measured(scene, options, 3 if quick else ROUNDS):
             rows.add(*row)
     page = folder / "README.md"

@@ -62,7 +62,9 @@ class EmptyLoop:
         return self.pace.report()
 
 
-def bench(folder: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+def bench(
+    folder: Path, quick: bool, progress: Callable[[str, int, int], None], command: str
+) -> None:
     """Write the page and its figure to `folder`."""
     seconds = QUICK if quick else SECONDS
     empty = EmptyLoop(seconds)
@@ -73,7 +75,7 @@ def bench(folder: Path, quick: bool, told: Callable[[str, int, int], None], comm
             SCENE,
             room,
             options,
-            lambda time: told(SCENE, int(time), seconds),
+            lambda time: progress(SCENE, int(time), seconds),
             real_time=RealTimeRun(empty.start),
         ).results
     report = results.record.real_time

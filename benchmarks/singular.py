@@ -40,7 +40,7 @@ COLUMNS = ("mu", "rate", "error_m")
 COLOURS = dict(zip(MUS, ("#8a8a8a", "#d1495b", "#1b6ca8", "#2a9d5c"), strict=True))
 
 
-def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> None:
     """Write README.md, rates.csv and tip-error.png to `out`."""
     code_version.begin(out, ("rates.csv",))
     rows = Rows(out / "rates.csv", COLUMNS, keys=2)
@@ -49,7 +49,7 @@ def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command
     for k, (name, (integrator, mu)) in enumerate(MUS.items()):
         advance = None
         for i, rate in enumerate(rates):
-            told(f"singular poses: {name}", k * len(rates) + i, len(MUS) * len(rates))
+            progress(f"singular poses: {name}", k * len(rates) + i, len(MUS) * len(rates))
             if (name, rate) in rows:
                 continue
             if advance is None:

@@ -42,7 +42,7 @@ SAME = ("scene", "compared", "differ", "largest_difference", "apart")
 ON, OFF = "on", "off"
 ROUNDS = 7
 READ = "record.signals=connected"
-Told = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 
 
 @contextmanager
@@ -124,19 +124,19 @@ def _ports(columns: Iterable[str]) -> dict[str, list[str]]:
     return found
 
 
-def measure(out: Path, scenes: Sequence[str], rounds: int, told: Told) -> tuple[Rows, Rows]:
+def measure(out: Path, scenes: Sequence[str], rounds: int, progress: Progress) -> tuple[Rows, Rows]:
     """The rows of runs and of comparisons, of which those on disk are not made again."""
     rows, same = Rows(out / "runs.csv", COLUMNS, keys=3), Rows(out / "same.csv", SAME, keys=1)
     total = len(scenes) * (rounds + 1)
     with process_cache.unpacked_once(), temporary_folders.room() as room:
         for k, scene in enumerate(scenes):
-            told(f"{scene}: the same results", k, total)
+            progress(f"{scene}: the same results", k, total)
             if (scene,) not in same:
                 made = {s: run(scene, room / s, s) for s in (ON, OFF)}
                 same.add(scene, *compared(made[ON], made[OFF]))
         for number in range(rounds):
             for k, scene in enumerate(scenes):
-                told(f"{scene}: run time", (number + 1) * len(scenes) + k, total)
+                progress(f"{scene}: run time", (number + 1) * len(scenes) + k, total)
                 for skipping in (ON, OFF):
                     if (scene, skipping, number) not in rows:
                         made_now = run(scene, room / skipping, skipping, READ)
@@ -145,11 +145,11 @@ def measure(out: Path, scenes: Sequence[str], rounds: int, told: Told) -> tuple[
     return rows, same
 
 
-def bench(out: Path, quick: bool, told: Told, command: str) -> None:
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
     """Write README.md, skip.png and the rows to `out`."""
     from benchmarks import skip_page  # loads Matplotlib
 
     code_version.begin(out, ("runs.csv", "same.csv"), hapticlink.orchestrator, hapticlink.scenes)
     scenes = list(find_scene.shipped())
-    rows, same = measure(out, scenes[::6] if quick else scenes, 2 if quick else ROUNDS, told)
+    rows, same = measure(out, scenes[::6] if quick else scenes, 2 if quick else ROUNDS, progress)
     skip_page.write(out, rows, same, command)

@@ -58,8 +58,8 @@ def write(out: Path, rows: Rows, same: Rows, command: str) -> None:
         on, off = (rows.rows[scene, s, "0"] for s in (ON, OFF))
         first, middle, third = quartiles(found[scene]["run_s"])
         cells = " | ".join(f"{int(row[n]):,}" for n in COUNTS for row in (on, off))
-        told = _same(same.rows[scene,])
-        lines.append(f"| {scene} | {cells} | {middle:.2f} ({first:.2f} to {third:.2f}) | {told} |")
+        bits = _same(same.rows[scene,])
+        lines.append(f"| {scene} | {cells} | {middle:.2f} ({first:.2f} to {third:.2f}) | {bits} |")
     (out / "README.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
 
 

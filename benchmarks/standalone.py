@@ -40,7 +40,7 @@ SCENES = (
 DURATION = 3.0
 COLUMNS = ("scene", "bytes", "make_s", "run", "node", "chromium")
 ROUNDS = 15
-Told = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 TIMED = """
 const timed = (given, now, rounds) => {
   const module = new WebAssembly.Module(given.program), times = [];
@@ -83,7 +83,7 @@ onmessage = ({ data: [given, rounds] }) => postMessage(timed(given, now, rounds)
 """
 
 
-def bench(folder: Path, quick: bool, told: Told, command: str) -> Path:
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> Path:
     """Measures all scenes, and writes README.md and runs.csv into `folder`."""
     (folder / "runs.csv").unlink(missing_ok=True)
     rows = Rows(folder / "runs.csv", COLUMNS, 1)
@@ -91,7 +91,7 @@ def bench(folder: Path, quick: bool, told: Told, command: str) -> Path:
     with chromium() as browser:
         for k, (scene, options) in enumerate(scenes):
             title = " ".join((scene, *options))
-            told(title, k, len(scenes))
+            progress(title, k, len(scenes))
             rows.add(title, *_measured(scene, options, 3 if quick else ROUNDS, browser))
     path = folder / "README.md"
     path.write_text(_page([*rows.rows.values()], command), encoding="utf-8")

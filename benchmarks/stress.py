@@ -120,12 +120,12 @@ def risen(run: hl.Run) -> float:
     return 0.0
 
 
-def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> Path:
+def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> Path:
     """Write stress.csv and stress.md to `out`; returns the page."""
     chosen = [case for case in cases() if case.quick or not quick]
     found: dict[str, Made] = {}
     for i, case in enumerate(chosen):
-        told(f"stress: {case.name}", i, len(chosen))
+        progress(f"stress: {case.name}", i, len(chosen))
         found[case.name] = make(case)
     out.mkdir(parents=True, exist_ok=True)
     with (out / "stress.csv").open("w", newline="", encoding="utf-8") as file:

@@ -80,12 +80,14 @@ class Measured(Session):
         live.set, live.noted = noted, True  # type: ignore[method-assign,attr-defined]
 
 
-def bench(folder: Path, quick: bool, told: Callable[[str, int, int], object], command: str) -> None:
+def bench(
+    folder: Path, quick: bool, progress: Callable[[str, int, int], object], command: str
+) -> None:
     """Write the page to `folder`. Raises what playwright does without a browser."""
     seconds = QUICK if quick else SECONDS
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     scene = viewed(SCENE, [f"haptics.rate={RATE}"])
-    told(f"{SCENE}, dragged", 0, seconds)
+    progress(f"{SCENE}, dragged", 0, seconds)
     arguments = "127.0.0.1", "0", "bench", "", ""  # no second run
     with temporary_folders.room() as room, Link(SERVER, *arguments) as link:
         url = f"http://127.0.0.1:{link.first()['port']}/bench/"

@@ -132,8 +132,8 @@ def _status(arguments: Sequence[str] | None) -> int:
         say(f"hapticlink: {error}", file=sys.stderr)
         return 1
     except Exception as error:
-        if told := plugins.blamed(error):
-            say(f"hapticlink: {told}", file=sys.stderr)
+        if message := plugins.blamed(error):
+            say(f"hapticlink: {message}", file=sys.stderr)
             return InputFault.exit_status
         if isinstance(error, ModuleNotFoundError) and error.name != "hapticlink":
             say(

@@ -102,7 +102,7 @@ def run(
         result = ended.run
     if result.fault:
         say(f"hapticlink: {result.fault}", file=sys.stderr)
-    lines = [*summary.told(result, default_folder("runs", scene).name, result.numbers)]
+    lines = [*summary.printed(result, default_folder("runs", scene).name, result.numbers)]
     if quiet or json:
         for line in summary.warnings(result):
             say(f"hapticlink: {line}", file=sys.stderr)

@@ -83,8 +83,8 @@ def packed(
     step_size: float,
     engine: bytes = b"",
 ) -> dict[str, bytes]:
-    """As `entries`, with the files that hold the functions, and what the slave is told of them.
-    engine: the text of a module whose functions replace these."""
+    """As `entries`, with the files that hold the functions, and what the slave needs to know of
+    them. engine: the text of a module whose functions replace these."""
 
     def describe(guid: str) -> bytes:
         return model_description(component, guid, stop_time=stop_time, step_size=step_size)

@@ -41,8 +41,8 @@ def described(
     """The files that describe the program, the same for the same arguments. capable: its
     capabilities, as FMI 2.0 calls them. step_size (s): of the default experiment. files: the C
     files to compile, in sources/."""
-    told = of_model(scene, identifier)
-    root = ET.Element("fmiModelDescription", told, fmiVersion="2.0", guid=guid)
+    attributes = of_model(scene, identifier)
+    root = ET.Element("fmiModelDescription", attributes, fmiVersion="2.0", guid=guid)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
     simulation = ET.SubElement(root, "CoSimulation", runs | {**capable})
     listed = ET.SubElement(simulation, "SourceFiles")
@@ -100,13 +100,16 @@ def definitions(root: ET.Element, scene: Scene, ports: Sequence[Port], step_size
 
 def about(port: Port) -> dict[str, str]:
     """Causality, variability and, where it has to be said, how a variable starts."""
-    told = {"causality": CAUSALITY[port.kind], "variability": "continuous"}
+    attributes = {"causality": CAUSALITY[port.kind], "variability": "continuous"}
     if port.kind == "PARAMETER":
-        return told | {"variability": "fixed" if port.fixed else "tunable", "initial": "exact"}
+        return attributes | {
+            "variability": "fixed" if port.fixed else "tunable",
+            "initial": "exact",
+        }
     if port.start is None:
         kind = "discrete" if port.sampled else "continuous"
-        return told | {"variability": kind, "initial": "calculated"}
-    return told
+        return attributes | {"variability": kind, "initial": "calculated"}
+    return attributes
 
 
 def _variables(root: ET.Element, ports: Sequence[Port]) -> None:
@@ -114,8 +117,8 @@ def _variables(root: ET.Element, ports: Sequence[Port]) -> None:
     index = {port.name: str(i + 1) for i, port in enumerate(ports)}
     for reference, port in enumerate(ports):
         name = {"name": port.name, "valueReference": str(reference)}
-        told = name | {"description": port.description} | about(port)
-        real = ET.SubElement(ET.SubElement(parent, "ScalarVariable", told), "Real")
+        attributes = name | {"description": port.description} | about(port)
+        real = ET.SubElement(ET.SubElement(parent, "ScalarVariable", attributes), "Real")
         if port.unit:
             real.set("unit", port.unit)
         if port.start is not None:

@@ -66,8 +66,8 @@ def _model_description(
     token: str,
     step_size: float,
 ) -> bytes:
-    told = of_model(scene, identifier)
-    root = ET.Element("fmiModelDescription", told, fmiVersion="3.0", instantiationToken=token)
+    attributes = of_model(scene, identifier)
+    root = ET.Element("fmiModelDescription", attributes, fmiVersion="3.0", instantiationToken=token)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
     capabilities = {name: capable[of_fmi2] for name, of_fmi2 in CAPABILITIES.items()}
     ET.SubElement(root, "CoSimulation", runs | capabilities)
@@ -97,18 +97,22 @@ def _variable(variables: ET.Element, array: Array, holder: dict[str, Array]) -> 
     described = first.description
     if len(set(units)) > 1:
         described = f"{described.rstrip('.')} ({', '.join(units)})"
-    told = {"name": array.name, "valueReference": str(array.reference), "description": described}
-    told |= about(first)
+    attributes = {
+        "name": array.name,
+        "valueReference": str(array.reference),
+        "description": described,
+    }
+    attributes |= about(first)
     if len(set(units)) == 1 and units[0]:
-        told["unit"] = units[0]
+        attributes["unit"] = units[0]
     if first.start is not None:
-        told["start"] = " ".join(repr(float(port.start or 0.0)) for port in array.entries)
+        attributes["start"] = " ".join(repr(float(port.start or 0.0)) for port in array.entries)
     if first.max is not None:
-        told["max"] = repr(float(first.max))
+        attributes["max"] = repr(float(first.max))
     base = holder.get(first.derivative_of or "")
     if base and base.shape == array.shape:
-        told["derivative"] = str(base.reference)
-    element = ET.SubElement(variables, "Float64", told)
+        attributes["derivative"] = str(base.reference)
+    element = ET.SubElement(variables, "Float64", attributes)
     for size in array.shape:
         ET.SubElement(element, "Dimension", start=str(size))
 

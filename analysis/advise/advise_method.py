@@ -194,10 +194,10 @@ def on_draws(
         for draw in drawn
     ]
 
-    def told(done: int) -> None:
+    def progress(done: int) -> None:
         tell(done, len(jobs))
 
-    rows = sweep(jobs, folder, processes, tell=told, measure=measured)
+    rows = sweep(jobs, folder, processes, tell=progress, measure=measured)
     n = len(drawn)
     return {method: rows[i * n : (i + 1) * n] for i, method in enumerate(methods)}
 

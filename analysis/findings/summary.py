@@ -71,7 +71,7 @@ def warnings(results: Results) -> Sequence[str]:
     return [*lines(results)] if recorded is None else recorded
 
 
-def told(results: Results, name: str, known: Sequence[str] | None = None) -> Iterator[str]:
+def printed(results: Results, name: str, known: Sequence[str] | None = None) -> Iterator[str]:
     """The lines that `hapticlink run` and `print` show of a run: how it ended, its numbers (those
     that are `known`), warnings, time and files."""
     yield f"{name}: {ending(results)}"

@@ -275,8 +275,8 @@ def costs(
     for name, change in changes.items():
         try:
             changed = (*given, *overrides.written(change))
-            told = pose.options(whole_frames(open_scene.load(scene, changed), changed))
-            with resting(scene, told) as place:
+            options = pose.options(whole_frames(open_scene.load(scene, changed), changed))
+            with resting(scene, options) as place:
                 found.append(_cost(read, place, name))
         except (InputFault, FmuFault) as fault:
             tell(f"  {name}: {fault}")

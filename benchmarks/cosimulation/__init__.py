@@ -7,14 +7,14 @@ from pathlib import Path
 import hapticlink.orchestrator
 from benchmarks import code_version
 from benchmarks.continuous import kept
-from benchmarks.cosimulation.measure import Told, measure
+from benchmarks.cosimulation.measure import Progress, measure
 from benchmarks.cosimulation.points import CONTACT, LOOP, points
 
 ROUNDS = 5
 KEPT = ("reference.csv", "runs.csv")
 
 
-def bench(out: Path, quick: bool, told: Told, command: str) -> None:
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
     """Write README.md, the figure and the rows to `out`; finished rows and references of the same
     version of the code are reused."""
     from benchmarks.cosimulation import page  # loads Matplotlib
@@ -22,8 +22,8 @@ def bench(out: Path, quick: bool, told: Told, command: str) -> None:
     code_version.begin(out, KEPT, hapticlink.orchestrator)
     references = {}
     for k, name in enumerate((LOOP, CONTACT)):
-        told(f"{name}: two continuous runs", k, 2)
+        progress(f"{name}: two continuous runs", k, 2)
         references[name] = kept(out / "reference.csv", name)
     chosen = points(quick)
-    rows = measure(out / "runs.csv", chosen, references, 2 if quick else ROUNDS, told)
+    rows = measure(out / "runs.csv", chosen, references, 2 if quick else ROUNDS, progress)
     page.write(out, rows, references, command)

@@ -20,7 +20,7 @@ SETTINGS = tuple(f.name for f in fields(Point))
 COLUMNS = (*SETTINGS, "round", "run_s", "first_mm", "max_mm", "rms_mm", "end", "end_s")
 APART = 42.0
 """Error (mm, the length of a link) from which on a run counts as unstable."""
-Told = Callable[[str, int, int], None]
+Progress = Callable[[str, int, int], None]
 
 
 def errors(handle: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:
@@ -48,7 +48,7 @@ def measure(
     points: Sequence[Point],
     references: Mapping[str, Reference],
     rounds: int,
-    told: Told,
+    progress: Progress,
 ) -> Rows:
     """Run what `path` lacks. All points of a round come before the next round, so that a busy
     machine slows all of them alike; a refused point is not asked again."""
@@ -56,7 +56,7 @@ def measure(
     with process_cache.unpacked_once(), temporary_folders.room() as room:
         for number in range(rounds):
             for k, point in enumerate(points):
-                told(str(point), number * len(points) + k, rounds * len(points))
+                progress(str(point), number * len(points) + k, rounds * len(points))
                 first = rows.rows.get((*point.key, "0"))
                 if (*point.key, number) in rows or (first and first["end"] == "refused"):
                     continue

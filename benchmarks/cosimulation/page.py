@@ -34,7 +34,7 @@ def write(out: Path, rows: Rows, references: Mapping[str, Reference], command: s
 
 
 def _finding(found: Mapping[str, Sequence[Measured]]) -> str:
-    told = []
+    paragraphs = []
     for scene, points in found.items():
         best = front(points)
         free = [m for m in points if m.point.frames == NONE and not m.unstable]
@@ -43,14 +43,14 @@ def _finding(found: Mapping[str, Sequence[Measured]]) -> str:
             continue
         share = sum(m.point.frames == NONE for m in best)
         least = [min(group, key=lambda m: m.most) for group in (free, held)]
-        told.append(
+        paragraphs.append(
             f"`{scene}`: {share} of the {len(best)} points of the Pareto front hold nothing "
             f"between rates; the least error without held values is {least[0].most:.2g} mm, with "
             f"them {least[1].most:.2g} mm. The front runs from {best[0].most:.2g} mm in "
             f"{_ms(best[0]):.1f} ms per simulated second to {best[-1].most:.2g} mm in "
             f"{_ms(best[-1]):.0f} ms ({', '.join(best[-1].point.settings())})."
         )
-    return "\n\n".join(fill(t, 110, break_on_hyphens=False) for t in told)
+    return "\n\n".join(fill(t, 110, break_on_hyphens=False) for t in paragraphs)
 
 
 def _ms(m: Measured) -> float:

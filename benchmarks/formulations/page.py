@@ -78,12 +78,14 @@ def steps(
     yield "symbolic embedding", embedded.n_instructions(), advance, advance
 
 
-def measure(rows: Rows, count: int, folder: Path, told: Callable[[str, int, int], None]) -> None:
+def measure(
+    rows: Rows, count: int, folder: Path, progress: Callable[[str, int, int], None]
+) -> None:
     """A row for each case and method; cases whose own reference is not certain are left out."""
     every = RATE // 16
     times = np.arange(0, int(END * RATE) + 1, every) / RATE
     for case, bar, start in cases(count):
-        told("random five-bars", case, count)
+        progress("random five-bars", case, count)
         if all((case, name) in rows for name in METHODS) or (case, "left out") in rows:
             continue
         exact, check = (bar.reference(start, times, tol) for tol in (1e-12, 1e-11))

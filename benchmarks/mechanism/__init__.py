@@ -11,12 +11,12 @@ from benchmarks import code_version
 ROWS = ("runs.csv", "energy.csv", "growth.csv", "references.json")
 
 
-def bench(out: Path, quick: bool, told: Callable[[str, int, int], None], command: str) -> None:
+def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> None:
     """Write README.md, table.csv and two figures to `out`."""
     from benchmarks.mechanism import energy, errors, growth, page  # load Matplotlib
 
     code_version.begin(out, ROWS)
-    drifts = energy.measure(out, told)
-    sizes = growth.measure(out, quick, told)
-    page.write(out, *errors.measure(out, quick, told), drifts, sizes, command)
+    drifts = energy.measure(out, progress)
+    sizes = growth.measure(out, quick, progress)
+    page.write(out, *errors.measure(out, quick, progress), drifts, sizes, command)
     shutil.rmtree(out / ".compiled", ignore_errors=True)

@@ -23,7 +23,7 @@ COLUMNS = ("integrator", "stabilization", "closure_m", "energy_drift")
 ENERGY, END, RATE, NONE = 12.6e-3, 200, 512, (0.0, 0.0, 0.0)
 
 
-def measure(out: Path, told: Callable[[str, int, int], None]) -> list[dict[str, str]]:
+def measure(out: Path, progress: Callable[[str, int, int], None]) -> list[dict[str, str]]:
     """Largest closure error (m) and relative energy change over the run, sampled every 1/8 s."""
     rows = Rows(out / "energy.csv", COLUMNS, keys=2)
     bar = mechanisms.five_bar()
@@ -32,7 +32,7 @@ def measure(out: Path, told: Callable[[str, int, int], None]) -> list[dict[str, 
     scale = math.sqrt(ENERGY / probe.outputs(probe.start)["energy"][0])
     moving = replace(bar, start_velocity={"shoulder1": scale})
     for k, (integrator, stabilization) in enumerate(ALL):
-        told(f"200 s: {integrator}, {stabilization}", k, len(ALL))
+        progress(f"200 s: {integrator}, {stabilization}", k, len(ALL))
         if (integrator, stabilization) in rows:
             continue
         ours = Ours(moving, NONE, setting(integrator, stabilization), 1 / RATE)

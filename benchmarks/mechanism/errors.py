@@ -148,7 +148,7 @@ def tasks(
 
 
 def measure(
-    out: Path, quick: bool, told: Callable[[str, int, int], None]
+    out: Path, quick: bool, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, list[dict]], list[str]]:
     """Run the cases that runs.csv lacks; returns the aggregated rows by case and the codes that are
     not installed."""
@@ -161,7 +161,7 @@ def measure(
         rounds = 2 if quick else 5
         for number in range(rounds):
             for k, (code, method, rate, prepare) in enumerate(listed):
-                told(
+                progress(
                     f"{case.name}: {code}, {method}", number * len(listed) + k, rounds * len(listed)
                 )
                 key = (case.name, code, method, rate)

@@ -15,13 +15,15 @@ COLUMNS = ("mechanism", "bodies", "build_s", "instructions", "vm_us", "c_us")
 STEPS = 500
 
 
-def measure(out: Path, quick: bool, told: Callable[[str, int, int], None]) -> list[dict[str, str]]:
+def measure(
+    out: Path, quick: bool, progress: Callable[[str, int, int], None]
+) -> list[dict[str, str]]:
     rows = Rows(out / "growth.csv", COLUMNS, keys=2)
     sizes = (5, 10, 20) if quick else (5, 10, 20, 40, 80, 160)
     wanted = [("serial chain", n, mechanisms.chain(n)) for n in sizes]
     wanted += [("N-four-bar", 2 * (n // 2) + 1, mechanisms.n_four_bar(n // 2)) for n in sizes]
     for k, (name, bodies, linkage) in enumerate(wanted):
-        told(f"growth: {name} of {bodies}", k, len(wanted))
+        progress(f"growth: {name} of {bodies}", k, len(wanted))
         if (name, bodies) in rows:
             continue
         builds = []

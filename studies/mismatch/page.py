@@ -94,9 +94,11 @@ def _kept(found: Found, arrangement: str, bias: str) -> str:
     chosen = {rate: found.advice[arrangement, bias, rate] for rate in COLUMNS}
     advised = [rate for rate in COLUMNS if chosen[rate].method]
     others = [f"{c.most} of {c.of} at {rate} Hz" for rate, c in chosen.items() if not c.method]
-    told = [f"advised at {both(advised)} Hz"] if advised else []
-    told += [f"nothing keeps the limits elsewhere, the best in {both(others)}"] if others else []
-    return "; ".join(told) + "."
+    sentences = [f"advised at {both(advised)} Hz"] if advised else []
+    sentences += (
+        [f"nothing keeps the limits elsewhere, the best in {both(others)}"] if others else []
+    )
+    return "; ".join(sentences) + "."
 
 
 def _where_to_run(found: Found) -> str:

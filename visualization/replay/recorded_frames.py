@@ -106,7 +106,7 @@ class Recorded:
             made.append(self.picture.drawn(frame))
         return made
 
-    def told(self) -> dict[str, Any]:
+    def message(self) -> dict[str, Any]:
         """All that the page needs, as JSON: the frames by name, each value with the frame from
         which on it stands."""
         frames = self.frames()

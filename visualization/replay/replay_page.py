@@ -19,8 +19,10 @@ WRITTEN = (".html", ".gif", ".webp", ".png")
 
 def html(runs: Sequence[Recorded]) -> str:
     """The page. The same runs give the same bytes."""
-    told = [run.told() | {"short": name} for run, name in zip(runs, _names(runs), strict=True)]
-    data = {"runs": told, "kinds": KINDS, "shapes": SHAPES}
+    runs_as_json = [
+        run.message() | {"short": name} for run, name in zip(runs, _names(runs), strict=True)
+    ]
+    data = {"runs": runs_as_json, "kinds": KINDS, "shapes": SHAPES}
     return one_file.page("replay.html", {"data": one_file.as_json(data)})
 
 

@@ -79,7 +79,7 @@ def test_a_long_run_is_thinned_and_says_so(folder: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(recorded_frames, "MAX_FRAMES", 100)
     run = Recorded(str(folder))
     assert len(run.times) <= 100
-    assert run.told()["every"] == 3
+    assert run.message()["every"] == 3
 
 
 def test_signals_that_are_not_recorded_are_named_and_nothing_stands_in_for_them(
@@ -171,8 +171,8 @@ def test_the_page_is_served_to_who_knows_its_path_alone() -> None:
 def test_a_run_of_two_users_has_the_handles_and_arms_of_both(tmp_path: Path) -> None:
     out = tmp_path / "two"
     hl.run("two-users", {"duration": 0.1}, out=out, figures=False)
-    r, told = hl.load(out), Recorded(str(out)).told()
-    assert told["users"] == ["", "left"]
+    r, message = hl.load(out), Recorded(str(out)).message()
+    assert message["users"] == ["", "left"]
     frame = Recorded(str(out)).frames()[-1]
     left = frame["others"]["left"]
     assert left["handle"] == r["haptic_device_left.x_true"][-1].tolist()
