@@ -114,8 +114,8 @@ def page(ours: Report, empty: Report, seconds: int, load: float, command: str) -
         f"Made by `{command}`, on {platform.system()} with {os.cpu_count()} "
         f"cores and a load average of {load:.1f} before. Milliseconds; the deadline of a tick is "
         f"the next one, {short(1e3 * ours['period'])} ms after it was due. Rows are recorded, the "
-        f"graphics side runs in a thread: {samples['late']} of its {samples['taken']} samples were "
-        f"late, at most by {short(1e3 * samples['largest_lateness'])} ms.",
+        f"graphics clock runs in a thread: {samples['late']} of its {samples['taken']} samples "
+        f"were late, at most by {short(1e3 * samples['largest_lateness'])} ms.",
         "",
         f"| | {' | '.join(ours['lateness'])} |",
         "|---|" + "--:|" * len(ours["lateness"]),

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 
 @dataclass(frozen=True)
 class NearEnd:
-    """The near end of a spring-damper on the fast side.
+    """The near end of a spring-damper at the haptic rate.
 
     position, velocity: read x and v; without v it is the difference of two positions. turns: a full
     turn for each entry that is a wrapped angle, else 0. sampled: whether F is computed at each tick

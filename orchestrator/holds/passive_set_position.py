@@ -1,7 +1,8 @@
 """Passive set-position modulation (Lee & Huang, IEEE Trans. Robotics 26(4), 2010), with one energy
 tank for both sides of the coupling.
 
-Where held samples are the set position y (and set velocity w) of a spring-damper on the fast side,
+Where held samples are the set position y (and set velocity w) of a spring-damper at the haptic
+rate,
 
 F = K (y - x) + B (w - v),    x the near end, v its velocity,
 

@@ -61,7 +61,7 @@ class Graphics(GraphicsCopy):
     controller (section B.6)."""
 
     rate: AnyRate = 30
-    """Frame rate: a number, bounds and a seed, the times at which frames end, or a recorded
+    """Graphics rate: a number, bounds and a seed, the times at which frames end, or a recorded
     trace."""
     phase: Seconds | None = None
     """End of the first frame of a fixed rate, at most a period; by default a period."""
