@@ -31,6 +31,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "report": "Write a page of a run, or of several beside each other.",
         "build": "Build the FMUs of a scene.",
         "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
+        "export-results": "Write the results of a run as Parquet tables, or as MCAP for Foxglove.",
         "info": "Describe a scene, or list the shipped scenes.",
         "schema": "Print the keys of a scene, as a JSON schema or as a page.",
         "stability": "Analyse the stability of a scene by its linearised map over a period.",
@@ -95,7 +96,8 @@ def _commands(arguments: Sequence[str]) -> None:
             # The list of commands uses this line, without an import; a command's own help is its
             # docstring.
             line = None if words[:1] == [name] else command
-            app.command(f"{__name__}.{name}:{name}", name=name, help=line)
+            file = name.replace("-", "_")
+            app.command(f"{__name__}.{file}:{file}", name=name, help=line)
         else:
             app.command(command, name=name)
 

@@ -54,6 +54,7 @@ BUILDINGS = {
         "standalone",
         "replay",
         "compare",
+        "export",
     ),
     "api": (".",),
     "commands": (".",),

@@ -76,7 +76,16 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         power_across_rates=power_across_rates(system),
         events=[(change.begin, change.text) for change in system.changes],
         not_recorded=not_recorded,
+        units=_units(system),
     )
+
+
+def _units(system: System) -> dict[str, str]:
+    """The units of the columns that are written."""
+    outputs = ((u.name, s) for u in system.fmus for s in u.description.outputs)
+    units = {f"{name}.{s.name}": s.unit for name, s in outputs if s.unit}
+    written = system.recording.outputs
+    return units if written is None else {name: units[name] for name in written if name in units}
 
 
 def _within_a_step(order: int, substeps: int) -> str:

@@ -85,6 +85,8 @@ class RunSetup:
     """The outputs `fmu.port` of which an entry is not written."""
     events: list[tuple[float, str]] = field(default_factory=list)
     """Times (s) and texts of what `[[at]]` does, each with the first step that it acts on."""
+    units: dict[str, str] = field(default_factory=dict)
+    """By column of a table, as its FMU names it; columns without a unit are left out."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -162,19 +162,23 @@ def _place(path: Path, binary: bool = False) -> Path:
 def load(folder: Path | str, binary: bool = False) -> Results:
     """Reads a run's folder; `binary`: from the rows where they are still there. Raises InputFault
     if it contains no run, one of another version, or one that was changed."""
-    folder = Path(folder)
-    tables: dict[str, Table] = {}
-    try:
-        run = json_file.read(folder / "run.json")
-    except InputFault as error:
-        raise InputFault(f"{folder}: not the folder of a run: {error}") from error
-    results = Results(folder, run, tables)
+    folder, tables = Path(folder), dict[str, Table]()
+    results = Results(folder, run_json(folder), tables)
     for name in results.record.rates:
         if recorded(name, results.record.files):
             tables[name] = read_table(folder / f"{name}.csv", tables, binary)
         else:
             tables[name] = empty(tables)
     return results
+
+
+def run_json(folder: Path) -> dict[str, Any]:
+    """The content of the run.json of a run's folder. Raises InputFault where there is none."""
+    try:
+        content: dict[str, Any] = json_file.read(folder / "run.json")
+    except InputFault as error:
+        raise InputFault(f"{folder}: not the folder of a run: {error}") from error
+    return content
 
 
 def recorded(rate: str, files: Sequence[str]) -> bool:
@@ -195,29 +199,43 @@ def read_table(
     if (place := _place(path, binary)) != path:
         _require_file(place)
         return Table(*rows.read(place), {} if others is None else others)
+    (columns, values), *_ = csv_parts(path)
+    return Table(columns, values, {} if others is None else others)
+
+
+def csv_parts(path: Path, most: int | None = None) -> Iterator[tuple[tuple[str, ...], Vector]]:
+    """The columns of a CSV of a run, with its rows, or with those of about `most` bytes as doubles
+    at a time. Raises InputFault for a table that is not as a run writes it."""
     _require_file(path)
+    line, last = 2, -math.inf
     try:
         with path.open(encoding="utf-8", newline="") as file:
             columns = tuple(next(csv.reader([file.readline()])))
-            first = file.readline()
-            lines = chain([first], file)  # the text of all of them would take twice what they take
-            numbers = np.loadtxt(lines, delimiter=",", ndmin=2) if first else None
+            if columns[:1] != ("time",):
+                why = f"its first column is {columns[0] if columns else ''!r}, not 'time'"
+                raise InputFault(f"{path}: line 1: {why}: run the scene again")
+            count = most and max(most // (8 * len(columns)), 1)
+            while first := file.readline():
+                # The text of all lines would take twice what they take.
+                lines = chain([first], islice(file, count and count - 1))
+                values = np.loadtxt(lines, delimiter=",", ndmin=2)
+                if values.shape[1] != len(columns):
+                    raise ValueError
+                ordered = np.diff(values[:, 0], prepend=last) >= 0
+                if not ordered.all():
+                    late = int(ordered.argmin())
+                    why = f"time = {values[late, 0]:g} s is before that of the line above"
+                    raise InputFault(f"{path}: line {line + late}: {why}: run the scene again")
+                yield columns, values
+                line, last = line + len(values), values[-1, 0]
+            if line == 2:
+                yield columns, np.zeros((0, len(columns)))
     except OSError as error:
         raise InputFault(f"{path}: {error.strerror}: run the scene again") from error
     except csv.Error as error:  # a line without end
         raise InputFault(f"{path}: {error}: run the scene again") from error
     except ValueError as error:
         raise InputFault(f"{path}: {_malformed(path) or error}: run the scene again") from error
-    values = np.zeros((0, len(columns))) if numbers is None else numbers
-    why = "" if values.shape[1] == len(columns) else _malformed(path)
-    if columns[:1] != ("time",):
-        why = f"line 1: its first column is {columns[0] if columns else ''!r}, not 'time'"
-    elif not (ordered := np.diff(values[:, 0]) >= 0).all():
-        line = int(ordered.argmin()) + 3
-        why = f"line {line}: time = {values[line - 2, 0]:g} s is before that of the line above"
-    if why:
-        raise InputFault(f"{path}: {why}: run the scene again")
-    return Table(columns, values, {} if others is None else others)
 
 
 def _require_file(path: Path) -> None:

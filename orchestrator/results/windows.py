@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -12,15 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.orchestrator.results import json_file, rows
+from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.results import json_file, rows, run_record
 from hapticlink.orchestrator.results.run_record import RunRecord
 from hapticlink.orchestrator.results.tables import (
+    TABLES,
     Results,
     Table,
+    csv_parts,
     empty,
     load,
     read_table,
     recorded,
+    run_json,
     size,
 )
 
@@ -37,6 +42,34 @@ def opened(folder: Path) -> Results:
     if size(folder, run, binary=True) <= WINDOW_BYTES:
         return load(folder, binary=True)
     return Streamed(folder, run, TablesLater(folder, tuple(run["rates"]), tuple(run["files"])))
+
+
+@contextmanager
+def of_run(folder: Path | str) -> Iterator[Results]:
+    """The results of a run that has ended, in windows; where they are CSVs of more than a window,
+    these are copied as rows into a temporary folder of the context. Raises InputFault as `load`."""
+    folder = Path(folder)
+    run = run_json(folder)
+    tables = [folder / n for n in run_record.read(run, folder).files if n.endswith(TABLES)]
+    csvs = [path for path in tables if path.suffix != rows.SUFFIX]
+    if not all(path.is_file() for path in tables) or size(folder, run) <= WINDOW_BYTES:
+        yield load(folder, binary=True)
+    elif not csvs:
+        yield opened(folder)
+    else:
+        with temporary_folders.room() as room:
+            for path in csvs:
+                copy_as_rows(path, room / f"{path.stem}{rows.SUFFIX}")
+            yield Streamed(room, run, TablesLater(room, tuple(run["rates"]), tuple(run["files"])))
+
+
+def copy_as_rows(path: Path, target: Path) -> None:
+    """Write a CSV of a run as rows, a window at a time. Raises InputFault as `read_table`."""
+    with target.open("xb") as file:
+        for columns, part in csv_parts(path, WINDOW_BYTES):
+            if not file.tell():
+                file.write(rows.header(columns))
+            file.write(part.tobytes())
 
 
 class TablesLater(Mapping[str, Table]):

@@ -15,11 +15,11 @@ from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.results.recorded_scene import by_user
 from hapticlink.visualization.figure_axes import plain
-from hapticlink.visualization.mechanism import workspace_drawing
+from hapticlink.visualization.mechanism import mark_places, workspace_drawing
+from hapticlink.visualization.mechanism.mark_places import MM, Frame, Points, place
 from hapticlink.visualization.mechanism.marks import (
     BODIES,
     ORIGIN,
-    SHAPES,
     Mark,
     Place,
     Point,
@@ -36,16 +36,11 @@ if TYPE_CHECKING:
 
     from hapticlink.orchestrator.scene.scene import Scene
 
-Points = NDArray[np.float64]
 Coordinates = Sequence[float] | NDArray[np.float64]
 """Joint coordinates of a linkage (m, rad)."""
-Frame = Mapping[str, Any]
 Look = dict[str, Any]
 MAX_NAMED_BODIES = 10
 """Bodies of a linkage of which the names are written beside them."""
-MM = 1e3
-MIN_ARROW, MAX_ARROW = 3.0, 120.0
-"""Lengths of arrows (pt); shorter ones are not drawn."""
 ROLES_BEHIND_PATHS = ("obstacle", "device", "directions", "ground", "rail", "spring")
 """Roles of marks that are drawn behind paths."""
 
@@ -118,33 +113,20 @@ def paint(axes: Axes, marks: Iterable[Mark], frame: Frame, zorder: float | None 
     """The marks that a frame has the places of."""
     labelled: set[str] = {""}
     for mark in marks:
-        at = [found for each in mark.at if (found := place(frame, each)) is not None]
-        if not at or (mark.when and mark.when not in frame.get("states", ())):
+        at = mark_places.points(mark, frame)
+        if at is None:
             continue
         layer = (1.0 if mark.role in ROLES_BEHIND_PATHS else 3.0) if zorder is None else zorder
         look = {"zorder": layer, "label": None if mark.label in labelled else mark.label}
-        if PAINTERS.get(mark.kind, _shape)(axes, mark, np.array(at), frame, look):
+        if PAINTERS.get(mark.kind, _shape)(axes, mark, at, frame, look):
             labelled.add(mark.label)
-
-
-def place(frame: Frame, of: Place) -> Points | None:
-    """The place (mm) of a point in the frame, (2,)."""
-    pose = reach(frame, of.path)
-    return None if pose is None else (np.array(pose[:2]) + _turned(pose, of.point)) * MM
-
-
-def _turned(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
-    """Points, (2,) or (k, 2), of the frame of a pose, turned into the world's directions."""
-    angle = by + (pose[2] if len(pose) > 2 else 0.0)
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(at) @ [[c, s], [-s, c]]
 
 
 def _area(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
     from matplotlib.patches import Polygon
 
     if mark.fill is None:
-        return _line(axes, mark, np.vstack([at, at[:1]]), frame, look)
+        return _line(axes, mark, at, frame, look)
     axes.add_patch(Polygon(at, fc=mark.fill, ec=mark.stroke, lw=mark.width, **look))
     return True
 
@@ -157,23 +139,6 @@ def _line(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
     return True
 
 
-def _rail(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
-    pose = reach(frame, mark.at[-1].path)
-    along = _turned(pose, (mark.size * MM, 0.0), mark.angle or 0.0)
-    along = -along if np.dot(at[1] - at[0], along) < 0 else along
-    return _line(axes, mark, at + np.array([-along, along]), frame, look)
-
-
-def _spring(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
-    a, b = at
-    along = b - a
-    length = float(np.linalg.norm(along)) or 1.0
-    across = np.array([-along[1], along[0]]) / length * min(0.04 * length, 6.0)
-    waves = np.where(np.arange(13) % 2, 1.0, -1.0)[:, None] * across
-    line = np.vstack([a, a + np.linspace(0.2, 0.8, 13)[:, None] * along + waves, b])
-    return _line(axes, mark, line, frame, look)
-
-
 def _disc(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
     from matplotlib.patches import Circle
 
@@ -184,9 +149,7 @@ def _disc(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
 
 
 def _shape(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
-    corners = np.array(SHAPES[mark.kind])
-    if mark.angle is not None:
-        corners = _turned(reach(frame, mark.at[-1].path), corners, mark.angle)
+    corners = mark_places.shape(mark, frame)
     axes.plot(
         *at[0], marker=np.vstack([corners, corners[:1]]), ms=2 * np.abs(corners).max(), ls="",
         mfc=mark.fill or "none", mec=mark.stroke or "none", mew=mark.width, **look,
@@ -195,11 +158,9 @@ def _shape(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool
 
 
 def _arrow(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
-    force = np.array(reach(frame, mark.vector) or (0.0, 0.0))[:2]
-    length = mark.size * float(np.hypot(*force))
-    if length < MIN_ARROW:
+    tip: Any = mark_places.arrow(mark, frame)
+    if tip is None:
         return False
-    tip = (*(force * mark.size * min(1.0, MAX_ARROW / length)),)
     line: Any = {"color": mark.stroke, "lw": mark.width}
     axes.annotate(
         "", at[0], tip, textcoords="offset points", annotation_clip=False, zorder=look["zorder"],
@@ -220,8 +181,8 @@ def _directions(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) ->
 PAINTERS = {
     "area": _area,
     "line": _line,
-    "rail": _rail,
-    "spring": _spring,
+    "rail": _line,
+    "spring": _line,
     "disc": _disc,
     "arrow": _arrow,
     "directions": _directions,

@@ -14,7 +14,8 @@ from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.figure_axes import plain
-from hapticlink.visualization.mechanism.drawing import MM, paint, place
+from hapticlink.visualization.mechanism.drawing import paint
+from hapticlink.visualization.mechanism.mark_places import MM, place
 from hapticlink.visualization.mechanism.marks import KINDS, RED
 from hapticlink.visualization.replay.recorded_frames import Recorded
 
