@@ -26,7 +26,7 @@ from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.visualization.export.scene_update import WORLD, SceneDrawing, pose
 from hapticlink.visualization.replay.recorded_frames import Recorded
 
-FRAMES_PER_S = 60
+FRAMES_PER_S = 30
 """Of the mechanism, at most; signals have all of their rows."""
 Stamped = tuple[int, str, Any]
 """Time (ns), topic and message."""
@@ -173,7 +173,8 @@ def _kind(topic: str, fields: Sequence[_Field]) -> Any:
     message = file.message_type.add(name=name)
     for number, field in enumerate([_Field("time", "", [], False), *fields], 1):
         label = "LABEL_REPEATED" if field.repeated else "LABEL_OPTIONAL"
-        message.field.add(name=field.name, number=number, type="TYPE_DOUBLE", label=label)
+        called = {"name": field.name, "json_name": field.name}
+        message.field.add(number=number, type="TYPE_DOUBLE", label=label, **called)
     pool = DescriptorPool()
     pool.Add(file)
     return GetMessageClass(pool.FindMessageTypeByName(f"hapticlink.{name}"))

@@ -3,6 +3,7 @@ the tip of its arrow, for whatever paints them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -21,7 +22,11 @@ MIN_ARROW, MAX_ARROW = 3.0, 120.0
 def place(frame: Frame, of: Place) -> Points | None:
     """The place (mm) of a point in the frame, (2,)."""
     pose = reach(frame, of.path)
-    return None if pose is None else (np.array(pose[:2]) + _turned(pose, of.point)) * MM
+    if pose is None:
+        return None
+    angle, (x, y) = _angle(pose), of.point
+    c, s = math.cos(angle), math.sin(angle)  # many single points, for which NumPy is slow
+    return np.array([(pose[0] + c * x - s * y) * MM, (pose[1] + s * x + c * y) * MM])
 
 
 def points(mark: Mark, frame: Frame) -> Points | None:
@@ -50,9 +55,13 @@ def arrow(mark: Mark, frame: Frame) -> Points | None:
 
 def _turned(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
     """Points, (2,) or (k, 2), of the frame of a pose, turned into the world's directions."""
-    angle = by + (pose[2] if len(pose) > 2 else 0.0)
+    angle = by + _angle(pose)
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(at) @ [[c, s], [-s, c]]
+
+
+def _angle(pose: Sequence[float]) -> float:
+    return pose[2] if len(pose) > 2 else 0.0
 
 
 def _straight(mark: Mark, at: Points, frame: Frame) -> Points:
