@@ -23,8 +23,8 @@ def main() -> None:
     mpl.use("agg")
     (lines,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     with tempfile.TemporaryDirectory() as room, chdir(room):
-        hl.run("closed-loop", out="runs/closed-loop", figures=False)
-        hl.export_results("runs/closed-loop", to="parquet")
+        hl.run("closed-loop", out="runs/five-bar", figures=False)
+        hl.export_results("runs/five-bar", to="parquet")
         exec(lines, {})
         shutil.copyfile(PICTURE.name, PICTURE)
 
