@@ -36,10 +36,17 @@ def chromium(bypass_csp: bool = True) -> Iterator[Any]:
 
 
 class Page:
-    """A page in a window of a size, by day or in the dark, with what went wrong in it."""
+    """A page in a window of a size, by day or in the dark, with what went wrong in it; `shown` is
+    awaited, by default that it shows a run."""
 
     def __init__(
-        self, browser: Any, url: str, width: int = 1280, height: int = 800, dark: bool = False
+        self,
+        browser: Any,
+        url: str,
+        width: int = 1280,
+        height: int = 800,
+        dark: bool = False,
+        shown: str = "view.frame && view.stage.limits",
     ) -> None:
         self.faults: list[str] = []
         self.page = browser.new_page()
@@ -49,7 +56,7 @@ class Page:
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("requestfailed", lambda request: self.faults.append(request.url))
         self.page.goto(url)
-        self.until("view.frame && view.stage.limits")
+        self.until(shown)
 
     def until(self, condition: str) -> None:
         """Wait for a condition in JavaScript."""
