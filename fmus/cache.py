@@ -23,7 +23,7 @@ from typing import Any
 import hapticlink.components
 from hapticlink.components import registry
 from hapticlink.fmus import lock
-from hapticlink.fmus.versions import version
+from hapticlink.fmus.versions import installed
 
 MAX_BUILD_TIME = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
@@ -64,7 +64,7 @@ def key(material: Mapping[str, Any]) -> str:
     package = sys.modules[__package__]  # this one, which imports this file
     whole = {
         "material": material,
-        "versions": {name: version(name) for name in VERSIONS},
+        "versions": installed(VERSIONS),
         "sources": sources(hapticlink.components, package),
         "plugins": {name: source(name) for name in plugins},
     }

@@ -63,8 +63,8 @@ def test_order_of_keys_does_not_matter_but_values_do():
 
 @pytest.mark.parametrize("name", cache.VERSIONS)
 def test_versions_are_part_of_the_key(name, monkeypatch):
-    before, version = cache.key(MATERIAL), cache.version
-    monkeypatch.setattr(cache, "version", lambda n: "0.0" if n == name else version(n))
+    before, installed = cache.key(MATERIAL), cache.installed
+    monkeypatch.setattr(cache, "installed", lambda names: installed(names) | {name: "0.0"})
     assert cache.key(MATERIAL) != before
 
 
