@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from time import monotonic
+from contextlib import contextmanager
 
+from hapticlink.fmus.durations import measured
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import printable, say
 
 SHORT = 2.0
 """Duration (s) below which nothing is said of what is begun."""
-DURATIONS = "durations.json"
-"""In the folder of the cache: minutes by command."""
 
 
 @contextmanager
@@ -35,7 +32,7 @@ def runs(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None
 def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int], None]]:
     """Gives a function to be called with what is done, and the numbers of finished and of all
     steps. Where stderr is no terminal, a line tells at the start how long it took before."""
-    with _measured(title) as took, _bar(title, hidden) as show:
+    with measured(title) as took, _bar(title, hidden) as show:
         if not (hidden or show):
             _tell(title, took)
         yield lambda what, done, of: show(done, of, what) if show else None
@@ -56,9 +53,9 @@ def progress(
 def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> Iterator[None]:
     """Prints before a long command how many minutes it took at most on this machine, or `guess`,
     and records how many it takes. Raises Fault where it is interrupted."""
-    with _measured(command) as took:
+    with measured(command) as took:
         if took is not None:
-            guess = f"up to {took:.1f} minutes here, less if partly finished before"
+            guess = f"up to {took / 60:.1f} minutes here, less if partly finished before"
         if not hidden:
             say(f"{command}: duration {guess}", file=sys.stderr)
         try:
@@ -71,7 +68,7 @@ def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> I
 def waiting(what: str, hidden: bool = False) -> Iterator[None]:
     """Says what is being done, for as long as it takes, and how long it took before, where nothing
     can be counted; once at the start where stderr is no terminal."""
-    with _measured(what) as took:
+    with measured(what) as took:
         if hidden or not sys.stderr.isatty():
             if not hidden:
                 _tell(what, took)
@@ -85,33 +82,13 @@ def waiting(what: str, hidden: bool = False) -> Iterator[None]:
 
 
 def _said(what: str, took: float | None) -> str:
-    return what if took is None else f"{what}, up to {60 * took:.0f} s before"
+    return what if took is None else f"{what}, up to {took:.0f} s before"
 
 
 def _tell(what: str, took: float | None) -> None:
     """Prints what is begun on stderr, unless it is known to take less than SHORT."""
-    if took is None or 60 * took >= SHORT:
+    if took is None or took >= SHORT:
         say(_said(what, took), file=sys.stderr)
-
-
-@contextmanager
-def _measured(what: str) -> Iterator[float | None]:
-    """Gives the longest duration (minutes) that something took on this machine, None where it is
-    not known, and records how long it takes."""
-    from hapticlink.fmus import cache
-    from hapticlink.fmus.atomic_file import atomic_file
-
-    folder, known = cache.folder(), dict[str, float]()
-    if folder:
-        with suppress(OSError, ValueError):
-            known = json.loads((folder / DURATIONS).read_text(encoding="utf-8"))
-    took, begun = known.get(what), monotonic()
-    yield took
-    if folder:
-        folder.mkdir(parents=True, exist_ok=True)
-        known[what] = max((monotonic() - begun) / 60, took or 0.0)
-        with suppress(OSError), atomic_file(folder / DURATIONS) as unfinished:
-            unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")
 
 
 @contextmanager

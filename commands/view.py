@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,7 +18,6 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 
 if TYPE_CHECKING:
-    from hapticlink.orchestrator.scene.scene import Scene
     from hapticlink.visualization.live_page.server_pipe import Link
 
 Host = Annotated[
@@ -99,20 +97,22 @@ def view(
             f"{given}: {scene} is not the folder of a run; first `hapticlink run {scene}`, then "
             f"`hapticlink view {default_folder('runs', scene)}`"
         )
-    import hapticlink as hl
-    from hapticlink.visualization.interactive_scene.viewed_scene import viewed
-    from hapticlink.visualization.live_page.session import Session
-
-    read = viewed(scene, changes.options)
     if standalone:
-        return _written(read, scene, standalone)
+        return _written(scene, changes, standalone)
     default = default_folder("runs", scene)
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
     second_run = "hapticlink.commands.compared_run", f"{root}-b"
-    with _served(host, port, token, *second_run) as (link, served_port):
+    with _server(host, port, token, *second_run) as link:
+        from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+
+        read = viewed(scene, changes.options)  # while the server starts
+        served_port = _port(link, host, port)
         page_address.show(read.title, host, served_port, token, browser)
         say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
+        import hapticlink as hl
+        from hapticlink.visualization.live_page.session import Session
+
         session = Session(read, link, root, hl.RealTime)
         with suppress(Interrupted, hl.RunInterrupted):
             session.run()
@@ -121,10 +121,12 @@ def view(
     return 0
 
 
-def _written(scene: Scene, name: str, path: Path) -> int:
+def _written(name: str, changes: Changes, path: Path) -> int:
     """Write the page of a scene that needs no server."""
+    from hapticlink.visualization.interactive_scene.viewed_scene import viewed
     from hapticlink.visualization.standalone import page
 
+    scene = viewed(name, changes.options)
     if path.suffix.lower() != ".html":
         raise InputFault(f"--standalone {path}: name a file that ends in .html")
     title = default_folder("", name).name
@@ -141,20 +143,20 @@ def _is_scene(name: str) -> bool:
     return name in hl.shipped() and not (Path(name) / "run.json").exists()
 
 
-@contextmanager
-def _served(host: str, port: int | None, *arguments: str) -> Iterator[tuple[Link, int]]:
-    """The server, and the port that it listens on. Raises InputFault where it cannot start."""
+def _server(host: str, port: int | None, *arguments: str) -> Link:
+    """The page's server, which begins to start."""
     if not find_spec("websockets"):
         raise InputFault(f"the page needs the package websockets: {install_command('view')}")
     from hapticlink.visualization.live_page.server_pipe import Link
 
-    module, error = "hapticlink.visualization.live_page.server", ""
-    for tried in (page_address.PORT, 0) if port is None else (port,):
-        with Link(module, host, str(tried), *arguments) as link:
-            if (first := link.first()) is None:
-                raise Fault("the page's server does not start")
-            if "error" not in first:
-                yield link, first["port"]
-                return
-            error = first["error"]
-    raise InputFault(page_address.refused(host, port, error))
+    ports = (page_address.PORT, 0) if port is None else (port,)
+    return Link("hapticlink.visualization.live_page.server", host, ports, *arguments)
+
+
+def _port(link: Link, host: str, port: int | None) -> int:
+    """The port that the server listens on. Raises InputFault where it cannot."""
+    if (first := link.first()) is None:
+        raise Fault("the page's server does not start")
+    if "error" in first:
+        raise InputFault(page_address.refused(host, port, first["error"]))
+    return int(first["port"])

@@ -61,12 +61,14 @@ def build_block(
 
     def make(folder: Path) -> Path:
         from hapticlink.fmus.build import build, build_engine, build_native
+        from hapticlink.fmus.fmu_functions import GRAPHS
 
-        block = component(name, settings, starts)
-        if engine:
-            return build_engine(block, settings, folder, **experiment)
-        if packaging == "python":
-            return build(block, folder, **experiment)
+        with GRAPHS:
+            block = component(name, settings, starts)
+            if engine:
+                return build_engine(block, settings, folder, **experiment)
+            if packaging == "python":
+                return build(block, folder, **experiment)
         return build_native(block, folder, platforms=platforms, **experiment)
 
     material: dict[str, Any] = {

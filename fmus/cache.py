@@ -23,7 +23,7 @@ from typing import Any
 import hapticlink.components
 from hapticlink.components import registry
 from hapticlink.fmus import lock
-from hapticlink.fmus.versions import version
+from hapticlink.fmus.versions import installed
 
 MAX_BUILD_TIME = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
@@ -64,7 +64,7 @@ def key(material: Mapping[str, Any]) -> str:
     package = sys.modules[__package__]  # this one, which imports this file
     whole = {
         "material": material,
-        "versions": {name: version(name) for name in VERSIONS},
+        "versions": installed(VERSIONS),
         "sources": sources(hapticlink.components, package),
         "plugins": {name: source(name) for name in plugins},
     }
@@ -106,11 +106,11 @@ def cached(
 ) -> Path:
     """The cached FMU for `key_material`, built by `build_function(folder) -> path` if necessary.
 
-    Processes of a machine that need the same one wait for the first to build it, which is logged as
-    a warning; `poll` is called meanwhile. Those of several machines each build their own, and the
-    last rename wins, with the same bytes. A damaged file in the cache is built again. It is built
-    in `build_folder`, which the caller has to remove, and stays there if the cache is off or
-    cannot be written; the latter is logged as a warning.
+    Threads and processes of a machine that need the same one wait for the first to build it, which
+    is logged as a warning where it is another process; `poll` is called meanwhile. Those of several
+    machines each build their own, and the last rename wins, with the same bytes. A damaged file in
+    the cache is built again. It is built in `build_folder`, which the caller has to remove, and
+    stays there if the cache is off or cannot be written; the latter is logged as a warning.
     """
     root = folder()
     if root is None:
@@ -135,12 +135,12 @@ _held: set[Path] = set()
 
 @contextmanager
 def _exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
-    """No other process of this machine builds for `entry` within the context."""
+    """No other thread or process of this machine builds for `entry` within the context."""
     warned = False
 
     def wait() -> None:
         nonlocal warned
-        if not warned:
+        if not warned and path not in _held:  # which another thread of this process holds
             logging.getLogger(__name__).warning("waiting for another process that builds %s", name)
         warned = True
         poll()
@@ -155,9 +155,9 @@ def _exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator
         try:
             yield
         finally:
-            _held.discard(path)
             with suppress(OSError):
                 path.unlink()
+            _held.discard(path)
 
 
 def remove_locks() -> None:

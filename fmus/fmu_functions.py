@@ -56,13 +56,14 @@ def one_pass(component: Component) -> OnePass:
         return _composed(component)
 
 
-_ALONE = threading.RLock()
+GRAPHS = threading.RLock()
+"""Held by the thread that derives equations: `_unsimplified` sets an option of the whole process,
+under which another thread would derive other graphs."""
 
 
 @contextmanager
 def _unsimplified() -> Iterator[None]:
-    """One thread at a time, as CasADi has one such option for all."""
-    with _ALONE:
+    with GRAPHS:
         before = ca.GlobalOptions.getSimplificationOnTheFly()
         ca.GlobalOptions.setSimplificationOnTheFly(False)
         try:

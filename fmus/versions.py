@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache
 from importlib import metadata
 
 version = cache(metadata.version)
 """The version of a distribution by its name. Raises importlib.metadata.PackageNotFoundError."""
+
+
+def installed(names: Iterable[str]) -> dict[str, str]:
+    """The versions of those distributions that are installed: built FMUs run without what built
+    them."""
+    found = {}
+    for name in names:
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def install_command(extra: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Iterable
 
-from hapticlink.fmus.versions import version
+from hapticlink.fmus.versions import installed
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.signal_names import MECHANISM
 from hapticlink.orchestrator.plan.plan import Plan
@@ -35,8 +35,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
     return RunSetup(
         scene=scene.tables(),
         options=list(scene.source.options) if scene.source else [],
-        versions={name: version(name) for name in (*PACKAGES, *_compilers(scene))}
-        | {"python": platform.python_version()},
+        versions=installed((*PACKAGES, *_compilers(scene))) | {"python": platform.python_version()},
         plugins=plugins.loaded(),
         seeds=_seeds(scene, system),
         files=["run.json", *(f"{table}.{scene.record.format}" for table in tables)],

@@ -17,8 +17,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.component import Component
+from hapticlink.components.component import Component, Signals
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, UnitInertia
+from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import COORDINATES, coordinates
@@ -65,6 +66,13 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
         for _ in range(RATE_STEPS):
             qd = project(q, qd, parameters)
     return q, qd
+
+
+def start_coordinates(linkage: Linkage) -> NDArray[np.float64]:
+    """The joint coordinates (m, rad) of the assembled start pose, (n,)."""
+    p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
+    q, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
+    return np.array(ca.Function("start", [p.vector], [q])(p.starts)).ravel()
 
 
 def _given(linkage: Linkage) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.components.component import Signals
-from hapticlink.components.dynamics.assembly import assemble
+from hapticlink.components.dynamics.assembly import start_coordinates
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.linkage.model import LinkageModel
@@ -23,11 +23,9 @@ def start_mobility(
 ) -> tuple[Matrix, Matrix]:
     """The mobilities (k x k) of k `coordinates` of a model, with closed and with open loops."""
     p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
-    q0, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
     model = LinkageModel.symbolic(linkage, p)
     J, space = ca.jacobian(coordinates(model), model.q), OperationalSpace(model)
-    start = ca.Function("start", [p.vector], [q0])
     both = [space.mobility(J), space.open_mobility(J)]
     mobilities = ca.Function("mobilities", [model.q, p.vector], both)
-    closed, opened = (np.array(m) for m in mobilities(start(p.starts), p.starts))
+    closed, opened = (np.array(m) for m in mobilities(start_coordinates(linkage), p.starts))
     return closed, opened

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from hapticlink.components.component import Component
 from hapticlink.fmus.documentation import documentation
+from hapticlink.fmus.fmu_functions import GRAPHS
 from hapticlink.fmus.model_description import model_description
 from hapticlink.fmus.native.compiler import (
     FLAGS,
@@ -45,13 +46,16 @@ def entries(
     platform's binary does not depend on the other platforms. Raises FmuError if no FMU can be built
     from the component, CompilerError if the source does not compile.
     """
-    check_functions(component)
-
-    files = {
-        "documentation/index.html": documentation(component),
-        "model.png": icon(component.timing),
-    }
-    header, pieces = component_source(component)
+    with GRAPHS:
+        check_functions(component)
+        header, pieces = component_source(component)
+        xml = model_description(
+            component, "", stop_time=stop_time, step_size=step_size, needs_tool=False
+        )
+        files = {
+            "documentation/index.html": documentation(component),
+            "model.png": icon(component.timing),
+        }
     made_by = [compiler_version(), *FLAGS, TARGETS]
     content = {
         **files,
@@ -60,12 +64,10 @@ def entries(
         COMMON.name: COMMON.read_bytes(),
         WINDOWS.name: WINDOWS.read_bytes(),
         "compiler": json.dumps(made_by).encode(),
-        "xml": model_description(
-            component, "", stop_time=stop_time, step_size=step_size, needs_tool=False
-        ),
+        "xml": xml,
     }
     guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
-    files["modelDescription.xml"] = content["xml"].replace(b'guid=""', f'guid="{guid}"'.encode(), 1)
+    files["modelDescription.xml"] = xml.replace(b'guid=""', f'guid="{guid}"'.encode(), 1)
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
         head = f'#define GUID "{guid}"\n'.encode()

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 
 from hapticlink.fmus.blocks import Starts, build_block
@@ -12,12 +15,12 @@ from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.scene.blocks import Blocks
+from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import STEP_SIZE, sizes
 
 LOG = logging.getLogger(__name__)
-"""Says, at level INFO, which block is being built, or taken from the cache."""
+"""Says, at level INFO, which block is begun to be built, or taken from the cache."""
 
 
 def fmu_files(
@@ -37,25 +40,12 @@ def fmu_files(
     rates. Raises InputFault where no FMU can be built from
     the settings (a loop that does not close), Fault where the compiler fails.
     """
-    interrupt.add(remove_locks)
-    try:
-        return dict(_files(scene, blocks, timeline, room, platforms, starts))
-    finally:
-        interrupt.remove(remove_locks)
-
-
-def _files(
-    scene: Scene,
-    blocks: Blocks,
-    timeline: Timeline,
-    room: Path,
-    platforms: Sequence[str],
-    starts: Mapping[str, Starts] | None,
-) -> Iterator[tuple[str, Path]]:
     every = (*blocks.built, *blocks.engines)
-    for i, block in enumerate(every, 1):
+    begun = count(1)
+
+    def file(block: BlockPlan) -> Path:
         interrupt.check()
-        LOG.info("building block %d of %d: %s", i, len(every), block.name)
+        LOG.info("building block %d of %d: %s", next(begun), len(every), block.name)
         given: Starts = {}
         experiment: dict[str, float] = {}
         if starts is not None:
@@ -66,7 +56,7 @@ def _files(
             }
             experiment = {"stop_time": scene.duration, "step_size": steps[STEP_SIZE]}
         try:
-            file = build_block(
+            return build_block(
                 block.block,
                 block.settings,
                 room / block.name,  # two hands are two files of one name
@@ -82,4 +72,12 @@ def _files(
             raise Fault(str(error)) from error
         except FmuError as error:
             raise InputFault(str(error)) from error
-        yield block.name, file
+
+    interrupt.add(remove_locks)
+    # While one block is compiled, the equations of the next are derived.
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        return {b.name: f for b, f in zip(every, pool.map(file, every), strict=True)}
+    finally:
+        pool.shutdown(cancel_futures=True)
+        interrupt.remove(remove_locks)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.commands import progress
+from hapticlink.fmus import durations
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
 
 
@@ -16,7 +17,7 @@ def test_a_long_command_tells_how_long_it_took(
 ) -> None:
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
     times = iter([0.0, 90.0, 0.0, 30.0, 0.0, 0.0])
-    monkeypatch.setattr(progress, "monotonic", lambda: next(times))
+    monkeypatch.setattr(durations, "monotonic", lambda: next(times))
     for _ in range(3):
         with progress.timed("bench it", "about 3 minutes"):
             pass

@@ -14,7 +14,9 @@ import { Stage } from "./stage.js";
 import { started } from "./worker_run.js";
 
 const $ = (id) => document.getElementById(id);
+let untouched = true; // nobody has pulled yet
 const stage = new Stage($("scene"), $("legend"), (at, user) => {
+  untouched = false;
   $("door").hidden = true;
   ending.hide();
   run.send({ type: "hand", at, user });
@@ -32,6 +34,13 @@ let address = "", later = null;
 function change(message) { run.send(acts_on_b ? { ...message, b: true } : message); }
 
 const HANDLERS = {
+  opening({ title, marks, shapes, kinds, frame }) {
+    document.title = $("title").textContent = title;
+    if (!frame) return;
+    stage.begin(marks, shapes);
+    view.kinds = kinds;
+    view.start = frame;
+  },
   scene(message) {
     document.title = $("title").textContent = message.title;
     stage.begin(message.marks, message.shapes);
@@ -40,7 +49,7 @@ const HANDLERS = {
     energies = Array.from({ length: runs }, () => new Energies(message));
     charts.begin([{ name: message.port, words: message.port }, ...message.power], message.users, runs);
     ending.begin();
-    view.frame = null;
+    view.start = view.frame = null;
     view.levels = [];
     view.marks = message.marks;
     if (run.listen) view.sound = sound ??= new Sound(run.listen, message.haptics);
@@ -73,6 +82,7 @@ const HANDLERS = {
     view.frames += 1;
     ending.add(message);
     if (first) note();
+    if (untouched) $("door").hidden = false;
     if (first && !message.directions) $("resists").hidden = true;
     [message, message.b].forEach((frame, i) => {
       if (!frame || !energies[i]) return;
@@ -84,7 +94,7 @@ const HANDLERS = {
     if (sound?.signal) sound.feel(loudness(sound.signal, message));
   },
   map: (message) => show({ map: { ...message, since: performance.now() } }),
-  building({ said }) { view.building = said; note(); },
+  building({ said, took }) { view.building = { said, took, since: performance.now() }; },
   refused(message) {
     view.refused = message.why;
     refusedUntil = performance.now() + 4000;
@@ -105,17 +115,26 @@ function show(change) {
   $("verdict").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${view.map?.why ?? ""}`;
 }
 
-// The verdict, or for how long it has been computed.
-function verdict({ said, since }) {
-  const seconds = said === "computing" ? Math.floor((performance.now() - since) / 1e3) : 0;
-  return `stability: ${said}${seconds > 1 ? `, ${seconds} s` : ""}`;
+// For how long something has been waited for.
+function waited(since) {
+  const seconds = Math.floor((performance.now() - since) / 1e3);
+  return seconds > 1 ? `, ${seconds} s` : "";
+}
+
+// The verdict, or that it is being computed.
+const verdict = ({ said, since }) => `stability: ${said}${said === "computing" ? waited(since) : ""}`;
+
+// What is done before the first run.
+function building({ said, took, since }) {
+  const before = took >= 2 ? ` (all blocks together took up to ${Math.round(took)} s before)` : "";
+  return `${said}${waited(since)}${before}`;
 }
 
 function note() {
   const { recording } = view.state;
   const refused = performance.now() < refusedUntil && view.refused;
   $("note").textContent = refused || (ending.frame && "slow motion of the last 0.2 s") ||
-    (recording && `recording to ${recording}`) || (!view.frame && (view.building ?? "the FMUs are being built ...")) || "";
+    (recording && `recording to ${recording}`) || (!view.frame && (view.building ? building(view.building) : "reading the scene ...")) || "";
 }
 
 function received(message) { HANDLERS[message.type]?.(message); }
@@ -200,6 +219,9 @@ function draw() {
     stage.draw(ending.frame ?? view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
     tags($("tags"), [...view.frame.states.map(label), ...(b ? [[SECOND, second()]] : [])]);
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;
+  } else {
+    if (view.start) stage.draw(view.start);
+    if (view.building) note();
   }
   if (view.map) $("map").textContent = verdict(view.map);
   charts.draw();

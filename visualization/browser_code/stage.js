@@ -91,7 +91,7 @@ export class Stage {
 
   // A key pulls the first user's handle further in a direction, until all are let go.
   pullBy([dx, dy]) {
-    if (!this.limits || !this.frame) return;
+    if (!this.limits || !this.frame?.handle) return;
     const pulling = this.pulls.get(KEYS) ?? { user: "", target: this.frame.handle.slice(0, 2) };
     pulling.target = [pulling.target[0] + STEP * dx, pulling.target[1] + STEP * dy];
     this.pulls.set(KEYS, pulling);
@@ -103,7 +103,7 @@ export class Stage {
   // The user whose handle is nearest to a place, of those that no pointer here pulls.
   nearest([x, y]) {
     const pulled = [...this.pulls.values()].map((pulling) => pulling.user);
-    const free = users(this.frame).filter(([name]) => !pulled.includes(name));
+    const free = users(this.frame).filter(([name, { handle }]) => handle && !pulled.includes(name));
     const distance = ([, { handle }]) => Math.hypot(handle[0] - x, handle[1] - y);
     return free.sort((a, b) => distance(a) - distance(b))[0]?.[0];
   }

@@ -1,4 +1,4 @@
-"""The message with which a page begins a run: title, users, rate and power, and its drawing."""
+"""The message with which a page begins a run: title, users, rate and power."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from hapticlink.analysis.findings import labels
-from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, HAND
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import Connection, System
 from hapticlink.visualization.interactive_scene.offered_controls import users
-from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
-from hapticlink.visualization.mechanism.picture import PORT, Picture
 
 
 def running(scene: Scene, system: System, meters: Iterable[str]) -> dict[str, Any]:
@@ -25,18 +22,6 @@ def running(scene: Scene, system: System, meters: Iterable[str]) -> dict[str, An
         "users": [*users(scene)],
         "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
         "power": power(system, meters),
-    }
-
-
-def drawn(picture: Picture) -> dict[str, Any]:
-    """Of the drawing: `marks` and the `shapes` that they name, what states mean (`kinds`), the name
-    of the user's `port`, and the `noticeable` energy (J)."""
-    return {
-        "marks": [mark._asdict() for mark in picture.marks],
-        "shapes": SHAPES,
-        "kinds": KINDS,
-        "port": PORT,
-        "noticeable": NOTICEABLE_J,
     }
 
 

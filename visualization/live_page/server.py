@@ -1,9 +1,12 @@
 """Serves the page on localhost, in a process of its own: files, and a websocket to each window.
 
 The haptic loop sends pickled messages to the standard input, whose end ends the process; messages
-of the pages leave by the standard output. The first message has host, port (0: a free one), token,
-and the module and result folder of a second run: as other processes could read them among the
-arguments of the command, they come this way.
+of the pages leave by the standard output. The first message has host, ports of which the first free
+one is taken (0: any), token, and the module and result folder of a second run: as other processes
+could read them among the arguments of the command, they come this way.
+
+What draws is loaded with the message that begins, by the thread that reads: so the page is served
+at once.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ import threading
 from collections.abc import Sequence
 from http import HTTPStatus
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from websockets.asyncio.server import Server, ServerConnection, broadcast, serve
 from websockets.datastructures import Headers
@@ -26,11 +29,12 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from hapticlink.visualization.browser_code.one_file import PAGE
-from hapticlink.visualization.interactive_scene import scene_message
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.server_pipe import Link, read, to_caller
 from hapticlink.visualization.live_page.stability_process import StabilityProcess
-from hapticlink.visualization.mechanism.picture import Picture
+
+if TYPE_CHECKING:
+    from hapticlink.visualization.mechanism.picture import Picture
 
 TYPES = {
     ".html": "text/html",
@@ -74,9 +78,11 @@ class Pages:
             self._newest[kind] = message
             self._stability.ask(message["scene"], message["settings"], message["parameters"])
             return
-        if kind == "scene":
-            self._picture = Picture(*message.pop("picture"))
-            message |= scene_message.drawn(self._picture) | {"runs": 2 if self._second else 1}
+        if kind == "opening":
+            self._picture = message.pop("picture")
+        elif kind == "scene":
+            runs = 2 if self._second else 1
+            message = self._newest["opening"] | message | {"runs": runs}
             self._holding = {user: self._holding.get(user) for user in message["users"]}
         elif kind == "frame" and self._picture:
             self._take_second(self._picture)
@@ -147,7 +153,7 @@ class Pages:
 
     async def window(self, connection: ServerConnection) -> None:
         """Serve a window until it is closed."""
-        for kind in ("building", "scene", "controls", "state", "map"):
+        for kind in ("opening", "building", "scene", "controls", "state", "map"):
             if message := self._newest.get(kind):
                 await connection.send(self._text(kind, message))
         self._windows.add(connection)
@@ -195,19 +201,26 @@ def _response(status: HTTPStatus, file: Path | None = None) -> Response:
     return Response(status.value, status.phrase, headers, body)
 
 
-async def _bound(pages: Pages, host: str, port: int) -> Server:
-    return await serve(
-        pages.window, host, port, process_request=pages.answer, max_size=messages.MAX_CHARACTERS,
-        compression=None, server_header=None, open_timeout=5, close_timeout=1,
-    )  # fmt: skip
+async def _bound(pages: Pages, host: str, ports: Sequence[int]) -> Server:
+    """The server on the first port that is free. Raises OSError of the last one."""
+    port, *others = ports
+    try:
+        return await serve(
+            pages.window, host, port, process_request=pages.answer, compression=None,
+            max_size=messages.MAX_CHARACTERS, server_header=None, open_timeout=5, close_timeout=1,
+        )  # fmt: skip
+    except OSError:
+        if not others:
+            raise
+        return await _bound(pages, host, others)
 
 
 async def _served(
-    host: str, port: str, token: str, second_run: Sequence[str], out: IO[bytes]
+    host: str, ports: Sequence[int], token: str, second_run: Sequence[str], out: IO[bytes]
 ) -> None:
     pages = Pages(token, second_run, out)
     try:
-        server = await _bound(pages, host, int(port))
+        server = await _bound(pages, host, ports)
     except OSError as error:
         pickle.dump({"error": error.strerror or str(error)}, out)
         out.flush()
@@ -223,9 +236,15 @@ async def _served(
     loop.set_exception_handler(failed)
 
     def receive() -> None:
-        while (message := read(sys.stdin.buffer)) is not None:
-            loop.call_soon_threadsafe(pages.show, message)
-        loop.call_soon_threadsafe(ended.set)
+        try:
+            while (message := read(sys.stdin.buffer)) is not None:
+                if message["type"] == "opening":
+                    from hapticlink.visualization.interactive_scene import opening_message
+
+                    message = opening_message.opening(message["title"], *message["picture"])
+                loop.call_soon_threadsafe(pages.show, message)
+        finally:
+            loop.call_soon_threadsafe(ended.set)
 
     threading.Thread(target=receive, daemon=True).start()
     async with server:
@@ -239,9 +258,9 @@ def main() -> None:
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # connections that fail are no news
     if (arguments := read(sys.stdin.buffer)) is None:
         return
-    host, port, token, *second_run = arguments
+    host, ports, token, *second_run = arguments
     try:
-        asyncio.run(_served(host, port, token, second_run, out))
+        asyncio.run(_served(host, ports, token, second_run, out))
     except BrokenPipeError:  # nobody is left to be told
         os._exit(1)
 

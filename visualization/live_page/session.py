@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+from hapticlink.fmus.durations import measured
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
@@ -32,17 +34,18 @@ WAIT = 0.02
 
 
 class Building(logging.Handler):
-    """Tells the page which block is being built."""
+    """Tells the page which block is being built, and what all of them took before (s), if it is
+    known."""
 
-    def __init__(self, link: Pipe) -> None:
+    def __init__(self, link: Pipe, took: float | None) -> None:
         super().__init__()
-        self._link = link
+        self._link, self._took = link, took
         fmu_files.LOG.addHandler(self)
         fmu_files.LOG.setLevel(logging.INFO)
         fmu_files.LOG.propagate = False  # the terminal shows the page's address
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._link.send({"type": "building", "said": f"{record.getMessage()} ..."})
+        self._link.send({"type": "building", "said": record.getMessage(), "took": self._took})
 
 
 class Session:
@@ -67,11 +70,20 @@ class Session:
         self._shown = 0.0
         self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
         self.recordings: list[Path] = []
-        Building(link)
+        self._before = ExitStack()
 
     def run(self) -> None:
         """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has
         ended, which raises Fault."""
+        scene = self._scene
+        drawing = (scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
+        self._link.send({"type": "opening", "title": scene.title, "picture": drawing})
+        with self._before:  # it ends where the first run begins
+            took = self._before.enter_context(measured(f"{scene.title}: FMUs of its page"))
+            Building(self._link, took)
+            self._repeat()
+
+    def _repeat(self) -> None:
         while True:
             out = self._begin()
             live = self._real_time(self._scene)
@@ -129,14 +141,13 @@ class Session:
             self._anew(self._state["recording"] and "again")
 
     def _start(self, live: LiveRun) -> None:
+        self._before.close()
         self._frames, self._controls = Frames(live), Controls(live, self._settings)
         self._controls.restore()
         scene = self._scene
         self._held = {target(user): at for user, at in self._frames.handles(live).items()}
         self._packed = packed(scene)
-        drawing = (scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
-        message = scene_message.running(scene, live.system, live.energies())
-        self._link.send(message | {"picture": drawing})
+        self._link.send(scene_message.running(scene, live.system, live.energies()))
         self._tell_controls()
         if self._state["paused"]:
             live.pause()

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.results.recorded_scene import by_user
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.visualization.interactive_scene import scene_message
+from hapticlink.visualization.interactive_scene import opening_message, scene_message
 from hapticlink.visualization.interactive_scene.offered_controls import (
     Offered,
     Settings,
@@ -53,7 +53,7 @@ class Description:
         self.data: dict[str, Any] = {
             "name": name,
             "scene": scene_message.running(scene, system, program.meters)
-            | scene_message.drawn(picture),
+            | opening_message.drawn(picture),
             "controls": offered.described(Settings()),
             "topology": offered.topology,
             "hands": hands,

@@ -36,10 +36,17 @@ def chromium(bypass_csp: bool = True) -> Iterator[Any]:
 
 
 class Page:
-    """A page in a window of a size, by day or in the dark, with what went wrong in it."""
+    """A page in a window of a size, by day or in the dark, with what went wrong in it; `shown` is
+    awaited, by default that it shows a run."""
 
     def __init__(
-        self, browser: Any, url: str, width: int = 1280, height: int = 800, dark: bool = False
+        self,
+        browser: Any,
+        url: str,
+        width: int = 1280,
+        height: int = 800,
+        dark: bool = False,
+        shown: str = "view.frame && view.stage.limits",
     ) -> None:
         self.faults: list[str] = []
         self.page = browser.new_page()
@@ -49,12 +56,12 @@ class Page:
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("requestfailed", lambda request: self.faults.append(request.url))
         self.page.goto(url)
-        self.until("view.frame && view.stage.limits")
+        self.until(shown)
 
     def until(self, condition: str) -> None:
         """Wait for a condition in JavaScript."""
         try:
-            self.page.wait_for_function(f"() => {condition}", timeout=20_000)
+            self.page.wait_for_function(f"() => {condition}", timeout=60_000)
         except playwright.TimeoutError:
             shown = self.get("JSON.stringify([view.state, view.refused, view.frames, view.frame])")
             raise AssertionError(f"{condition} did not come; the page has {shown}") from None

@@ -80,6 +80,32 @@ def test_the_wheel_zooms_about_the_pointer_and_shift_moves(served: Served, brows
     moved = 60 / page.get("view.stage.scale")
     page.until(f"Math.abs({under}[0] + {moved} - {before[0]}) < {0.02 * wide + 0.1 * moved}")
     assert page.get("view.stage.pulls.size") == 0
+    page.pull(0.005, 0.0)  # what is pressed is where it is seen
+    target = page.get("[...view.stage.pulls.values()][0].target")
+    held_at = page.get("view.frame.handle.slice(0, 2)")
+    assert np.hypot(*np.subtract(target, held_at)) < 0.01
+    page.until("view.frame.F_hand[0] > 0.1")
+    page.page.mouse.up()
+    page.page.close()
+
+
+REACHED = """[...document.querySelectorAll('button, select, input, summary')].filter((each) => {
+  if (!each.checkVisibility()) return false;
+  each.scrollIntoView({ block: "center" });
+  const box = each.getBoundingClientRect();
+  const at = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+  return !(each.contains(at) || at?.contains(each)) || box.left < 0 || box.right > innerWidth + 1;
+}).map((each) => each.id || each.dataset.control || each.textContent)"""
+"""The buttons and controls that a finger cannot reach: cut, or with something over them."""
+
+
+def test_every_button_and_control_of_a_phone_can_be_reached(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url, 390, 844)
+    for fold in page.page.query_selector_all("summary"):
+        fold.click()
+    assert len(page.page.query_selector_all("button, select, input, summary")) > 15
+    assert page.get(REACHED) == []
+    assert page.get("document.documentElement.scrollWidth") == 390
     page.page.close()
 
 
