@@ -43,6 +43,17 @@ LOG_CATEGORIES = {
 }
 
 
+def of_maker() -> dict[str, str]:
+    """The attributes of a model description that name who has made the FMU, with what."""
+    return {
+        "author": "The hapticlink authors",
+        "version": version("hapticlink"),
+        "copyright": "(c) 2026 The hapticlink authors",
+        "license": "MIT",
+        "generationTool": f"hapticlink {version('hapticlink')}",
+    }
+
+
 def model_description(
     component: Component, guid: str, *, stop_time: float, step_size: float, needs_tool: bool = True
 ) -> bytes:
@@ -57,11 +68,7 @@ def model_description(
         modelName=component.name,
         guid=guid,
         description=component.description,
-        author="The hapticlink authors",
-        version=version("hapticlink"),
-        copyright="(c) 2026 The hapticlink authors",
-        license="MIT",
-        generationTool=f"hapticlink {version('hapticlink')}",
+        **of_maker(),
         variableNamingConvention="structured",
     )
     runs = {"modelIdentifier": component.name, "needsExecutionTool": str(needs_tool).lower()}

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -304,6 +305,14 @@ def test_it_has_the_outputs_that_the_scene_records(tmp_path: Path) -> None:
     found = outputs(program("closed-loop", options), experiment, 240)
     assert found.names == [f"virtual_mechanism.x[{i}]" for i in (1, 2, 3)]
     assert [*differing(found, experiment)] == []
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_it_says_who_has_made_it(fmi: int) -> None:
+    scene = open_scene.load("pendulum", ())
+    files = program_files(scene, "program", fmi=fmi)
+    root = ET.fromstring(files["modelDescription.xml"])
+    assert [root.get(name) for name in ("author", "license")] == ["The hapticlink authors", "MIT"]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
