@@ -62,15 +62,14 @@ def model_description(
     needs_tool: whether the FMU needs Python (needsExecutionTool). Raises FmuError for a declared
     derivative that is not of the shape of its output, InvalidUnit for a unit.
     """
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=component.name,
-        guid=guid,
-        description=component.description,
-        **of_maker(),
-        variableNamingConvention="structured",
-    )
+    of_component = {
+        "fmiVersion": "2.0",
+        "modelName": component.name,
+        "guid": guid,
+        "description": component.description,
+    }
+    naming = {"variableNamingConvention": "structured"}
+    root = ET.Element("fmiModelDescription", of_component | of_maker() | naming)
     runs = {"modelIdentifier": component.name, "needsExecutionTool": str(needs_tool).lower()}
     ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
     _unit_definitions(root, component)
