@@ -43,6 +43,17 @@ LOG_CATEGORIES = {
 }
 
 
+def of_maker() -> dict[str, str]:
+    """The attributes of a model description that name who has made the FMU, with what."""
+    return {
+        "author": "The hapticlink authors",
+        "version": version("hapticlink"),
+        "copyright": "(c) 2026 The hapticlink authors",
+        "license": "MIT",
+        "generationTool": f"hapticlink {version('hapticlink')}",
+    }
+
+
 def model_description(
     component: Component, guid: str, *, stop_time: float, step_size: float, needs_tool: bool = True
 ) -> bytes:
@@ -51,19 +62,14 @@ def model_description(
     needs_tool: whether the FMU needs Python (needsExecutionTool). Raises FmuError for a declared
     derivative that is not of the shape of its output, InvalidUnit for a unit.
     """
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=component.name,
-        guid=guid,
-        description=component.description,
-        author="The hapticlink authors",
-        version=version("hapticlink"),
-        copyright="(c) 2026 The hapticlink authors",
-        license="MIT",
-        generationTool=f"hapticlink {version('hapticlink')}",
-        variableNamingConvention="structured",
-    )
+    of_component = {
+        "fmiVersion": "2.0",
+        "modelName": component.name,
+        "guid": guid,
+        "description": component.description,
+    }
+    naming = {"variableNamingConvention": "structured"}
+    root = ET.Element("fmiModelDescription", of_component | of_maker() | naming)
     runs = {"modelIdentifier": component.name, "needsExecutionTool": str(needs_tool).lower()}
     ET.SubElement(root, "CoSimulation", runs | CAPABILITIES)
     _unit_definitions(root, component)

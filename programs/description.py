@@ -8,10 +8,9 @@ from xml.etree import ElementTree as ET
 
 from hapticlink.components.base_units import BASES
 from hapticlink.fmus.documentation import STYLE
-from hapticlink.fmus.model_description import LOG_CATEGORIES
+from hapticlink.fmus.model_description import LOG_CATEGORIES, of_maker
 from hapticlink.fmus.python_fmu import icon
 from hapticlink.fmus.units import base_unit
-from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.ports import Port
 
@@ -65,9 +64,7 @@ def of_model(scene: Scene, identifier: str) -> dict[str, str]:
     return {
         "modelName": identifier,
         "description": scene.title,
-        "version": version("hapticlink"),
-        "license": "MIT",
-        "generationTool": f"hapticlink {version('hapticlink')}",
+        **of_maker(),
         "variableNamingConvention": naming,
     }
 

@@ -12,7 +12,7 @@ from tests.docs.pages import PAGES, ROOT, name, prose
 
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(r"`([^`\n]+)`")
-MADE = {"info", "maps", "reports", "runs", "site", "sweeps", "tuned"}
+MADE = {"info", "maps", "reports", "runs", "site", "standalone", "sweeps", "tuned"}
 """Folders that commands write in the checkout."""
 FOLDERS = {p.name for p in ROOT.iterdir() if p.is_dir() and not p.name.startswith(".")} - MADE
 

@@ -10,18 +10,31 @@ from pathlib import Path
 
 import pytest
 
+from docs import make_standalone
 from tests.docs.pages import ROOT
 
 FETCHED = re.compile(r"""<(?:script|img|link|iframe)\b[^>]*?(?:src|href)=["']?(?:https?:)?//""")
 
 
+DRAGGED = ("pendulum", "four-bar")
+"""Scenes that have their page in one file."""
+
+
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def standalone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("standalone")
+    assert make_standalone.main(DRAGGED, folder) == [*DRAGGED]
+    return folder
+
+
+@pytest.fixture(scope="module")
+def site(standalone: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """By the command of docs/conf.py; links that lead nowhere are warnings too."""
     for needed in ("sphinx", "furo", "myst_parser", "latex2mathml"):
         pytest.importorskip(needed)
     out = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "-j", "2", "-c", "docs", "."]
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "-j", "2", "-c", "docs"]
+    command += ["-D", f"standalone={standalone}", "."]
     done = subprocess.run(
         [*command, str(out)], cwd=ROOT, capture_output=True, text=True, check=False,
         env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
@@ -48,3 +61,31 @@ def test_equations_are_mathml(site: Path) -> None:
     text = (site / "docs" / "theory.html").read_text(encoding="utf-8")
     assert text.count("<math") > 10
     assert "$$" not in text
+
+
+def test_scenes_that_have_their_page_in_one_file_show_it(site: Path) -> None:
+    framed = re.compile(r'<iframe src="(.+?)"')
+    for path in (site / "docs" / "scenes").glob("*.html"):
+        if path.name.startswith("drag-"):
+            continue
+        files = framed.findall(path.read_text(encoding="utf-8"))
+        assert files == ([f"drag-{path.name}"] if path.stem in DRAGGED else []), path
+        assert all((path.parent / file).stat().st_size < 400_000 for file in files)
+
+
+def test_pages_are_made_again_where_their_scene_or_sources_are_others(
+    standalone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert make_standalone.main(DRAGGED, standalone) == []
+    (standalone / "four-bar.html").unlink()
+    assert make_standalone.main(DRAGGED, standalone) == ["four-bar"]
+    monkeypatch.setattr(make_standalone.one_file, "bundle", lambda name: "// another")
+    assert make_standalone.main(["pendulum"], standalone) == ["pendulum"]
+
+
+def test_a_scene_that_cannot_become_a_page_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert make_standalone.main(["scenario"], tmp_path) == []
+    assert "[[at]]" in capsys.readouterr().out
+    assert not [*tmp_path.glob("*.html")]

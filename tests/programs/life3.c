@@ -49,7 +49,8 @@ int main(int argc, char **argv) {
     unsigned char *bytes = malloc(size);
     if (fmi3SerializeFMUState(one, state, bytes, size)) return 7;
     if (fmi3DeserializeFMUState(two, bytes, size, &read) || fmi3SetFMUState(two, read)) return 8;
-    if (stepped(one, 150 * h, 150, h, n) != stepped(two, 150 * h, 150, h, n)) return 9;
+    const double first = stepped(one, 150 * h, 150, h, n), second = stepped(two, 150 * h, 150, h, n);
+    if (first != second) return 9;
     said = 0;
     if (fmi3SetFloat64(one, &unknown, 1, values, 1) != fmi3Error) return 10;
     if (fmi3SetFloat64(one, none, 2, values, 64) != fmi3Error || fmi3EnterStepMode(one) != fmi3Error) return 11;
@@ -65,5 +66,6 @@ int main(int argc, char **argv) {
     fmi3FreeInstance(NULL);
     for (int i = 0; i < 20; i++) fmi3FreeInstance(initialised(argv[1]));
     free(bytes);
+    printf("%zu bytes of state, sum %.17g\n", size, first);
     return 0;
 }

@@ -1,21 +1,20 @@
-"""The one FMU of a scene on other machines: the same life of two instances (life.c) as here, by its
-binary for Windows under wine, and by its C files for ARM under qemu."""
+"""The one FMU of a scene on other machines: the same life of two instances as here, by its binary
+for Windows under wine, and by its C files for ARM under qemu."""
 
 from __future__ import annotations
 
-import os
-import re
 import shutil
 import subprocess
 import zipfile
-from functools import cache
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import pytest
 
 from hapticlink.fmus.native.compiler import compile_library
 from hapticlink.programs.build import OPTIONS
-from tests.programs import windows
+from tests.programs import life, windows
 from tests.programs.built import COMPILER, needs_compiler, program
 from tests.programs.windows import WINE
 
@@ -24,59 +23,53 @@ ARM, QEMU = shutil.which("aarch64-linux-gnu-gcc"), shutil.which("qemu-aarch64")
 FLAGS = ("-std=gnu11", "-O0", "-w", "-ffp-contract=off", *OPTIONS)
 
 
-@pytest.fixture(scope="module")
-def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the FMU's C files, with life.c beside it."""
+@dataclass
+class Unpacked:
+    """An FMU of a scene in a folder, with the life beside it as life.c."""
+
+    folder: Path
+
+    @property
+    def sources(self) -> Path:
+        return self.folder / "sources"
+
+    @property
+    def description(self) -> str:
+        return (self.folder / "modelDescription.xml").read_text()
+
+    def compiled(self, compiler: list[str], name: str) -> Path:
+        """The life with the FMU's C files."""
+        files = [*map(str, self.sources.glob("*.c")), "life.c", "-lm"]
+        command = [*compiler, *FLAGS, f"-I{self.sources}", "-o", name, *files]
+        subprocess.run(command, cwd=self.folder, check=True)
+        return self.folder / name
+
+    @cached_property
+    def here(self) -> float:
+        """The sum on this machine."""
+        assert COMPILER
+        return life.lived([self.compiled([COMPILER], "here")], self.description)
+
+
+@pytest.fixture(scope="module", params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
+def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
     folder = tmp_path_factory.mktemp("one")
-    with zipfile.ZipFile(program("closed-loop")) as archive:
+    with zipfile.ZipFile(program("closed-loop", fmi=request.param)) as archive:
         archive.extractall(folder)
-    shutil.copy(Path(__file__).with_name("life.c"), folder)
-    return folder / "sources"
-
-
-def lived(command: list[str], sources: Path, **environment: str) -> float:
-    """The sum of all variables after the life, as life.c prints it."""
-    xml = (sources.parent / "modelDescription.xml").read_text()
-    guid = re.search(r'guid="(.*?)"', xml)
-    assert guid
-    arguments = [guid[1], str(xml.count("<ScalarVariable")), repr(1 / 512)]
-    done = subprocess.run(
-        [*command, *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=sources.parent,
-        env={**os.environ, **environment},
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    return float(done.stdout.rpartition(" ")[2])
-
-
-@cache
-def here(sources: Path) -> float:
-    """The sum on this machine."""
-    assert COMPILER
-    compiled([COMPILER], sources, "life")
-    return lived(["./life"], sources)
-
-
-def compiled(compiler: list[str], sources: Path, name: str) -> None:
-    files = [*map(str, sources.glob("*.c")), "life.c", "-lm"]
-    command = [*compiler, *FLAGS, f"-I{sources}", "-o", name, *files]
-    subprocess.run(command, cwd=sources.parent, check=True)
+    shutil.copy(life.SOURCES[request.param], folder / "life.c")
+    return Unpacked(folder)
 
 
 @pytest.mark.skipif(not (ARM and QEMU), reason="no cross compiler for ARM, or no qemu-aarch64")
-def test_arm(sources: Path) -> None:
-    compiled([str(ARM), "-static"], sources, "life-arm")
-    assert lived([str(QEMU), "./life-arm"], sources) == pytest.approx(here(sources), rel=1e-13)
+def test_arm(fmu: Unpacked) -> None:
+    command = [str(QEMU), fmu.compiled([str(ARM), "-static"], "on-arm")]
+    assert life.lived(command, fmu.description) == pytest.approx(fmu.here, rel=1e-13)
 
 
 @pytest.mark.skipif(not WINE, reason="no wine64")
-def test_windows(sources: Path) -> None:
-    folder = sources.parent
-    library = folder / "library.dll"  # the name that zig gives it inside, which life.exe asks for
-    compile_library([*sources.glob("*.c")], library, "win64", OPTIONS)
-    life = windows.program(folder / "life.c", library, [f"-I{sources}"])
-    assert lived(life, sources, **windows.environment()) == pytest.approx(here(sources), rel=1e-13)
+def test_windows(fmu: Unpacked) -> None:
+    library = fmu.folder / "library.dll"  # its name inside, by which life.exe asks for it
+    compile_library([*fmu.sources.glob("*.c")], library, "win64", OPTIONS)
+    command = windows.program(fmu.folder / "life.c", library, [f"-I{fmu.sources}"])
+    found = life.lived(command, fmu.description, windows.environment())
+    assert found == pytest.approx(fmu.here, rel=1e-13)

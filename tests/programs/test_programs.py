@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.programs.build import build_program, program_files
+from tests.programs import life
 from tests.programs.built import COMPILER, FLAGS, needs_compiler, program
 from tests.programs.comparison import differing, outputs, run
 
@@ -306,6 +308,14 @@ def test_it_has_the_outputs_that_the_scene_records(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+def test_it_says_who_has_made_it(fmi: int) -> None:
+    scene = open_scene.load("pendulum", ())
+    files = program_files(scene, "program", fmi=fmi)
+    root = ET.fromstring(files["modelDescription.xml"])
+    assert [root.get(name) for name in ("author", "license")] == ["The hapticlink authors", "MIT"]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
 def test_its_memory_is_its_own(fmi: int, tmp_path: Path) -> None:
     """The life of two instances under the sanitizers for addresses and undefined behaviour."""
     scene = open_scene.load("closed-loop-direct", ("graphics.rate=30", "hold=passive"))
@@ -314,17 +324,11 @@ def test_its_memory_is_its_own(fmi: int, tmp_path: Path) -> None:
     for name, content in files.items():
         if name.startswith("sources/"):
             (tmp_path / Path(name).name).write_bytes(content)
-    shutil.copy(Path(__file__).with_name("life3.c" if fmi == 3 else "life.c"), tmp_path)
+    shutil.copy(life.SOURCES[fmi], tmp_path)
     flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", *FLAGS]
-    life = tmp_path / "life"
-    command = [COMPILER, *flags, "-o", life, *tmp_path.glob("*.c"), "-lm"]
+    command = [COMPILER, *flags, "-o", tmp_path / "life", *tmp_path.glob("*.c"), "-lm"]
     made = subprocess.run(command, capture_output=True, text=True, check=False)
     if "cannot find" in made.stderr:
         pytest.skip("the compiler has no sanitizers")
     assert made.returncode == 0, made.stderr
-    guid = re.search(r'(?:guid|Token)="(.*?)"', xml)
-    assert guid
-    references = map(int, re.findall(r'valueReference="(\d+)" desc', xml))
-    lived = [life, guid[1], str(1 + max(references)), repr(1 / 512)]
-    done = subprocess.run(lived, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    life.lived([tmp_path / "life"], xml)

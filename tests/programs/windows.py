@@ -28,7 +28,7 @@ def program(source: Path, library: Path, options: Sequence[str] = ()) -> list[st
     objects = [f"{source.stem}.o", f"{START.stem}.o", library.name]
     command = [*zig, ENTRY, *system_libraries(TARGET), "-o", f"{source.stem}.exe", *objects]
     subprocess.run(command, cwd=folder, check=True)
-    return [str(WINE), f"{source.stem}.exe"]
+    return [str(WINE), str(folder / f"{source.stem}.exe")]
 
 
 @cache

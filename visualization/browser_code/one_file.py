@@ -44,14 +44,15 @@ def as_json(data: Any) -> str:
 
 
 def packed(content: bytes) -> str:
-    """Compressed bytes as text; packed.js unpacks them."""
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+    """Compressed bytes as text of base 85, 6 % shorter than base 64, with "," for "<", which could
+    end the element; packed.js unpacks them."""
+    return base64.b85encode(gzip.compress(content, 9, mtime=0)).decode().replace("<", ",")
 
 
 def unpacked(html: str, element: str) -> bytes:
     """The packed bytes in an element of a page."""
     _, _, rest = html.partition(f'id="{element}">')
-    return gzip.decompress(base64.b64decode(rest.partition("</script>")[0]))
+    return gzip.decompress(base64.b85decode(rest.partition("</script>")[0].replace(",", "<")))
 
 
 def bundle(name: str) -> str:
