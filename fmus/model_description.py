@@ -86,6 +86,22 @@ def model_description(
     _annotation(root, component)
     _model_variables(root, component)
     _model_structure(root, component)
+    return as_text(root)
+
+
+def with_sources(xml: bytes, names: Iterable[str]) -> bytes:
+    """A model description that lists the C files in sources/ to compile (FMI 2.0.5, 4.3.1)."""
+    root = ET.fromstring(xml)
+    simulation = root.find("CoSimulation")
+    assert simulation is not None
+    listed = ET.SubElement(simulation, "SourceFiles")
+    for name in names:
+        ET.SubElement(listed, "File", name=name)
+    return as_text(root)
+
+
+def as_text(root: ET.Element) -> bytes:
+    """The indented XML text."""
     ET.indent(root)
     return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
 

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 from hapticlink.components.base_units import BASES
 from hapticlink.fmus.documentation import STYLE
-from hapticlink.fmus.model_description import LOG_CATEGORIES, of_maker
+from hapticlink.fmus.model_description import LOG_CATEGORIES, as_text, of_maker
 from hapticlink.fmus.python_fmu import icon
 from hapticlink.fmus.units import base_unit
 from hapticlink.orchestrator.scene.scene import Scene
@@ -67,12 +67,6 @@ def of_model(scene: Scene, identifier: str) -> dict[str, str]:
         **of_maker(),
         "variableNamingConvention": naming,
     }
-
-
-def as_text(root: ET.Element) -> bytes:
-    """The indented XML text."""
-    ET.indent(root)
-    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
 
 
 def definitions(root: ET.Element, scene: Scene, ports: Sequence[Port], step_size: float) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree as ET
 
+from hapticlink.fmus.model_description import as_text
 from hapticlink.fmus.python_fmu import icon
 from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE, VARIABLE_STEP
 from hapticlink.orchestrator.scene.scene import Scene
@@ -17,7 +18,6 @@ from hapticlink.programs.description import (
     PAGE,
     SECOND,
     about,
-    as_text,
     definitions,
     documentation,
     of_model,

@@ -14,15 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 
-import fmpy
-
 from hapticlink.fmus.errors import CompilerError
-from hapticlink.fmus.native.compiler import global_names
+from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS, global_names
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import Description
 
-HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 _EXPORTS = ("__declspec(dllexport)", '__attribute__ ((visibility ("default")))')
 _PLAIN = "#define fmi2FullName(name) name"
 
@@ -62,8 +59,8 @@ class Foreign:
         """Its files, and beside each that is compiled the headers of the standard."""
         texts = {name: content.decode(errors="replace") for name, content in self.files.items()}
         folders = {PurePosixPath(name).parent for name in self.compiled}
-        headers = {str(folder / name) for folder in folders for name in HEADERS}
-        headers |= {name for name in texts if PurePosixPath(name).name in HEADERS}
+        headers = {str(folder / name) for folder in folders for name in FMI2_HEADERS}
+        headers |= {name for name in texts if PurePosixPath(name).name in FMI2_HEADERS}
         return texts | {name: _header(PurePosixPath(name).name, id_) for name in headers}
 
     def _with_prefix(self, name: str, id_: str) -> str:
@@ -94,7 +91,7 @@ def write_texts(files: Mapping[str, str], folder: Path) -> None:
 
 def _header(name: str, id_: str) -> str:
     """A header of the standard, which gives all functions a prefix and exports none."""
-    text = (Path(fmpy.__file__).parent / "c-code" / name).read_text(errors="replace")
+    text = (HEADERS / name).read_text(errors="replace")
     for export in _EXPORTS:
         text = text.replace(export, "")
     return text.replace(_PLAIN, f"#define fmi2FullName(name) {id_}_ ## name")

@@ -11,17 +11,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 
 from hapticlink.components.component import Component
+from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
 from hapticlink.fmus.native.native_fmu import COMMON, FMI3, WRAPPER
 from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.run.compiled import build as loop
-from hapticlink.programs.foreign import HEADERS
 from hapticlink.programs.memory_regions import Regions
 from hapticlink.programs.ports import Port, arrays
 from hapticlink.programs.resolve_scene import Resolved
@@ -55,8 +54,7 @@ def sources(
     files[COMMON.name] = COMMON.read_text()
     files["hold_laws.h"] = loop.LAWS["text"]()
     files |= {name: (HERE / name).read_text() for name in OWN}
-    headers = Path(fmpy.__file__).parent / "c-code"
-    files |= {name: (headers / name).read_text(errors="replace") for name in HEADERS}
+    files |= {name: (HEADERS / name).read_text(errors="replace") for name in FMI2_HEADERS}
     ids, guids = identifiers(resolved.members), {}
     required = {f"fmi2{name}" for name in re.findall(r"X\(id, (\w+),", files["program.c"])}
     for fmu, id_ in ids.items():
@@ -73,8 +71,7 @@ def sources(
 def fmi3_sources(ports: Sequence[Port]) -> dict[str, str]:
     """What the interface of FMI 3.0 adds: its C file, with the sizes of the variables by value
     reference, 0 where none begins, time the last, and the functions that it does not have."""
-    headers = Path(fmpy.__file__).parent / "c-code"
-    files = {name: (headers / name).read_text(errors="replace") for name in HEADERS_3}
+    files = {name: (HEADERS / name).read_text(errors="replace") for name in HEADERS_3}
     files[FMI3.name] = FMI3.read_text()
     sizes = [n for a in arrays(ports) for n in (len(a.entries), *[0] * (len(a.entries) - 1))]
     listed = ", ".join(map(str, sizes))

@@ -52,7 +52,8 @@ LINK = ("-shared", "-s")
 WEBASSEMBLY = "wasm32-wasi"
 WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
 _ZIG = (sys.executable, "-m", "ziglang")
-_HEADERS = Path(fmpy.__file__).parent / "c-code"
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+FMI2_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 
 
 def host_platform(fmi: int = 2) -> str:
@@ -187,7 +188,7 @@ def global_names(source: Iterable[Path], folder: Path) -> list[str]:
 
 def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
     flags = WEBASSEMBLY_FLAGS if target == WEBASSEMBLY else FLAGS
-    command = [*_ZIG, "cc", "-target", target, *flags, f"-I{_HEADERS}", *arguments]
+    command = [*_ZIG, "cc", "-target", target, *flags, f"-I{HEADERS}", *arguments]
     with tempfile.TemporaryDirectory(dir=folder) as local:
         # zig keeps its own C library in its cache, but not our code.
         compiles = nullcontext({CHOICE: local}) if "-c" in command else linker_cache(target)

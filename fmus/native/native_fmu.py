@@ -12,9 +12,11 @@ from pathlib import Path
 from hapticlink.components.component import Component
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.fmu_functions import GRAPHS
-from hapticlink.fmus.model_description import model_description
+from hapticlink.fmus.model_description import model_description, with_sources
 from hapticlink.fmus.native.compiler import (
     FLAGS,
+    FMI2_HEADERS,
+    HEADERS,
     TARGETS,
     compile_library,
     compiler_version,
@@ -40,7 +42,8 @@ def entries(
     step_size: float,
     platforms: Sequence[str],
 ) -> dict[str, bytes]:
-    """All files of the FMU, with a binary for each of `platforms`, compiled in `folder`.
+    """All files of the FMU, with a binary for each of `platforms`, compiled in `folder`, and in
+    sources/ the C files from which `cc *.c` makes one for any other.
 
     The GUID is a hash of the binaries' sources (component.h has that of pieces), so that a
     platform's binary does not depend on the other platforms. Raises FmuError if no FMU can be built
@@ -67,7 +70,7 @@ def entries(
         "xml": xml,
     }
     guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
-    files["modelDescription.xml"] = xml.replace(b'guid=""', f'guid="{guid}"'.encode(), 1)
+    xml = xml.replace(b'guid=""', f'guid="{guid}"'.encode(), 1)
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
         head = f'#define GUID "{guid}"\n'.encode()
@@ -80,7 +83,10 @@ def entries(
             library = compile_library(sources if pieces else main, room / "library", platform)
             sources = [main, *sorted(room.glob("piece*.c"))]
             files[entry(platform, component.name)] = library.read_bytes()
-    return files
+        files["modelDescription.xml"] = with_sources(xml, (path.name for path in sources))
+        for path in (*sources, room / "component.h", room / COMMON.name):
+            files[f"sources/{path.name}"] = path.read_bytes()
+    return files | {f"sources/{name}": (HEADERS / name).read_bytes() for name in FMI2_HEADERS}
 
 
 def _written(pieces: Iterable[str], folder: Path) -> Iterator[Path]:

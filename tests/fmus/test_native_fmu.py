@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import ctypes
 import os
+import shutil
 import struct
 import subprocess
 import sys
 import threading
 import zipfile
 from array import array
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Literal
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from fmpy import fmi2
+from fmpy import fmi2, sharedLibraryExtension
+from fmpy.build import build_platform_binary
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from hypothesis import given
@@ -46,6 +50,7 @@ from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native import compile_library, compiler, split_functions
 from hapticlink.fmus.native.compiler_cache import linker_cache
 from hapticlink.fmus.native.source import component_source
+from hapticlink.fmus.reproducible_zip import write
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import blocks
 from tests.fmus import sample_components
@@ -219,6 +224,43 @@ def test_pieces_of_long_functions_give_the_same_bits(both, name, tmp_path, monke
     assert header.count("noinline") > len([*files]) >= 1
     split = build_native(made, tmp_path)
     np.testing.assert_array_equal(driven(split), driven(both[name][0]))
+    if shutil.which("cc"):
+        np.testing.assert_array_equal(driven(rebuilt(split, tmp_path / "cc", by_cc)), driven(split))
+
+
+def rebuilt(path: Path, room: Path, build: Callable[[Path], object]) -> Path:
+    """The FMU with the library that `build` makes of its unpacked files."""
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(room)
+    for library in room.glob("binaries/*/*"):
+        library.unlink()
+    build(room)
+    made = {str(f.relative_to(room)): f.read_bytes() for f in room.rglob("*") if f.is_file()}
+    target = room.with_suffix(".fmu")
+    with target.open("wb") as file:
+        write(made, file)
+    return target
+
+
+def by_cc(room: Path) -> None:
+    description = ET.parse(room / "modelDescription.xml")
+    listed = description.findall("CoSimulation/SourceFiles/File")
+    sources = [room / "sources" / file.attrib["name"] for file in listed]
+    assert {*sources} == {*room.glob("sources/*.c")}
+    (folder,) = room.glob("binaries/*")
+    library = folder / (description.getroot().attrib["modelName"] + sharedLibraryExtension)
+    command = ["cc", "-shared", "-fPIC", "-std=gnu11", "-O1", "-ffp-contract=off", "-w"]
+    subprocess.run([*command, "-o", library, *sources, "-lm"], check=True)
+
+
+@pytest.mark.skipif(not (shutil.which("cmake") and shutil.which("make")), reason="no cmake or make")
+def test_fmpy_rebuilds_a_block(both, tmp_path):
+    path = both["controller"][1]
+    (tmp_path / "build").mkdir()
+    again = rebuilt(
+        path, tmp_path / "own", lambda room: build_platform_binary(room, tmp_path / "build")
+    )
+    np.testing.assert_array_equal(driven(again), driven(path))
 
 
 def test_libraries_for_fmi3_are_in_a_folder_for_each_processor(tmp_path, monkeypatch):
@@ -275,7 +317,8 @@ def test_the_archive_is_self_contained(native_fmus, tmp_path):
         names = archive.namelist()
         archive.extractall(tmp_path)
     (library,) = (n for n in names if n.startswith("binaries/"))
-    assert set(names) == {library, "documentation/index.html", "model.png", "modelDescription.xml"}
+    others = {n for n in names if not n.startswith("sources/")}
+    assert others == {library, "documentation/index.html", "model.png", "modelDescription.xml"}
     assert b"python" not in (tmp_path / library).read_bytes().lower()
     description = (tmp_path / "modelDescription.xml").read_text()
     assert 'needsExecutionTool="false"' in description
