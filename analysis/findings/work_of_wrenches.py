@@ -212,7 +212,8 @@ class Works:
             work = self._of[key] = _metered(window, key, table, moved, self._whole)
         until, to = work.until, times
         if until is not None and window.begin < until <= window.end:
-            to = np.union1d(times, until)  # where the meter stops may be beside or after the times
+            # Where the meter stops may be beside or after the times.
+            to, _ = np.unique(np.append(times, until), return_index=True)
         path = moved["time"], moved[position]
         found = work.at(to, sign * table[signal], table, path, window.end)
         acts, source = (each[np.searchsorted(to, times)] for each in found)

@@ -36,7 +36,8 @@ def keyed_events(
 def keyed(starts: Sequence[Ticks], known: int, end: int) -> tuple[Ticks, NDArray[np.int64]]:
     """The ticks of the events up to `known` with their keys; `starts` are communication points of
     each clock as far as the one after that, `end` is that of the run."""
-    ticks = np.unique(np.concatenate([each[:-1] for each in starts]))
+    # With an index, since NumPy loads its masked arrays otherwise.
+    ticks, _ = np.unique(np.concatenate([each[:-1] for each in starts]), return_index=True)
     ticks = ticks[ticks <= known]
     keys = np.zeros((len(ticks), 1 + len(starts)), np.int64)
     keys[:, 0] = ticks == 0

@@ -159,16 +159,24 @@ def _place(path: Path, binary: bool = False) -> Path:
     return left if left.exists() and (binary or not path.exists()) else path
 
 
-def load(folder: Path | str, binary: bool = False) -> Results:
-    """Reads a run's folder; `binary`: from the rows where they are still there. Raises InputFault
-    if it contains no run, one of another version, or one that was changed."""
+def with_record(results: Results, record: RunRecord | None) -> Results:
+    """The same results with their record, where it is known without reading it from `run`."""
+    if record:
+        results.__dict__["record"] = record
+    return results
+
+
+def load(folder: Path | str, binary: bool = False, record: RunRecord | None = None) -> Results:
+    """Reads a run's folder; `binary`: from the rows where they are still there. record: the content
+    of its run.json, where it is known. Raises InputFault if it contains no run, one of another
+    version, or one that was changed."""
     folder = Path(folder)
     tables: dict[str, Table] = {}
     try:
         run = json_file.read(folder / "run.json")
     except InputFault as error:
         raise InputFault(f"{folder}: not the folder of a run: {error}") from error
-    results = Results(folder, run, tables)
+    results = with_record(Results(folder, run, tables), record)
     for name in results.record.rates:
         if recorded(name, results.record.files):
             tables[name] = read_table(folder / f"{name}.csv", tables, binary)
