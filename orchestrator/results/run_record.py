@@ -48,7 +48,7 @@ class RefusedHold:
     reason: str
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True)
 class RunSetup:
     """What is known before a run; `scene` is its scene as tables, with all defaults."""
 
@@ -177,7 +177,7 @@ class Energy:
     peak: float
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True)
 class RunEnding:
     """What is known when a run has ended. The defaults hold for a run that goes on or was killed.
 
@@ -252,7 +252,7 @@ class PortEnergy(BlockEnergy):
     hand_work: float = 0.0
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True)
 class RunRecord(RunEnding, RunSetup):
     """The content of run.json, which a run that was recovered has together with `recovered`."""
 
