@@ -155,7 +155,8 @@ def _found(folder: Path, ended: Experiment, figures: bool) -> Run:
         run = folders.add(folder, (), findings)
         if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
             run = folders.add(folder, _explained(ended))
-            run = folders.add(folder, _drawn(ended, results) if figures else ())
+            if figures:
+                run = folders.add(folder, _drawn(ended, results))
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None

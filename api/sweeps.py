@@ -128,7 +128,6 @@ def sweep(
                 raise Fault(f"interrupted: {left.done} of {left.of} runs; {advice}") from None
     folder = folders.ensure(out)
     found = Sweep(into(folder), keys, folder, ("table.csv",))
-    if drawn := found.figure(metric):
-        sweep_figure.save(drawn, folder / "sweep.png")
+    if sweep_figure.write(folder / "sweep.png", found.rows, keys, metric):
         return replace(found, files=("table.csv", "sweep.png"))
     return found

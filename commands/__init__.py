@@ -52,11 +52,6 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
 called; or a function itself. Its arguments and docstring define the command, and it returns the
 exit status."""
 
-app.register_install_completion_command(
-    add_to_startup=False,  # nobody has asked for a change of ~/.bashrc
-    help="Write the script that completes commands, options, scenes and keys in your shell.",
-)
-
 Plugin = Annotated[
     list[str] | None,
     Parameter(
@@ -66,6 +61,7 @@ Plugin = Annotated[
         help="Module with parts of your own, installed or in this folder; repeatable.",
     ),
 ]
+COMPLETION = "--install-completion"
 Tokens = Annotated[str, Parameter(show=False, allow_leading_hyphen=True)]
 
 
@@ -87,6 +83,8 @@ def _commands(arguments: Sequence[str]) -> None:
         elif not each.startswith("-"):
             words.append(each)
     plugins.load(filter(None, named))
+    if not words or words[0] not in COMMANDS:
+        _register_completion()
     if words and words[0] not in COMMANDS:
         plugins.load_installed()
     for name, command in COMMANDS.items():
@@ -100,6 +98,18 @@ def _commands(arguments: Sequence[str]) -> None:
             app.command(f"{__name__}.{file}:{file}", name=name, help=line)
         else:
             app.command(command, name=name)
+
+
+def _register_completion() -> None:
+    """Adds the option that writes the script of the shell, which takes as long to load as a
+    command: for the list of commands, and where it may be given."""
+    if COMPLETION not in app:
+        app.register_install_completion_command(
+            name=COMPLETION,
+            add_to_startup=False,  # nobody has asked for a change of ~/.bashrc
+            help="Write the script that completes commands, options, scenes and keys in your "
+            "shell.",
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -26,7 +26,7 @@ from hapticlink.orchestrator.results.files import remove_rows
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
 from hapticlink.orchestrator.results.run_results import ResultsInMemory
-from hapticlink.orchestrator.results.tables import Results, Table
+from hapticlink.orchestrator.results.tables import Results, Table, with_record
 from hapticlink.orchestrator.results.windows import WINDOW_BYTES, opened
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
@@ -69,12 +69,11 @@ class Experiment:
     @property
     def results(self) -> Results:
         """The results of the run, with empty tables if it had no row."""
-        if self.outcome.published and not self.memory:
-            return opened(self.folder)
-        if self.outcome.published and self.memory:
-            results = Results(None, self.run, self.memory.tables())
-            results.__dict__["record"] = RunRecord(**vars(self.before), **vars(self.ending))
-            return results
+        if self.outcome.published:
+            record = RunRecord(**vars(self.before), **vars(self.ending))
+            if not self.memory:
+                return opened(self.folder, record)
+            return with_record(Results(None, self.run, self.memory.tables()), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:

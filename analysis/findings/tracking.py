@@ -48,7 +48,7 @@ def table_of(results: Results, signal: str) -> Table | None:
 def of_block(results: Results, signal: str, *shape: int) -> Table | None:
     """As `of_any_shape`, where the signal has that shape."""
     table = of_any_shape(results, signal)
-    return table if table and table[signal].shape[1:] == shape else None
+    return table if table and table.shape(signal) == shape else None
 
 
 def of_any_shape(results: Results, signal: str) -> Table | None:

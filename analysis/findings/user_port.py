@@ -154,6 +154,9 @@ def ports(results: Results) -> Iterator[UserPort | None]:
     """The energy at the user's port, window by window; None without hand, handle and mechanism,
     where something else than its hand pushes a handle, or where the work of another hand is not
     recorded. Without all signals that its blocks need there are none."""
+    if results.number == 1:
+        yield _port(results, Works(whole=True), _energy_at_start(results))
+        return
     works, start = Works(), 0.0
     for i, window in enumerate(results.windows()):
         start = _energy_at_start(window) if i == 0 else start

@@ -125,11 +125,12 @@ class Passing:
 class Work:
     """The work (J) of a wrench at a position: as it acts, and that of its source."""
 
-    def __init__(self, arrivals: Arrivals | None, meter: Energy | None) -> None:
+    def __init__(self, arrivals: Arrivals | None, meter: Energy | None, whole: bool) -> None:
+        """whole: the run is one window, so that both passes are made of it."""
         self._arrivals, self.until = arrivals, meter.until if meter else None
         ends = (meter.held, meter.ideal) if meter else ()
         self._passing = [Passing(meter.until, end) for end in ends] if meter else []
-        self._whole: tuple[Vector, Vector] | None = None  # of a run of one window
+        self._whole = whole
         self.again(final=False)
 
     def again(self, final: bool = True) -> None:
@@ -142,25 +143,23 @@ class Work:
         self, times: Vector, force: Vector, table: Table, path: tuple[Vector, Vector], end: float
     ) -> tuple[Vector, ...]:
         """Both until the times, which have `until`, of a window that ends at `end` (s)."""
-        if self._whole is None:
-            stamps = table["time"]
-            known = self._arrivals.known(stamps, table.first) if self._arrivals else stamps
-            both = (
-                self._held.at(times, force, known, stamps, path, end),
-                self._ideal.at(times, force, stamps, path, end),
-            )
-        else:
-            both = self._whole
-        if table.of is None:
-            self._whole = both
+        stamps = table["time"]
+        known = self._arrivals.known(stamps, table.first) if self._arrivals else stamps
+        both = (
+            self._held.at(times, force, known, stamps, path, end),
+            self._ideal.at(times, force, stamps, path, end),
+        )
         if not self._passing:
             return both
         pairs = [*zip(self._passing, both, strict=True)]
-        if self._final:
-            return tuple(passing.changed(series, times) for passing, series in pairs)
-        for passing, series in pairs:
-            passing.path(series, times)
-        return both
+        if not self._final:
+            for passing, series in pairs:
+                passing.path(series, times)
+            if not self._whole:
+                return both
+            for passing in self._passing:
+                passing.again()
+        return tuple(passing.changed(series, times) for passing, series in pairs)
 
 
 Key = tuple[str, str, float, str | None]
@@ -168,9 +167,10 @@ Key = tuple[str, str, float, str | None]
 
 class Works:
     """The works of a run, in two passes over its windows: those of the first, as far as a meter has
-    them, are not those of the meter yet."""
+    them, are not those of the meter yet. One pass suffices where the `whole` run is one window."""
 
-    def __init__(self) -> None:
+    def __init__(self, whole: bool = False) -> None:
+        self._whole = whole
         self._of: dict[Key, Work] = {}
         self._window: Results | None = None
         self._found: dict[Key, tuple[Vector, Vector]] = {}
@@ -209,10 +209,11 @@ class Works:
         if key in self._found:
             return self._found[key]
         if (work := self._of.get(key)) is None:
-            work = self._of[key] = _metered(window, key, table, moved)
+            work = self._of[key] = _metered(window, key, table, moved, self._whole)
         until, to = work.until, times
         if until is not None and window.begin < until <= window.end:
-            to = np.union1d(times, until)  # where the meter stops may be beside or after the times
+            # Where the meter stops may be beside or after the times.
+            to, _ = np.unique(np.append(times, until), return_index=True)
         path = moved["time"], moved[position]
         found = work.at(to, sign * table[signal], table, path, window.end)
         acts, source = (each[np.searchsorted(to, times)] for each in found)
@@ -243,10 +244,11 @@ class Works:
         return self._contacts.at(times, contact[ENVIRONMENT_WRENCH], stamps, path, window.end)
 
 
-def _metered(window: Results, key: Key, table: Table, moved: Table) -> Work:
+def _metered(window: Results, key: Key, table: Table, moved: Table, whole: bool) -> Work:
     signal, position, _, connection = key
     meters, start = window.record.meters, f"{signal} -> {position.partition('.')[0]}."
     name = connection or next((each for each in meters if each.startswith(start)), None)
     if name is None:
-        return Work(None, None)
-    return Work(Arrivals(window.record, name, table.total, table is moved), meters[name])
+        return Work(None, None, whole)
+    arrivals = Arrivals(window.record, name, table.total, table is moved)
+    return Work(arrivals, meters[name], whole)

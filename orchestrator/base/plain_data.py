@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import is_dataclass
 from typing import Any
+
+_LEAVES = frozenset({float, int, str, bool, type(None)})
 
 
 def plain(value: Any) -> Any:
-    """As `dataclasses.asdict`, which copies a scene number by number and takes five times as
+    """As `dataclasses.asdict`, which copies a scene number by number and takes ten times as
     long."""
-    if is_dataclass(value):
-        return {name: plain(getattr(value, name)) for name in value.__dataclass_fields__}
+    if type(value) in _LEAVES:
+        return value
+    if (names := getattr(value, "__dataclass_fields__", None)) is not None:
+        return {name: plain(getattr(value, name)) for name in names}
     if isinstance(value, dict):
         return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, list):

@@ -39,6 +39,17 @@ def room() -> Iterator[Path]:
         shutil.rmtree(path, ignore_errors=True)
 
 
+@contextmanager
+def room_if_needed() -> Iterator[Path]:
+    """The path of a temporary folder, which whoever needs it creates within the context."""
+    path = Path(tempfile.gettempdir(), f"{_prefix()}{os.getpid()}-{os.urandom(8).hex()}")
+    try:
+        yield path
+    finally:
+        if path.exists():
+            shutil.rmtree(path, ignore_errors=True)
+
+
 def clear(ended: int | None = None) -> None:
     """Removes temporary folders of processes that have ended, of this machine and user only.
 

@@ -73,10 +73,16 @@ class Description:
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         """The entries of the vector `name` (or the scalar of exactly that name), sorted by index:
         some tools write x[10] before x[2]."""
-        scalars = (
-            s for s in self.scalars if name in (s.port, s.name) and s.causality in causalities
-        )
-        return tuple(sorted(scalars, key=lambda s: s.indices))
+        return tuple(s for s in self._entries.get(name, ()) if s.causality in causalities)
+
+    @cached_property
+    def _entries(self) -> dict[str, list[Scalar]]:
+        """The scalars by the names under which `port` finds them, sorted by index."""
+        entries: dict[str, list[Scalar]] = {}
+        for s in sorted(self.scalars, key=lambda s: s.indices):
+            for name in {s.port, s.name}:
+                entries.setdefault(name, []).append(s)
+        return entries
 
     def follows(self, output: Scalar, inputs: Iterable[Scalar] | None = None) -> bool:
         """Whether an output depends directly on one of `inputs`, by default on any input."""

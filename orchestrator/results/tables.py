@@ -40,27 +40,36 @@ class Table(Mapping[str, Vector]):
     of: int | None = None
 
     def __getitem__(self, name: str) -> Vector:
-        if name in self.columns:
-            return self.rows[:, self.columns.index(name)]
+        if (place := self._places.get(name)) is not None:
+            return self.rows[:, place]
         if name not in self._arrays:
             there = [other for other, table in self.others.items() if name in table]
             hint = f"; it is in tables[{there[0]!r}]" if there else ""
             raise KeyError(f"no signal {name!r}{hint}; there are {', '.join(self.columns)}")
-        indices, places = zip(*sorted(self._arrays[name]), strict=True)
-        return self.rows[:, places].reshape(-1, *_shape(indices))
+        places, shape = self._arrays[name]
+        return self.rows[:, places].reshape(-1, *shape)
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """The shape of a sample of a signal, which is here."""
+        return () if name in self._places else self._arrays[name][1]
 
     @cached_property
-    def _arrays(self) -> dict[str, list[tuple[tuple[int, ...], int]]]:
-        """The indices and columns of the entries of each vector and matrix."""
-        columns: dict[str, list[tuple[tuple[int, ...], int]]] = {}
+    def _places(self) -> dict[str, int]:
+        return {column: place for place, column in reversed([*enumerate(self.columns)])}
+
+    @cached_property
+    def _arrays(self) -> dict[str, tuple[tuple[int, ...], tuple[int, ...]]]:
+        """The columns of the entries of each vector and matrix, and its shape."""
+        entries: dict[str, list[tuple[tuple[int, ...], int]]] = {}
         for place, column in enumerate(self.columns):
             name, indices = entry_of(column)
             if indices:
-                columns.setdefault(name, []).append((indices, place))
-        return columns
+                entries.setdefault(name, []).append((indices, place))
+        ordered = {name: zip(*sorted(each), strict=True) for name, each in entries.items()}
+        return {name: (places, _shape(indices)) for name, (indices, places) in ordered.items()}
 
     def __contains__(self, name: object) -> bool:
-        return name in self.columns or name in self._arrays
+        return name in self._places or name in self._arrays
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -159,11 +168,19 @@ def _place(path: Path, binary: bool = False) -> Path:
     return left if left.exists() and (binary or not path.exists()) else path
 
 
-def load(folder: Path | str, binary: bool = False) -> Results:
-    """Reads a run's folder; `binary`: from the rows where they are still there. Raises InputFault
-    if it contains no run, one of another version, or one that was changed."""
+def with_record(results: Results, record: RunRecord | None) -> Results:
+    """The same results with their record, where it is known without reading it from `run`."""
+    if record:
+        results.__dict__["record"] = record
+    return results
+
+
+def load(folder: Path | str, binary: bool = False, record: RunRecord | None = None) -> Results:
+    """Reads a run's folder; `binary`: from the rows where they are still there. record: the content
+    of its run.json, where it is known. Raises InputFault if it contains no run, one of another
+    version, or one that was changed."""
     folder, tables = Path(folder), dict[str, Table]()
-    results = Results(folder, run_json(folder), tables)
+    results = with_record(Results(folder, run_json(folder), tables), record)
     for name in results.record.rates:
         if recorded(name, results.record.files):
             tables[name] = read_table(folder / f"{name}.csv", tables, binary)

@@ -27,6 +27,7 @@ from hapticlink.orchestrator.results.tables import (
     recorded,
     run_json,
     size,
+    with_record,
 )
 
 WINDOW_BYTES = 1 << 24
@@ -35,13 +36,14 @@ STEPS_BESIDE = 2
 """Rows beside a window, in the longest steps of all clocks, to interpolate between any two."""
 
 
-def opened(folder: Path) -> Results:
+def opened(folder: Path, record: RunRecord | None = None) -> Results:
     """The results of a run whose rows are still there, all of them read unless they are more than a
-    window; `load` for others."""
+    window; `load` for others. record: the content of its run.json, where it is known."""
     run = json_file.read(folder / "run.json")
     if size(folder, run, binary=True) <= WINDOW_BYTES:
-        return load(folder, binary=True)
-    return Streamed(folder, run, TablesLater(folder, tuple(run["rates"]), tuple(run["files"])))
+        return load(folder, binary=True, record=record)
+    later = TablesLater(folder, tuple(run["rates"]), tuple(run["files"]))
+    return with_record(Streamed(folder, run, later), record)
 
 
 @contextmanager

@@ -62,12 +62,18 @@ class Binder:
         joined: Callable[[Bound], Call] | None = None,
     ) -> None:
         self._simulation, self._joined = simulation, joined
+        self._calls: dict[Instruction, Call] = {}
         self.loops: dict[Repeat, FixedPoint] = {}
 
     def instructions(self, operations: Iterable[Operation], judged: bool = True) -> Bound:
         """The instructions of a block with their calls. Not `judged`, outputs need not be
         finite."""
-        return [(i, self.bind(i)) for i in instructions(operations, self._simulation, judged)]
+        found = []
+        for each in instructions(operations, self._simulation, judged):
+            if (call := self._calls.get(each)) is None:  # kinds of events share most of theirs
+                call = self._calls[each] = self.bind(each)
+            found.append((each, call))
+        return found
 
     def bind_all(self, operations: Iterable[Operation], judged: bool = True) -> list[Call]:
         bound = self.instructions(operations, judged)

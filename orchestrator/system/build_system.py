@@ -23,7 +23,7 @@ def built(scene: Scene, starts: Mapping[str, Starts] | None = None) -> Iterator[
     Files that are not in the cache exist only within the context. Raises InputFault where no FMU
     can be built from the settings, SceneFault where FMUs and connections do not fit.
     """
-    with temporary_folders.room() as room:
+    with temporary_folders.room_if_needed() as room:
         planned = blocks(scene)
         time = timeline(scene, planned)
         files = fmu_files(scene, planned, time, room, starts=starts)

@@ -40,8 +40,8 @@ def paired(c: Connection, entry: Scalar, power: Iterable[PowerPort]) -> PowerPor
 
 def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
     """Whether an entry of a connection has a power port."""
-    power = tuple(power)
-    return any(paired(c, entry, power) for entry in c.inputs)
+    own = [p for p in power if p.effort.startswith(f"{c.target}.")]
+    return any(paired(c, entry, own) for entry in c.inputs)
 
 
 def power_across_rates(system: System) -> list[str]:

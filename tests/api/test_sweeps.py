@@ -14,6 +14,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.sweep import table
 from hapticlink.analysis.sweep.points import points
+from hapticlink.visualization.figures import sweep_figure
 from tests.shared_fixtures import status
 
 
@@ -68,6 +69,28 @@ def test_a_sweep_is_that_of_the_command(
     assert figure.axes[0].get_ylabel() == "end of the run (s)"
     with pytest.raises(KeyError, match="did you mean 'end_time_s'"):
         found["end_time"]
+
+
+def test_the_figure_of_a_finished_sweep_is_drawn_again_only_where_it_differs(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    vary, figure = {"haptics.rate": [100, 200], "duration": [0.05]}, tmp_path / "sweep.png"
+    first = hl.sweep(bar, vary, out=tmp_path, jobs=1)
+    assert first.files == ("table.csv", "sweep.png")
+    drawn = figure.read_bytes()
+    draw, asked = sweep_figure.draw, []
+    monkeypatch.setattr(sweep_figure, "draw", lambda *of: asked.append(of) or draw(*of))
+    assert hl.sweep(bar, vary, out=tmp_path, jobs=1).files == first.files
+    assert not asked
+    assert figure.read_bytes() == drawn
+    hl.sweep(bar, vary, out=tmp_path, jobs=1, metric="end_time_s")
+    hl.sweep(bar, {**vary, "haptics.rate": [100]}, out=tmp_path, jobs=1)
+    assert len(asked) == 2
+    hl.sweep(bar, vary, out=tmp_path, jobs=1)
+    figure.write_bytes(drawn[:-20])  # killed while it was written
+    hl.sweep(bar, vary, out=tmp_path, jobs=1)
+    assert len(asked) == 4
+    assert figure.read_bytes() == drawn
 
 
 def test_of_many_runs_the_best_and_the_worst_are_shown() -> None:

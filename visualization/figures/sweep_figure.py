@@ -3,6 +3,7 @@ of the others; a map for two numeric keys with many values each."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
@@ -10,9 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import hapticlink.visualization
 from hapticlink.analysis.sweep.grid import number
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.table import columns
+from hapticlink.fmus.cache import sha, sources
+from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -38,6 +42,8 @@ NAMES = {
 FEW = 8
 """Number of lines that differ in colour; further ones also differ in dash pattern."""
 GOOD = ("duration",)
+LAST_CHUNK = b"IEND\xaeB`\x82"
+"""Of a PNG that is whole."""
 
 
 def check(metric: str, scenes: Sequence[Scene]) -> None:
@@ -83,9 +89,24 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
     return figure
 
 
-def save(figure: Figure, path: Path) -> None:
+def save(figure: Figure, path: Path, comment: str | None = None) -> None:
     """Write a figure without the software's version, so that the same rows give the same bytes."""
-    figure.savefig(path, dpi=130, metadata={"Software": None})
+    figure.savefig(path, dpi=130, metadata={"Software": None, "Comment": comment})
+
+
+def write(path: Path, rows: Sequence[Row], keys: Sequence[str], metric: str | None) -> bool:
+    """Write the figure of `draw`, unless the file there is that one already: loading Matplotlib and
+    drawing take longer than finding a finished sweep. Returns whether there is a figure. Raises as
+    `draw` does."""
+    made_with = version("matplotlib"), sources(hapticlink.visualization)
+    shown = sha(json.dumps([rows, keys, metric, made_with], default=str))
+    if path.is_file():
+        there = path.read_bytes()
+        if shown.encode() in there and there.endswith(LAST_CHUNK):
+            return True
+    if drawn := draw(rows, keys, metric):
+        save(drawn, path, shown)
+    return drawn is not None
 
 
 def _axes(wide: bool) -> tuple[Figure, Any]:

@@ -9,7 +9,8 @@ from types import MappingProxyType
 import numpy as np
 
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.plan.operations import Event, Firing
+from hapticlink.orchestrator.plan.event_kinds import event, keyed
+from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.operation_records import PATIENCE, Machine
 from hapticlink.orchestrator.run.concurrent_fmus import Side
@@ -109,40 +110,24 @@ class Events:
         clock.fill(starts=window, n=len(window), at=0)
 
     def _new_kind(self) -> None:
-        self._add(self._event(self._key.tolist()))
-
-    def _event(self, key: Sequence[int]) -> Event:
-        fired = (
-            Firing(clock.name, k // 2, bool(k % 2))
-            for clock, k in zip(self._timeline.clocks, key[1:], strict=True)
-            if k
-        )
-        return Event(bool(key[0]), tuple(fired))
+        self._add(event(self._timeline, self._key.tobytes()))
 
     def coming(self) -> list[Event]:
         """The kinds of the events of the next windows, in the order of their first occurrence."""
-        end, windows = self._timeline.end, self._windows
-        known = min(end, *(int(window[-2]) for window in windows))
-        ticks = np.unique(np.concatenate([window[:-1] for window in windows]))
-        ticks = ticks[ticks <= known]
-        keys = np.zeros((len(ticks), 1 + len(windows)), np.int64)
-        keys[:, 0] = ticks == 0
-        for i, window in enumerate(windows):
-            start = window[:-1][window[:-1] <= known]
-            after = window[1 : len(start) + 1]
-            keys[np.searchsorted(ticks, start), 1 + i] = 2 * (after - start) + (after > end)
-        kinds = dict.fromkeys(map(bytes, keys))
-        return [self._event(np.frombuffer(kind, np.int64).tolist()) for kind in kinds]
+        end = self._timeline.end
+        known = min(end, *(int(window[-2]) for window in self._windows))
+        _, keys = keyed(self._windows, known, end)
+        return [event(self._timeline, kind) for kind in dict.fromkeys(map(bytes, keys))]
 
     def prepare(self, kinds: Iterable[Event]) -> None:
         """Bind kinds of events before they occur."""
         for kind in kinds:
             self._add(kind)
 
-    def _add(self, event: Event) -> None:
-        fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
-        key = [event.first, *(fired.get(clock.name, 0) for clock in self._timeline.clocks)]
+    def _add(self, kind: Event) -> None:
+        fired = {f.clock: 2 * f.dticks + f.final for f in kind.firings}
+        key = [kind.first, *(fired.get(clock.name, 0) for clock in self._timeline.clocks)]
         self._keys = np.concatenate([self._keys, np.array([key], np.int64)])
         n = len(self._blocks) + 1
-        self._blocks = (structures.Block * n)(*self._blocks, structures.Block(*self._block(event)))
+        self._blocks = (structures.Block * n)(*self._blocks, structures.Block(*self._block(kind)))
         self._c.fill(keys=self._keys, kinds=self._blocks, n_kinds=n)

@@ -85,6 +85,7 @@ class Machine:
         self._holds = self._array("holds", ctypes.c_void_p, len(system.connections))
         self._meters = self._array("meters", ctypes.c_void_p, len(simulation.meters.of))
         self._indices: dict[tuple[str, Any], int] = {}
+        self._rows: dict[Instruction, tuple[float, ...]] = {}
         self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
@@ -154,7 +155,10 @@ class Machine:
         last."""
         first = len(self._bound)
         self._bound += bound
-        rows = [self._record(instruction) for instruction, _ in bound]
+        for instruction, _ in bound:
+            if instruction not in self._rows:
+                self._rows[instruction] = self._record(instruction)
+        rows = [self._rows[instruction] for instruction, _ in bound]
         self._ops = np.concatenate([self._ops, np.array(rows, np.dtype(Op))])
         self.loop.fill(ops=self._ops)
         return first, len(self._bound)

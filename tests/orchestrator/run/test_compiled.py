@@ -11,6 +11,7 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.plan.event_kinds import event
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_record import Timings
@@ -216,7 +217,7 @@ def test_kinds_of_events_are_bound_before_the_loop(tmp_path, monkeypatch, option
         original(events, bound[-1])
 
     def new_kind(events):
-        late.append(events._event(events._key.tolist()))
+        late.append(event(events._timeline, events._key.tobytes()))
         new(events)
 
     monkeypatch.setattr(Events, "prepare", prepare)

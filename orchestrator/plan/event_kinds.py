@@ -1,0 +1,59 @@
+"""The events of a timeline and their kinds, all at once.
+
+An event's key: whether it is the first, then for each clock twice the step (ticks) that it starts,
+1 more where this is final, 0 where the clock does not fire.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.plan.operations import Event, Firing
+
+Ticks = NDArray[np.int64]
+
+
+def keyed_events(
+    timeline: Timeline, until: int, most: int
+) -> tuple[Ticks, dict[Event, NDArray[np.intp]]]:
+    """The ticks of the events up to `until`, `most` of them, and the indices of those of each kind,
+    which are in the order of their first occurrence."""
+    every = [clock.starts for clock in timeline.clocks]
+    until = min(until, *(starts[most] for starts in every if len(starts) > most), timeline.end)
+    begun = [np.array(starts[: bisect_right(starts, until) + 1], np.int64) for starts in every]
+    ticks, keys = keyed(begun, until, timeline.end)
+    kinds: dict[bytes, list[int]] = {}
+    for i, key in enumerate(map(bytes, keys[:most])):
+        kinds.setdefault(key, []).append(i)
+    return ticks[:most], {event(timeline, key): np.array(rows) for key, rows in kinds.items()}
+
+
+def keyed(starts: Sequence[Ticks], known: int, end: int) -> tuple[Ticks, NDArray[np.int64]]:
+    """The ticks of the events up to `known` with their keys; `starts` are communication points of
+    each clock as far as the one after that, `end` is that of the run."""
+    # With an index, since NumPy loads its masked arrays otherwise.
+    ticks, _ = np.unique(np.concatenate([each[:-1] for each in starts]), return_index=True)
+    ticks = ticks[ticks <= known]
+    keys = np.zeros((len(ticks), 1 + len(starts)), np.int64)
+    keys[:, 0] = ticks == 0
+    for i, each in enumerate(starts):
+        start = each[:-1][each[:-1] <= known]
+        after = each[1 : len(start) + 1]
+        keys[np.searchsorted(ticks, start), 1 + i] = 2 * (after - start) + (after > end)
+    return ticks, keys
+
+
+def event(timeline: Timeline, key: bytes) -> Event:
+    """The kind of event with a key."""
+    first, *steps = np.frombuffer(key, np.int64).tolist()
+    fired = (
+        Firing(clock.name, step // 2, bool(step % 2))
+        for clock, step in zip(timeline.clocks, steps, strict=True)
+        if step
+    )
+    return Event(bool(first), tuple(fired))
