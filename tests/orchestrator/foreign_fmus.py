@@ -239,6 +239,32 @@ def c_fmu3(folder: Path) -> Path:
     return _packed(folder, "types_fmu3.c", "types", platform_tuple, description)
 
 
+EVENTS = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="events" instantiationToken="{token}">
+<CoSimulation modelIdentifier="events" hasEventMode="true" canGetAndSetFMUState="true"
+ canHandleVariableCommunicationStepSize="{varies}"/>
+<ModelVariables>
+<Float64 name="x" valueReference="1" causality="output"/>
+<Float64 name="u" valueReference="2" causality="input" start="0"/>
+<Int32 name="falls" valueReference="3" causality="output"/>
+<Int32 name="alarms" valueReference="4" causality="output"/>
+<Int32 name="level" valueReference="5" causality="input" start="0"/>
+<Int32 name="parts" valueReference="6" causality="output"/>
+<Int32 name="mode" valueReference="7" causality="parameter" variability="fixed" start="0"/>
+<Int32 name="entered" valueReference="8" causality="output"/>
+</ModelVariables>
+<ModelStructure><Output valueReference="1"/><Output valueReference="3"/><Output valueReference="4"/>
+<Output valueReference="6"/><Output valueReference="8"/></ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def event_fmu3(folder: Path, varies: bool = True, token: str = "{events}") -> Path:
+    """The FMU of event_fmu3.c, which has event mode; `varies`: it takes steps of any size."""
+    description = EVENTS.format(token=token, varies=str(varies).lower())
+    return _packed(folder, "event_fmu3.c", "events", platform_tuple, description)
+
+
 ISOLATED = "isolate = true\n"
 COMMAND = [sys.executable, "-m", "hapticlink"]
 RUN = [*COMMAND, "run", "--no-figures"]
