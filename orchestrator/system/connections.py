@@ -78,6 +78,9 @@ def _converted(
         raise ValueError(f"{sizes}; connect their entries one by one")
     converted = []
     for a, b in zip(outputs, inputs, strict=True):
+        if (a.type == "Clock") != (b.type == "Clock"):
+            clock = a if a.type == "Clock" else b
+            raise ValueError(f"{clock.name} is a clock, which is connected to a clock only")
         units = SAME
         if wire.convert:
             try:

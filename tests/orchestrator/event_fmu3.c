@@ -20,29 +20,6 @@ typedef struct {
     int32_t level, before, mode, falls, alarms, parts, entered;
 } Model;
 
-#define UNUSED(name) int name(void) { return 3; }
-UNUSED(fmi3ActivateModelPartition) UNUSED(fmi3CompletedIntegratorStep)
-UNUSED(fmi3DeserializeFMUState) UNUSED(fmi3EnterConfigurationMode)
-UNUSED(fmi3EnterContinuousTimeMode) UNUSED(fmi3EvaluateDiscreteStates)
-UNUSED(fmi3ExitConfigurationMode) UNUSED(fmi3GetAdjointDerivative) UNUSED(fmi3GetBinary)
-UNUSED(fmi3GetBoolean) UNUSED(fmi3GetClock) UNUSED(fmi3GetContinuousStateDerivatives)
-UNUSED(fmi3GetContinuousStates) UNUSED(fmi3GetDirectionalDerivative)
-UNUSED(fmi3GetEventIndicators) UNUSED(fmi3GetFloat32) UNUSED(fmi3GetInt16)
-UNUSED(fmi3GetInt64) UNUSED(fmi3GetInt8) UNUSED(fmi3GetIntervalDecimal)
-UNUSED(fmi3GetIntervalFraction) UNUSED(fmi3GetNominalsOfContinuousStates)
-UNUSED(fmi3GetNumberOfContinuousStates) UNUSED(fmi3GetNumberOfEventIndicators)
-UNUSED(fmi3GetNumberOfVariableDependencies) UNUSED(fmi3GetOutputDerivatives)
-UNUSED(fmi3GetShiftDecimal) UNUSED(fmi3GetShiftFraction) UNUSED(fmi3GetString)
-UNUSED(fmi3GetUInt16) UNUSED(fmi3GetUInt32) UNUSED(fmi3GetUInt64) UNUSED(fmi3GetUInt8)
-UNUSED(fmi3GetVariableDependencies) UNUSED(fmi3GetVersion) UNUSED(fmi3InstantiateModelExchange)
-UNUSED(fmi3InstantiateScheduledExecution) UNUSED(fmi3Reset) UNUSED(fmi3SerializeFMUState)
-UNUSED(fmi3SerializedFMUStateSize) UNUSED(fmi3SetBinary) UNUSED(fmi3SetBoolean)
-UNUSED(fmi3SetClock) UNUSED(fmi3SetContinuousStates) UNUSED(fmi3SetDebugLogging)
-UNUSED(fmi3SetFloat32) UNUSED(fmi3SetInt16) UNUSED(fmi3SetInt64) UNUSED(fmi3SetInt8)
-UNUSED(fmi3SetIntervalDecimal) UNUSED(fmi3SetIntervalFraction) UNUSED(fmi3SetShiftDecimal)
-UNUSED(fmi3SetShiftFraction) UNUSED(fmi3SetString) UNUSED(fmi3SetTime) UNUSED(fmi3SetUInt16)
-UNUSED(fmi3SetUInt32) UNUSED(fmi3SetUInt64) UNUSED(fmi3SetUInt8)
-
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources,
                                   bool visible, bool logging, bool events, bool early,
                                   const unsigned *required, size_t count, void *environment,
