@@ -23,6 +23,7 @@ from hapticlink.orchestrator.fmi.archive import opened, read_xml, require_whole
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import (
     TYPES,
+    WRITTEN,
     Scalar,
     derivatives,
     differences,
@@ -189,8 +190,7 @@ def _variables(
         for v in model.modelVariables
         for s in numbers(v, version, v.name in relative, bounded=bounded, resized=resized)
     )
-    written = ("String", "Binary")
-    strings = tuple(text(v) for v in model.modelVariables if v.type in written and not v.shape)
+    strings = tuple(text(v) for v in model.modelVariables if v.type in WRITTEN and not v.shape)
     require_unique(s.name for s in (*scalars, *strings))
     dependencies = {
         output.variable.name: frozenset(v.name for v in output.dependencies)

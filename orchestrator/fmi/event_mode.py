@@ -161,7 +161,7 @@ class InProcessWithEvents(InProcess3):
     def _in_parts(self, do_step: Callable[[float, float], int], time: float, size: float) -> int:
         """The status of a step from `time` over `size` (s), in parts that end at events."""
         end, near, now = time + size, SHARE * size, time
-        before, status, stuck = deepcopy(self.pending), 0, 0
+        before, status, stuck = deepcopy(self.pending) if self.retry else self.pending, 0, 0
         if (due := self._due(time, near)) and self.event(time, due):
             self._end(time)
             return status

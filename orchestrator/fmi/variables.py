@@ -21,6 +21,8 @@ TYPES = (
 )  # fmt: skip
 """The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
 FMI 3.0's ten, Boolean of both, and Clock, whose number is how often it has been active."""
+WRITTEN = ("String", "Binary")
+"""The FMI types that are no numbers."""
 _CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
 _DERIVATIVE = re.compile(r"der\((.+)\)")
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
