@@ -19,7 +19,6 @@ import ctypes
 import logging
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
@@ -82,8 +81,11 @@ class InProcessWithEvents(InProcess3):
     def _instantiate(self) -> Any:
         """One whose library refuses what its modelDescription.xml declares handles its events
         itself."""
-        with suppress(Exception):  # FMPy raises bare Exception; raised again below, where it stays
+        try:
             return super()._instantiate()
+        except Exception:  # FMPy raises bare Exception, which comes again where this was not it
+            if self._clocks:
+                raise
         self.has_events = False
         slave = super()._instantiate()
         warning = "%s declares event mode (hasEventMode) and refuses it: it handles its own events"
@@ -103,7 +105,8 @@ class InProcessWithEvents(InProcess3):
     def exit_initialization(self) -> None:
         """Initialisation mode leads to event mode, whose iterations settle the outputs of t = 0."""
         if not self.has_events:
-            return super().exit_initialization()
+            super().exit_initialization()
+            return
         self._clocks = tuple(self._told(clock) for clock in self._clocks)
         self._plan(0.0, {c.reference for c in self._clocks if c.kind == "changing"})
         self._call("fmi3ExitInitializationMode")
@@ -113,7 +116,6 @@ class InProcessWithEvents(InProcess3):
         self._call("fmi3EnterStepMode")
         self.read()
         self._start_loop()
-        return None
 
     def connect(
         self,
