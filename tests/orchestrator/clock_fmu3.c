@@ -3,7 +3,7 @@
    and read while one of them is active, or in initialisation mode. Each clock counts how often it
    was active.
 
-   sample    constant, 0.1 s from 0.05 s on: held takes the input w
+   sample    constant, 0.1 s from SHIFT on: held takes the input w
    told      fixed, 0.25 s, told in initialisation mode
    fired     an output: active at every third instant of sample
    go        triggered: got takes the input v, and later is due 0.02 s after it
@@ -31,7 +31,7 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
                                   void *log, void *update) {
     Model *m = events ? calloc(1, sizeof(Model)) : NULL;
     if (!m) return NULL;
-    m->next[SAMPLE] = 0.05;
+    m->next[SAMPLE] = SHIFT;
     m->next[GO] = -1; /* at any time */
     m->next[LATER] = INFINITY;
     m->interval = m->next[GROWS] = 0.03;

@@ -272,7 +272,7 @@ CLOCKED = """<?xml version="1.0" encoding="UTF-8"?>
 <CoSimulation modelIdentifier="clocks" {flags}/>
 <ModelVariables>
 <Clock name="sample" valueReference="0" causality="input" intervalVariability="constant"
- intervalDecimal="0.1" shiftDecimal="0.05"/>
+ intervalDecimal="0.1" shiftDecimal="{shift}"/>
 <Clock name="told" valueReference="1" causality="input" intervalVariability="fixed"/>
 <Clock name="fired" valueReference="2" causality="output" intervalVariability="triggered"/>
 <Clock name="go" valueReference="3" causality="input" intervalVariability="triggered"/>
@@ -293,17 +293,18 @@ CLOCKED = """<?xml version="1.0" encoding="UTF-8"?>
 CLOCKS = ("sample", "told", "fired", "go", "later", "grows")
 
 
-def clock_fmu3(folder: Path, **flags: str) -> Path:
-    """The FMU of clock_fmu3.c, with clocks of every kind and how often each was active; by default
-    one with event mode that takes steps of any size."""
+def clock_fmu3(folder: Path, shift: float = 0.05, **flags: str) -> Path:
+    """The FMU of clock_fmu3.c, with clocks of every kind and how often each was active, that of
+    0.1 s from `shift` (s) on; by default one with event mode that takes steps of any size."""
     flags = flags or {"hasEventMode": "true", "canHandleVariableCommunicationStepSize": "true"}
     counts = "".join(
         f'<Int32 name="{name}_count" valueReference="{30 + k}" causality="output" clocks="{k}"/>\n'
         for k, name in enumerate(CLOCKS)
     )
     said = " ".join(f'{name}="{value}"' for name, value in flags.items())
-    description = CLOCKED.format(flags=said, counts=counts)
-    return _packed(folder, "clock_fmu3.c", "clocks", platform_tuple, description)
+    description = CLOCKED.format(flags=said, counts=counts, shift=shift)
+    of = platform_tuple, description, f"-DSHIFT={shift}"
+    return _packed(folder, "clock_fmu3.c", "clocks", *of)
 
 
 ISOLATED = "isolate = true\n"

@@ -79,6 +79,20 @@ def test_an_output_clock_triggers_an_input_clock(tmp_path, source, target):
     np.testing.assert_array_equal(found["two.got"], np.concatenate([[0.0], got])[before(gone, t)])
 
 
+def test_a_sampled_block_at_the_rate_of_its_clock_has_no_delay(tmp_path):
+    """Its outputs of an instant are made of the inputs of that instant."""
+    clock_fmu3(tmp_path, shift=0.0)
+    python_fmu(tmp_path, "Gives")  # y = t
+    one = fmu_table("one", "clocks", 'rate = 10\ntiming = "sampled"\n')
+    gives = fmu_table("gives", "Gives", "rate = 10\n")
+    found = ran(tmp_path, gives + one + wire_table("gives.y", "one.w"), "duration=2.0")
+    table = found.tables["10hz"]
+    np.testing.assert_array_equal(table["one.held"], table["gives.y"])
+    np.testing.assert_array_equal(
+        table["one.sample_count"][1:], np.arange(2, len(table["time"]) + 1)
+    )
+
+
 def test_a_clock_within_a_step_of_fixed_size_is_a_fault(tmp_path):
     clock_fmu3(tmp_path, hasEventMode="true")
     said = fault(tmp_path, ONE)
