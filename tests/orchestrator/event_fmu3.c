@@ -3,7 +3,8 @@
    mode, in the second of two iterations, and `falls` counts. A time event each 0.3 s counts in
    `alarms`. `level` is a discrete input that is added to x where it changes. `parts` counts doStep.
    With `mode` 1 it returns early unasked, with 2 its events never settle, with 3 it asks to end at
-   its first fall, with 4 it returns early without advancing. */
+   its first fall, with 4 it returns early without advancing, with 5 it asks to end at
+   t = 0. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -55,7 +56,8 @@ int fmi3EnterEventMode(Model *m) {
 int fmi3UpdateDiscreteStates(Model *m, bool *more, bool *ends, bool *nominals, bool *values,
                              bool *defined, double *next) {
     if (m->state != EVENT) return 3;
-    *nominals = *values = *ends = false;
+    *nominals = *values = false;
+    *ends = m->mode == 5;
     if (m->phase == 1) {
         m->phase = 2;
         if (m->mode == 3) *ends = true;

@@ -81,11 +81,12 @@ def test_what_never_ends_or_was_not_asked_is_a_fault(tmp_path, mode, varies, mes
     assert message in fault(tmp_path, f"{ONE}start.mode = {mode}\n")
 
 
-def test_a_request_to_end_in_event_mode(tmp_path):
+@pytest.mark.parametrize(("mode", "end"), [(3, 1.0), (5, 0.0)])
+def test_a_request_to_end_in_event_mode(tmp_path, mode, end):
     event_fmu3(tmp_path)
-    experiment, _ = run(tmp_path, f"{ONE}start.mode = 3\n", "duration=4.0")
+    experiment, _ = run(tmp_path, f"{ONE}start.mode = {mode}\n", "duration=4.0")
     outcome = experiment.outcome
-    assert (outcome.fault, outcome.reason, outcome.end_time) == (None, "terminated", 1.0)
+    assert (outcome.fault, outcome.reason, outcome.end_time) == (None, "terminated", end)
 
 
 def test_a_restored_state_has_the_time_events_that_it_had(tmp_path):
