@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
@@ -17,7 +16,6 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import current_directory, interpreter_state, interrupt
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.describe_run import setup
-from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
 from hapticlink.orchestrator.plan.plan import Plan
@@ -145,10 +143,6 @@ def simulate(
             tables |= {f"{clock}_{SAMPLES}": COLUMNS for clock in sides}
             tables |= {f"{fmu.name}_{FRAMES}": FRAME for fmu in system.fmus if fmu.served}
         before = setup(read, plan, tables, _left_out(every, system))
-        for fmu in system.fmus:
-            if offered := capabilities.unused(fmu.description):
-                warning = "%s offers %s, which is not used: its events act at ends of steps"
-                logging.getLogger(__name__).warning(warning, fmu.name, offered)
         alone = isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         memory = _memory(system, tables) if in_memory and not foreign else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hapticlink.orchestrator.base.signal_names import MECHANISM
-from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
+from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.system.system import System
 
 
@@ -16,7 +16,7 @@ def mechanism_outputs(system: System) -> dict[str, float]:
     if fmu is None or fmu.description.block != MECHANISM:
         return {}
     outputs = np.zeros(len(fmu.description.outputs))
-    fmu_instance = IN_PROCESS[fmu.description.fmi](MECHANISM, fmu.description, outputs, fmu.starts)
+    fmu_instance = in_process(fmu.description)(MECHANISM, fmu.description, outputs, fmu.starts)
     with fmu_instance as instance:
         instance.enter_initialization(1.0)
         instance.read()

@@ -17,18 +17,9 @@ DIRECTIONAL_DERIVATIVES = {
 }
 
 
-UNUSED = {
-    "hasEventMode": "event mode",
-    "canReturnEarlyAfterIntermediateUpdate": "early return",
-    "providesIntermediateUpdate": "intermediate update",
-}
-"""What an FMU of FMI 3.0 may offer and a run does not use, by capability flag (FMI 3.0 section
-4.3.1)."""
-
-
-def unused(description: Description) -> str:
-    """What of UNUSED the FMU offers, "" if nothing."""
-    return ", ".join(name for flag, name in UNUSED.items() if flag in description.flags)
+def has_event_mode(description: Description) -> bool:
+    """Whether its importer may handle its events (FMI 3.0 section 4.3.1)."""
+    return description.fmi == "3" and "hasEventMode" in description.flags
 
 
 def varies_step(description: Description) -> bool:

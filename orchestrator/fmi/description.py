@@ -18,11 +18,12 @@ from fmpy import platform, platform_tuple, read_model_description, sharedLibrary
 from hapticlink.components.base_units import BASES
 from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi import annotation
+from hapticlink.orchestrator.fmi import annotation, clocks
 from hapticlink.orchestrator.fmi.archive import opened, read_xml, require_whole
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import (
     TYPES,
+    WRITTEN,
     Scalar,
     derivatives,
     differences,
@@ -67,6 +68,7 @@ class Description:
     """The states that its serialised FMU state ends with; None where that is not declared."""
     declares_timing: bool = False
     """Whether the FMU itself declares its timing."""
+    clocks: tuple[clocks.Clock, ...] = ()
     block: str | None = None
     """The block of this project that it was built from; None for FMUs of others."""
 
@@ -129,6 +131,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         try:
             model = read_model_description(_only_xml(content), validate=False)
             variables = _variables(tree, model, version, resized=bool(sizes))
+            ticking = tuple(clocks.read(tree))
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
         _require_binary(archive, model.coSimulation.modelIdentifier, version)
@@ -138,6 +141,11 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
     except ValueError as error:
         raise InputFault(f"{path}: its hapticlink annotation cannot be used: {error}") from error
     capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]
+    if ticking and "hasEventMode" not in capable:
+        raise InputFault(
+            f"{path}: it has clocks ({ticking[0].name}) and no event mode, in which alone they are "
+            "active: FMI 3.0 asks for hasEventMode (section 4.4)"
+        )
     return Description(
         path=path,
         guid=model.guid,
@@ -145,6 +153,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         fmi=version,
         flags=frozenset(capable),
         step_size=model.defaultExperiment and model.defaultExperiment.stepSize,
+        clocks=ticking,
         block=None if annotation.block(tree) is None else model.modelName,
         **variables,
         **declared._asdict(),
@@ -155,6 +164,11 @@ def _version(path: Path, tree: ElementTree.Element) -> str:
     """ "2" or "3". Raises InputFault for other versions, and for an FMU without co-simulation."""
     version = tree.get("fmiVersion") or "none"
     cosimulates = tree.find("CoSimulation") is not None
+    if not cosimulates and tree.find("ScheduledExecution") is not None:
+        raise InputFault(
+            f"{path}: it is for scheduled execution only, where a scheduler activates its model "
+            "partitions and preempts them; a run takes steps: export it for co-simulation"
+        )
     if version.partition(".")[0] not in ("2", "3") or not cosimulates:
         raise InputFault(
             f"{path}: FMI version {version}, co-simulation: {cosimulates}; "
@@ -182,8 +196,7 @@ def _variables(
         for v in model.modelVariables
         for s in numbers(v, version, v.name in relative, bounded=bounded, resized=resized)
     )
-    written = ("String", "Binary")
-    strings = tuple(text(v) for v in model.modelVariables if v.type in written and not v.shape)
+    strings = tuple(text(v) for v in model.modelVariables if v.type in WRITTEN and not v.shape)
     require_unique(s.name for s in (*scalars, *strings))
     dependencies = {
         output.variable.name: frozenset(v.name for v in output.dependencies)

@@ -1,7 +1,7 @@
-"""The differences of an FMI 3.0 co-simulation FMU from one of FMI 2.0.
+"""The differences of an FMI 3.0 co-simulation FMU from one of FMI 2.0. Those of one with event mode
+are in `event_mode`.
 
-Event mode, early return and intermediate update are not used, so a step is never cut short and its
-inputs are constant (FMI 3.0 section 4.2.1)."""
+Intermediate update is not used: inputs are constant over each step (FMI 3.0 section 4.2.1)."""
 
 from __future__ import annotations
 
@@ -91,7 +91,3 @@ class InProcess3(InProcess):
             self._call("fmi3ExitConfigurationMode")
         self._set_starts()
         self._call("fmi3EnterInitializationMode", False, 0.0, 0.0, True, stop_time)
-
-
-IN_PROCESS = {"2": InProcess, "3": InProcess3}
-"""The class of an FMU in this process, by version of FMI."""

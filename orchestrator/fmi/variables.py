@@ -17,10 +17,12 @@ from hapticlink.orchestrator.fmi.units import SAME, Linear
 TYPES = (
     "Real", "Integer",
     "Float64", "Float32", "Int64", "Int32", "Int16", "Int8", "UInt64", "UInt32", "UInt16", "UInt8",
-    "Boolean",
+    "Boolean", "Clock",
 )  # fmt: skip
 """The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
-FMI 3.0's ten, and Boolean of both."""
+FMI 3.0's ten, Boolean of both, and Clock, whose number is how often it has been active."""
+WRITTEN = ("String", "Binary")
+"""The FMI types that are no numbers."""
 _CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
 _DERIVATIVE = re.compile(r"der\((.+)\)")
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
@@ -50,6 +52,8 @@ class Scalar:
     initial: str | None = None
     items: tuple[tuple[str, int], ...] = ()
     """Of an enumeration: name and value of each."""
+    clocks: frozenset[int] = frozenset()
+    """References of the Clocks of which one has to be active when it is set or read."""
 
     @cached_property
     def port(self) -> str:
@@ -103,7 +107,7 @@ def numbers(
     bounded: the run has to end if its `max` is exceeded. resized: structural parameters have been
     changed; start values are NaN if their number does not match the new size."""
     kind = _CALLED.get((fmi, variable.type), variable.type)
-    if kind not in TYPES:
+    if kind not in TYPES or (kind == "Clock" and variable.intervalVariability != "triggered"):
         return
     check(variable)
     names = _names(variable)
@@ -128,6 +132,7 @@ def numbers(
             bound=float(variable.max) if bounded and variable.max else None,
             initial=variable.initial,
             items=tuple((i.name, int(i.value)) for i in declared.items) if declared else (),
+            clocks=frozenset(clock.valueReference for clock in variable.clocks or ()),
         )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.base.process_end import leave_threads
-from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
+from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
@@ -43,7 +43,7 @@ class Worker:
     def load(
         self, name: str, description: Any, outputs: int, starts: Any, policy: Any, folder: str
     ) -> None:
-        kind = IN_PROCESS[description.fmi]
+        kind = in_process(description)
         self._instance = kind(name, description, np.zeros(outputs), starts, policy, folder)
         self.instance.__enter__()
 

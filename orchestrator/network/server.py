@@ -19,7 +19,7 @@ import numpy as np
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault, InputFault
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
+from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.worker import Worker, fault_fields
 from hapticlink.orchestrator.network.channel import ALIVE, SECURE
 from hapticlink.orchestrator.network.key_file import Key
@@ -66,7 +66,7 @@ class Session(Worker):
             fmu.description, scalars=(*others, *(scalars[name] for name in dict.fromkeys(outputs)))
         )
         self._inputs = {s.name: s for s in kept.scalars if s.causality != "output"}
-        kind = IN_PROCESS[kept.fmi]
+        kind = in_process(kept)
         self._instance = kind(fmu.name, kept, np.zeros(len(kept.outputs)), fmu.starts, policy)
         self._instance.__enter__()
 

@@ -8,7 +8,7 @@ from functools import partial
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.capabilities import NEEDS_TOOL
-from hapticlink.orchestrator.fmi.in_process_fmi3 import IN_PROCESS
+from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.network.remote_fmu import Remote
@@ -40,7 +40,7 @@ def opened(
     instances = {}
     for fmu in system.fmus:
         interrupt.check()
-        kind = Isolated if fmu.name in alone else IN_PROCESS[fmu.description.fmi]
+        kind = Isolated if fmu.name in alone else in_process(fmu.description)
         outputs = signals.values[signals.fmu(fmu.name)]
         opening = partial(Remote, fmu.served) if fmu.served else kind
         instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)

@@ -1,7 +1,7 @@
 """Writes a scene as an SSP, SystemStructure.ssd and the FMUs, for this and other tools.
 
-Each connection is from scalar to scalar. Rates, holds and connections to parameters, which the
-standard does not have, are in an annotation, as JSON with the keys of a scene.
+Each connection is from scalar to scalar. Rates, holds and connections to parameters and of clocks,
+which SSP 1.0 does not have, are in an annotation, as JSON with the keys of a scene.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
     for unit in system.fmus:
         step_sizes.of_component(_component(elements, unit), system, unit)
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
-    lines = [c for c in system.connections if not c.to_parameter]
+    lines = [c for c in system.connections if _has_line(c)]
     if lines:
         connections = SubElement(top, f"{{{SSD}}}Connections")
     for c in lines:
@@ -112,7 +112,9 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
 def _component(elements: Element, unit: Fmu) -> Element:
     about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
     component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
-    shown = [s for s in unit.description.scalars if s.causality in ("input", "output", "parameter")]
+    causalities = ("input", "output", "parameter")
+    every = (s for s in unit.description.scalars if s.causality in causalities)
+    shown = [s for s in every if s.type != "Clock"]
     if shown:
         connectors = SubElement(component, f"{{{SSD}}}Connectors")
     for s in shown:
@@ -183,9 +185,14 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     }
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
     tables["connection"] = [
-        _row(c, wires.get(c.name)) for c in system.connections if c.to_parameter
+        _row(c, wires.get(c.name)) for c in system.connections if not _has_line(c)
     ]
     return tables
+
+
+def _has_line(c: Connection) -> bool:
+    """Whether a connection is one that the standard has."""
+    return not c.to_parameter and c.outputs[0].type != "Clock"
 
 
 def _row(c: Connection, wire: Wire | None) -> dict[str, Any]:

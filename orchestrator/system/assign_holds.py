@@ -87,7 +87,7 @@ def _assign(
         reason = hold and misfit(hold, c, fmus, rules.power, iterated is not None)
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
-            hold = "foh" if iterated and c.kind != "table" else "zoh"
+            hold = "foh" if iterated and not _has_rows(c) else "zoh"
         yield replace(c, hold=hold, kind=c.kind if c.kind != "none" else None)
 
 
@@ -114,6 +114,11 @@ def _between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
     return source.clock == target.clock and not source.sampled and not target.sampled
 
 
+def _has_rows(c: Connection) -> bool:
+    """Whether there is nothing between its samples that a hold could make."""
+    return c.kind == "table" or c.outputs[0].type == "Clock"
+
+
 def misfit(
     hold: str,
     c: Connection,
@@ -126,9 +131,10 @@ def misfit(
     if iterated and not HOLDS[hold].interpolates:
         able = ", ".join(HOLDS.names(lambda kind: kind.interpolates))
         return f"coupling = 'iterated' interpolates here; take one of {able}"
-    if c.kind == "table" and not HOLDS[hold].gives_samples:
+    if _has_rows(c) and not HOLDS[hold].gives_samples:
         able = ", ".join(HOLDS.names(lambda kind: kind.gives_samples))
-        return f"{c.source_port} is a table, whose rows have no values in between; take {able}"
+        what = "table, whose rows" if c.kind == "table" else "clock, whose counts"
+        return f"{c.source_port} is a {what} have no values in between; take {able}"
     if needs == "derivative" and not beside(c, fmus, hold):
         return (
             f"{c.source} does not put out the derivative of {c.source_port}, or does not declare "

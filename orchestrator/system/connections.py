@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, conversion
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem, reported
-from hapticlink.orchestrator.system.fmu_tables import outputs, settable
+from hapticlink.orchestrator.system.fmu_tables import no_number, outputs, settable
 from hapticlink.orchestrator.system.system import Connection
 
 
@@ -72,12 +72,17 @@ def _converted(
     inputs: tuple[Scalar, ...],
 ) -> tuple[Scalar, ...]:
     """The inputs with the conversion of the wire: units, then its factor and offset. Raises
-    ValueError for different sizes, Strings, and units that cannot be converted."""
-    if len(outputs) != len(inputs) or inputs[0].type == "String":
+    ValueError for different sizes, texts, and units that cannot be converted."""
+    if inputs[0].type in WRITTEN:
+        raise ValueError(no_number(inputs[0]))
+    if len(outputs) != len(inputs):
         sizes = f"{wire.from_} has {len(outputs)} numbers, {wire.to} takes {len(inputs)}"
         raise ValueError(f"{sizes}; connect their entries one by one")
     converted = []
     for a, b in zip(outputs, inputs, strict=True):
+        if (a.type == "Clock") != (b.type == "Clock"):
+            clock = a if a.type == "Clock" else b
+            raise ValueError(f"{clock.name} is a clock, which is connected to a clock only")
         units = SAME
         if wire.convert:
             try:

@@ -191,6 +191,8 @@ def stair_fmu(folder: Path, **flags: str) -> Path:
 def _packed(
     folder: Path, source: str, name: str, where: str, description: str, *options: str
 ) -> Path:
+    if where == platform_tuple:
+        options = (*options, str(Path(__file__).parent / "fmi3_rest.c"))
     library, path = compiled(source, folder, name, *options), folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
@@ -237,6 +239,72 @@ def c_fmu3(folder: Path) -> Path:
 </fmiModelDescription>
 """
     return _packed(folder, "types_fmu3.c", "types", platform_tuple, description)
+
+
+EVENTS = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="events" instantiationToken="{token}">
+<CoSimulation modelIdentifier="events" hasEventMode="true" canGetAndSetFMUState="true"
+ canHandleVariableCommunicationStepSize="{varies}"/>
+<ModelVariables>
+<Float64 name="x" valueReference="1" causality="output"/>
+<Float64 name="u" valueReference="2" causality="input" start="0"/>
+<Int32 name="falls" valueReference="3" causality="output"/>
+<Int32 name="alarms" valueReference="4" causality="output"/>
+<Int32 name="level" valueReference="5" causality="input" start="0"/>
+<Int32 name="parts" valueReference="6" causality="output"/>
+<Int32 name="mode" valueReference="7" causality="parameter" variability="fixed" start="0"/>
+<Int32 name="entered" valueReference="8" causality="output"/>
+</ModelVariables>
+<ModelStructure><Output valueReference="1"/><Output valueReference="3"/><Output valueReference="4"/>
+<Output valueReference="6"/><Output valueReference="8"/></ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def event_fmu3(folder: Path, varies: bool = True, token: str = "{events}") -> Path:
+    """The FMU of event_fmu3.c, which has event mode; `varies`: it takes steps of any size."""
+    description = EVENTS.format(token=token, varies=str(varies).lower())
+    return _packed(folder, "event_fmu3.c", "events", platform_tuple, description)
+
+
+CLOCKED = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="clocks" instantiationToken="clocks">
+<CoSimulation modelIdentifier="clocks" {flags}/>
+<ModelVariables>
+<Clock name="sample" valueReference="0" causality="input" intervalVariability="constant"
+ intervalDecimal="0.1" shiftDecimal="{shift}"/>
+<Clock name="told" valueReference="1" causality="input" intervalVariability="fixed"/>
+<Clock name="fired" valueReference="2" causality="output" intervalVariability="triggered"/>
+<Clock name="go" valueReference="3" causality="input" intervalVariability="triggered"/>
+<Clock name="later" valueReference="4" causality="input" intervalVariability="countdown"/>
+<Clock name="grows" valueReference="5" causality="input" intervalVariability="changing"/>
+<Float64 name="w" valueReference="20" causality="input" variability="discrete" clocks="0"
+ start="0"/>
+<Float64 name="held" valueReference="21" causality="output" variability="discrete" clocks="0"/>
+<Float64 name="v" valueReference="22" causality="input" variability="discrete" clocks="3"
+ start="0"/>
+<Float64 name="got" valueReference="23" causality="output" variability="discrete" clocks="3"/>
+<Float64 name="when" valueReference="24" causality="output" variability="discrete" clocks="4"/>
+<Float64 name="plain" valueReference="25" causality="output"/>
+{counts}</ModelVariables>
+<ModelStructure/>
+</fmiModelDescription>
+"""
+CLOCKS = ("sample", "told", "fired", "go", "later", "grows")
+
+
+def clock_fmu3(folder: Path, shift: float = 0.05, **flags: str) -> Path:
+    """The FMU of clock_fmu3.c, with clocks of every kind and how often each was active, that of
+    0.1 s from `shift` (s) on; by default one with event mode that takes steps of any size."""
+    flags = flags or {"hasEventMode": "true", "canHandleVariableCommunicationStepSize": "true"}
+    counts = "".join(
+        f'<Int32 name="{name}_count" valueReference="{30 + k}" causality="output" clocks="{k}"/>\n'
+        for k, name in enumerate(CLOCKS)
+    )
+    said = " ".join(f'{name}="{value}"' for name, value in flags.items())
+    description = CLOCKED.format(flags=said, counts=counts, shift=shift)
+    of = platform_tuple, description, f"-DSHIFT={shift}"
+    return _packed(folder, "clock_fmu3.c", "clocks", *of)
 
 
 ISOLATED = "isolate = true\n"

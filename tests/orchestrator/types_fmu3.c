@@ -24,27 +24,6 @@ typedef struct {
     double array[LARGEST];
 } Model;
 
-/* An importer may ask for every function of the standard; these are not called. */
-#define UNUSED(name) int name(void) { return 3; }
-UNUSED(fmi3ActivateModelPartition) UNUSED(fmi3CompletedIntegratorStep)
-UNUSED(fmi3DeserializeFMUState)
-UNUSED(fmi3EnterContinuousTimeMode) UNUSED(fmi3EnterEventMode) UNUSED(fmi3EnterStepMode)
-UNUSED(fmi3EvaluateDiscreteStates) UNUSED(fmi3FreeFMUState)
-UNUSED(fmi3GetAdjointDerivative) UNUSED(fmi3GetBinary) UNUSED(fmi3GetClock)
-UNUSED(fmi3GetContinuousStateDerivatives) UNUSED(fmi3GetContinuousStates)
-UNUSED(fmi3GetDirectionalDerivative) UNUSED(fmi3GetEventIndicators) UNUSED(fmi3GetFMUState)
-UNUSED(fmi3GetIntervalDecimal) UNUSED(fmi3GetIntervalFraction)
-UNUSED(fmi3GetNominalsOfContinuousStates) UNUSED(fmi3GetNumberOfContinuousStates)
-UNUSED(fmi3GetNumberOfEventIndicators) UNUSED(fmi3GetNumberOfVariableDependencies)
-UNUSED(fmi3GetOutputDerivatives) UNUSED(fmi3GetShiftDecimal) UNUSED(fmi3GetShiftFraction)
-UNUSED(fmi3GetString) UNUSED(fmi3GetVariableDependencies) UNUSED(fmi3GetVersion)
-UNUSED(fmi3InstantiateModelExchange) UNUSED(fmi3InstantiateScheduledExecution) UNUSED(fmi3Reset)
-UNUSED(fmi3SerializeFMUState) UNUSED(fmi3SerializedFMUStateSize)
-UNUSED(fmi3SetClock) UNUSED(fmi3SetContinuousStates) UNUSED(fmi3SetDebugLogging)
-UNUSED(fmi3SetFMUState) UNUSED(fmi3SetIntervalDecimal) UNUSED(fmi3SetIntervalFraction)
-UNUSED(fmi3SetShiftDecimal) UNUSED(fmi3SetShiftFraction) UNUSED(fmi3SetTime)
-UNUSED(fmi3UpdateDiscreteStates)
-
 static void say(const char *what) {
     const char *path = getenv("FAULT_FMU_LOG");
     FILE *file = path ? fopen(path, "a") : NULL;

@@ -161,3 +161,21 @@ def test_what_fits_no_array_or_binary_is_refused(tmp_path, starts, message):
     c_fmu3(tmp_path)
     with pytest.raises(SceneFault, match=message):
         run(tmp_path, ONE + starts)
+
+
+@pytest.mark.parametrize(
+    ("source", "target"), [("one.out_UInt8", "two.text"), ("one.out_UInt8", "two.blob")]
+)
+def test_a_text_is_not_connected(tmp_path, source, target):
+    c_fmu3(tmp_path)
+    name = target.partition(".")[2]
+    with pytest.raises(SceneFault, match=rf"{name} is a (String|Binary): signals, holds and"):
+        run(tmp_path, ONE + fmu_table("two", "types") + wire_table(source, target))
+
+
+def test_a_text_is_no_source(tmp_path):
+    parameter = 'valueReference="23" causality="parameter" variability="fixed"'
+    output = 'valueReference="23" causality="output" variability="discrete"'
+    edited(c_fmu3(tmp_path), lambda text: text.replace(parameter, output))
+    with pytest.raises(SceneFault, match="text is a String: signals, holds and results are num"):
+        run(tmp_path, ONE + fmu_table("two", "types") + wire_table("one.text", "two.in_Int8"))

@@ -186,15 +186,3 @@ def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path):
         _, said = tool.communicate(timeout=20)
     assert tool.returncode == 1
     assert "interrupted" in said
-
-
-def test_what_a_run_does_not_use_of_fmi_3_is_told(tmp_path, caplog):
-    scene = hostile_scene(tmp_path, "good_none_0")
-    hostile_fmu(tmp_path, "3")
-    simulate(scene, tmp_path / "out")
-    assert "not used" not in caplog.text
-    flags = ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate")
-    hostile_fmu(tmp_path, "3", **dict.fromkeys(flags, "true"))
-    simulate(scene, tmp_path / "out")
-    offered = "event mode, early return, intermediate update, which is not used"
-    assert f"good_none_0 offers {offered}" in caplog.text

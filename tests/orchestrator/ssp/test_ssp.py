@@ -15,6 +15,7 @@ from hapticlink.orchestrator.results.tables import Results
 from tests.orchestrator.foreign_fmus import (
     PAIR,
     c_fmu3,
+    clock_fmu3,
     fmu_table,
     python_fmu,
     scene,
@@ -190,6 +191,15 @@ def test_sizes_of_arrays_and_binary_starts_come_back(tmp_path):
         assert made.results.haptics["a.sum"][-1] == sum(i * i for i in range(1, 10))
     starts = {scalar.name: value for scalar, value in made.system.fmu["a"].starts}
     assert starts["blob"] == "00ff"
+
+
+def test_a_connection_of_clocks_comes_back(tmp_path):
+    """By the annotation: SSP 1.0 has no connector for it."""
+    clock_fmu3(tmp_path)
+    wire = wire_table("one.fired", "two.go")
+    fmus = fmu_table("one", "clocks") + fmu_table("two", "clocks")
+    found = come_back(str(scene(tmp_path, fmus + wire)), tmp_path)
+    assert found.haptics["two.go_count"][-1] == 1
 
 
 def test_a_start_that_no_ssp_can_hold_is_refused(tmp_path):

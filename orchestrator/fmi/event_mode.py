@@ -1,0 +1,406 @@
+"""An FMI 3.0 co-simulation FMU whose events its importer handles (`hasEventMode`).
+
+FMI 3.0.2 section 4.2.1: "The importer must call fmi3EnterEventMode when any of the following
+conditions are met: time has reached nextEventTime as returned by fmi3UpdateDiscreteStates, or the
+FMU returned with eventHandlingNeeded = fmi3True from fmi3DoStep, or the importer plans discrete
+changes to inputs, or an input Clock needs to be set." An FMU that takes steps of any size may
+return early, at its event, and goes on to the end of the step from there: communication points are
+those of the run. One of a fixed size has its events handled at the end of the step, "or if needed
+slightly further" (section 2.3.5, nextEventTime).
+
+Outputs at a communication point are those behind the events at the end of the step to it. A clock
+that is due at a communication point is active at the beginning of the step from it, with the inputs
+of that point, as a sampled controller takes them; one that is due within a step cuts it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.errors import AsksToEnd
+from hapticlink.orchestrator.fmi.capabilities import varies_step
+from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, Clock
+from hapticlink.orchestrator.fmi.in_process_fmi3 import InProcess3
+from hapticlink.orchestrator.fmi.setter import Setter
+from hapticlink.orchestrator.fmi.status import DISCARD, succeeded
+from hapticlink.orchestrator.fmi.termination import SHARE
+from hapticlink.orchestrator.fmi.variables import Scalar
+
+MOST = 1000
+"""Event iterations at one instant, and doSteps that do not advance time, before the FMU counts as
+one that never settles."""
+CHANGED = 2
+"""The value of fmi3IntervalQualifier for a new interval."""
+_NONE: Mapping[str, int] = MappingProxyType({})
+
+
+@dataclass
+class Pending:
+    """What is not in the FMU's own state. next_event: the time (s) of its next time event.
+    planned: those at which aperiodic clocks are due, by reference. values: the outputs, of which
+    those with clocks, and the counts of these, keep their values where no clock is active. seen:
+    the counts up to which triggered inputs have been activated, by reference."""
+
+    values: Vector
+    next_event: float = math.inf
+    planned: dict[int, float] = field(default_factory=dict)
+    seen: dict[int, float] = field(default_factory=dict)
+
+
+class InProcessWithEvents(InProcess3):
+    """An FMU of FMI 3.0 with event mode, whose library is loaded into this process."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.has_events = True
+        self.restored = 0
+        """How often its state was restored."""
+        self._cuts = varies_step(self.description)
+        self.pending = Pending(np.zeros(len(self.outputs)))
+        self.inputs: EventSetter | None = None
+        """The newest that was called."""
+        self._clocks = self.description.clocks
+        self._readings: dict[frozenset[int] | None, Reading] = {}
+        self._saved_pending: dict[int, Pending] = {}
+
+    @property
+    def in_c(self) -> bool:
+        return not self.has_events
+
+    def _instantiate(self) -> Any:
+        """One whose library refuses what its modelDescription.xml declares handles its events
+        itself."""
+        try:
+            return super()._instantiate()
+        except Exception:  # FMPy raises bare Exception, which comes again where this was not it
+            if self._clocks:
+                raise
+        self.has_events = False
+        slave = super()._instantiate()
+        warning = "%s declares event mode (hasEventMode) and refuses it: it handles its own events"
+        logging.getLogger(__name__).warning(warning, self.name)
+        return slave
+
+    def _logging(self) -> dict[str, Any]:
+        used = {"eventModeUsed": self.has_events, "earlyReturnAllowed": self._returns_early}
+        return super()._logging() | used
+
+    @property
+    def _returns_early(self) -> bool:
+        return self.has_events and self._cuts
+
+    # --- initialisation -------------------------------------------------------------------
+
+    def exit_initialization(self) -> None:
+        """Initialisation mode leads to event mode, whose iterations settle the outputs of t = 0."""
+        if not self.has_events:
+            super().exit_initialization()
+            return
+        self._clocks = tuple(self._told(clock) for clock in self._clocks)
+        self._plan(0.0, {c.reference for c in self._clocks if c.kind == "changing"})
+        self._call("fmi3ExitInitializationMode")
+        self._initialized = True
+        if self._iterate():
+            raise AsksToEnd(self.name, "has asked to end the simulation", 0.0)
+        self._call("fmi3EnterStepMode")
+        self.read()
+        self._start_loop()
+
+    def connect(
+        self,
+        scalars: Sequence[Scalar],
+        places: Sequence[int],
+        exact: Mapping[str, int] = _NONE,
+    ) -> Any:
+        if not (self.has_events and self._initialized):
+            of = [i for i, s in enumerate(scalars) if s.type != "Clock"]
+            return self.setter([scalars[i] for i in of], [places[i] for i in of], exact)
+        return EventSetter(self, scalars, places)
+
+    def setter(
+        self, scalars: Sequence[Scalar], places: Sequence[int], exact: Any = _NONE
+    ) -> Setter:
+        """One that sets them in the mode in which it is called."""
+        return super().connect(scalars, places, exact)
+
+    def _told(self, clock: Clock) -> Clock:
+        """A periodic clock with the interval that the FMU tells in initialisation mode."""
+        if clock.kind not in PERIODIC or clock.interval is not None:
+            return clock
+        interval, shift, reference = ctypes.c_double(), ctypes.c_double(), _one(clock.reference)
+        qualifier = ctypes.byref(ctypes.c_int())
+        self._call("fmi3GetIntervalDecimal", reference, 1, ctypes.byref(interval), qualifier)
+        self._call("fmi3GetShiftDecimal", reference, 1, ctypes.byref(shift))
+        if not interval.value > 0:
+            raise self._fault(f"clock {clock.name} has an interval of {interval.value:g} s", 0.0)
+        return clock.timed(interval.value, shift.value)
+
+    def getter(self, outputs: Sequence[Scalar], values: Vector) -> Callable[[], None]:
+        """Reads `outputs`, sorted by type, into `values`."""
+        transfers = self._transfers("Get", outputs, values)
+        return lambda: self._carry_out(transfers, "gets", passing=True)
+
+    # --- the loop -------------------------------------------------------------------------
+
+    def _stepper(self) -> Callable[[float, float], int]:
+        do_step = super()._stepper()
+        return partial(self._in_parts, do_step) if self.has_events else do_step
+
+    def _settled(self, status: int, time: float) -> int:
+        return status if self.has_events else super()._settled(status, time)
+
+    def _in_parts(self, do_step: Callable[[float, float], int], time: float, size: float) -> int:
+        """The status of a step from `time` over `size` (s), in parts that end at events."""
+        end, near, now = time + size, SHARE * size, time
+        before, status, stuck = deepcopy(self.pending) if self.retry else self.pending, 0, 0
+        if (due := self._due(time, near)) and self.event(time, due):
+            self._end(time)
+            return status
+        while now < end - near:
+            until = self._until(now + near, end, near)
+            status = do_step(now, size if (now, until) == (time, end) else until - now)
+            if not succeeded(status):
+                if status == DISCARD:
+                    self.pending = before
+                return status
+            event, ends, early = (flag.value for flag in self.step_flags)
+            reached = self.reached.value
+            if ends:
+                self._end(reached)
+                return status
+            if early and not self._returns_early:
+                what = f"{self.do_step} returned early, at {reached:.6g} s, unasked"
+                raise self._fault(what, time)
+            stuck = stuck + 1 if early and reached <= now else 0
+            if stuck > MOST:
+                raise self._fault(f"{self.do_step} returned early {MOST} times in a row", now)
+            now = min(max(reached, now), until) if early else until
+            due = self._due(now, near) if now < end - near else frozenset()
+            needed = event or due or now >= self.pending.next_event - near
+            if needed and self.event(now, due):
+                self._end(now)
+                return status
+        return status
+
+    def _until(self, least: float, end: float, near: float) -> float:
+        """The end of the part of a step to `end`: the next instant at which event mode is due, if
+        that lies after `least` and within the step."""
+        instants = {c.name: self._instant(c, least) for c in self._clocks}
+        first = min(instants.values(), default=math.inf)
+        if first < end - near and not self._cuts:
+            name = next(name for name, instant in instants.items() if instant == first)
+            what = f"clock {name} is due at {first:.6g} s, within a step, and the FMU takes steps"
+            raise self._fault(f"{what} of one size only: give it the clock's rate", least)
+        due = min(self.pending.next_event, first)
+        return due if self._cuts and least < due < end - near else end
+
+    def _due(self, time: float, near: float) -> frozenset[int]:
+        """References of the clocks that are due at `time` (s)."""
+        due = (c for c in self._clocks if self._instant(c, time - near) <= time + near)
+        return frozenset(c.reference for c in due)
+
+    def _instant(self, clock: Clock, least: float) -> float:
+        """The first instant after `least` (s) at which a clock is due; infinity of one that is
+        triggered, or has not told it."""
+        if clock.kind in PERIODIC:
+            return clock.first_after(least)
+        return self.pending.planned.get(clock.reference, math.inf)
+
+    def event(
+        self,
+        time: float,
+        active: Collection[int] = (),
+        settings: Callable[[], object] = lambda: None,
+    ) -> bool:
+        """Event mode at `time` (s), in which `settings` are made and the clocks of the references
+        `active` are activated. Returns whether the FMU requests the end of the simulation."""
+        self.place.time = time
+        self._call("fmi3EnterEventMode")
+        settings()
+        for _ in range(MOST):
+            if self._iterate(active):
+                return True
+            active = {r for r, at in self.pending.planned.items() if at <= time}
+            if not active:
+                self._call("fmi3EnterStepMode")
+                return False
+        raise self._fault(f"its clocks are due {MOST} times at one instant", time)
+
+    def _iterate(self, active: Collection[int] = ()) -> bool:
+        """Event iterations until the discrete states need no update. Returns whether the FMU
+        requests the end of the simulation (FMI 3.0.2 section 2.3.5, fmi3UpdateDiscreteStates)."""
+        more, ends, _, _, defined = flags = [ctypes.c_bool() for _ in range(5)]
+        next_event = ctypes.c_double()
+        results = [*(ctypes.byref(flag) for flag in flags), ctypes.byref(next_event)]
+        for _ in range(MOST):
+            self._activate(active)
+            self._call("fmi3UpdateDiscreteStates", *results)
+            self._plan(self.time, active)
+            active, self.pending.next_event = (), next_event.value if defined else math.inf
+            if ends:
+                return True
+            if not more:
+                return False
+        raise self._fault(f"its discrete states need an update after {MOST} of them", self.time)
+
+    # --- clocks ---------------------------------------------------------------------------
+
+    def _activate(self, active: Collection[int]) -> None:
+        """Activate input clocks, set the inputs with these clocks, and read the outputs with clocks
+        that are active: "Clocked variables can acquire new values and can be queried only when
+        their Clock is active" (FMI 3.0.2 section 2.2.9), which the next update ends."""
+        if not self._clocks:
+            return
+        if active:
+            references = (ctypes.c_uint * len(active))(*active)
+            states = (ctypes.c_bool * len(active))(*[True] * len(active))
+            self._call("fmi3SetClock", references, len(active), states)
+            if self.inputs:
+                self.inputs.set_clocked(frozenset(active))
+        now = {*active}
+        for i, output in enumerate(self.description.outputs):
+            if output.type == "Clock":
+                state = ctypes.c_bool()
+                self._call("fmi3GetClock", _one(output.reference), 1, ctypes.byref(state))
+                if state:
+                    self.pending.values[i] += 1
+                    now.add(output.reference)
+        if now:
+            self._reading(frozenset(now)).into(self.pending.values)
+
+    def _plan(self, time: float, active: Collection[int]) -> None:
+        """Take what the FMU tells of the next instants of its aperiodic clocks: of one with a
+        countdown in each event mode, of one whose interval changes where it was active."""
+        for clock in self._clocks:
+            if clock.kind in APERIODIC:
+                if clock.reference in active:
+                    self.pending.planned.pop(clock.reference, None)
+                if clock.kind == "changing" and clock.reference not in active:
+                    continue
+                interval, qualifier = ctypes.c_double(), ctypes.c_int()
+                results = ctypes.byref(interval), ctypes.byref(qualifier)
+                self._call("fmi3GetIntervalDecimal", _one(clock.reference), 1, *results)
+                if qualifier.value == CHANGED:
+                    self.pending.planned[clock.reference] = time + interval.value
+
+    def _reading(self, active: frozenset[int] | None) -> Reading:
+        """What reads the outputs of clocks that are active, or with None those without clocks."""
+        if active not in self._readings:
+            self._readings[active] = Reading(self, active)
+        return self._readings[active]
+
+    def read(self) -> None:
+        if not self._clocks:
+            super().read()
+            return
+        values = self.pending.values
+        if not self._initialized:  # where those with clocks may be read as well
+            self._reading(frozenset(c.reference for c in self._clocks)).into(values)
+        self._reading(None).into(values)
+        self.outputs[:] = values
+
+    # --- states ---------------------------------------------------------------------------
+
+    def save(self, slot: int = 0) -> None:
+        super().save(slot)
+        self._saved_pending[slot] = deepcopy(self.pending)
+
+    def rollback(self, slot: int = 0) -> None:
+        super().rollback(slot)
+        self.pending = deepcopy(self._saved_pending[slot])
+        self.restored += 1
+
+
+class Reading:
+    """Reads the outputs of an FMU that have one of the clocks `active`, or with None those that
+    have no clock."""
+
+    def __init__(self, instance: InProcessWithEvents, active: frozenset[int] | None) -> None:
+        outputs = instance.description.outputs
+        self._places = [
+            i
+            for i, s in enumerate(outputs)
+            if s.type != "Clock" and (not s.clocks if active is None else s.clocks & active)
+        ]
+        self._values = np.zeros(len(self._places))
+        self._read = instance.getter([outputs[i] for i in self._places], self._values)
+
+    def into(self, values: Vector) -> None:
+        """Read into the vector of all outputs."""
+        self._read()
+        values[self._places] = self._values
+
+
+class EventSetter:
+    """Sets continuous inputs in step mode, and the others, which are discrete inputs and tunable
+    parameters, in event mode when one of them has changed. Inputs with clocks wait until one of
+    these is active. A triggered clock is active where the count that is connected to it has
+    grown."""
+
+    def __init__(
+        self, instance: InProcessWithEvents, scalars: Sequence[Scalar], places: Sequence[int]
+    ) -> None:
+        self._instance, self._before = instance, (-1, b"")
+        rows = [*zip(scalars, places, strict=True)]
+        self._clocks = [(s.reference, p) for s, p in rows if s.type == "Clock"]
+        self._clocked = [(s, p) for s, p in rows if s.clocks and s.type != "Clock"]
+        others = [(s, p) for s, p in rows if not s.clocks and s.type != "Clock"]
+        self._continuous = self._of([row for row in others if _is_continuous(row[0])])
+        self._discrete = self._of([row for row in others if not _is_continuous(row[0])])
+        self._signals: Vector = np.zeros(0)
+        self._setters: dict[frozenset[int], Setter] = {}
+
+    def _of(self, rows: Sequence[tuple[Scalar, int]]) -> Setter:
+        return self._instance.setter([s for s, _ in rows], [p for _, p in rows])
+
+    def __call__(self, signals: Vector) -> None:
+        instance, discrete = self._instance, self._discrete
+        if instance.ended:
+            return
+        instance.inputs = self
+        if self._clocked:
+            self._signals = signals.copy()  # as they are now, when a clock is active
+        self._continuous(signals)
+        seen, active = instance.pending.seen, []
+        for reference, place in self._clocks:
+            if signals[place] > seen.get(reference, 0.0):
+                seen[reference] = float(signals[place])
+                active.append(reference)
+        now = instance.restored, signals[discrete.where].tobytes()
+        changed = len(discrete.where) > 0 and now != self._before
+        if changed or active:
+            self._before = now
+            settings = (lambda: discrete(signals)) if changed else (lambda: None)
+            instance.place.ended = instance.event(instance.time, active, settings)
+
+    def set_clocked(self, active: frozenset[int]) -> None:
+        """Set the inputs of clocks that are active."""
+        if active not in self._setters:
+            self._setters[active] = self._of(
+                [row for row in self._clocked if row[0].clocks & active]
+            )
+        setter = self._setters[active]
+        if len(setter.where):
+            setter(self._signals)
+
+
+def _one(reference: int) -> Any:
+    return (ctypes.c_uint * 1)(reference)
+
+
+def _is_continuous(scalar: Scalar) -> bool:
+    """Whether it may be set in step mode: an input that varies continuously, as those of floating
+    point do by default (FMI 3.0.2 section 2.4.7.4)."""
+    default = "continuous" if scalar.type.startswith("Float") else "discrete"
+    return scalar.causality == "input" and (scalar.variability or default) == "continuous"

@@ -1,0 +1,16 @@
+"""The class of an FMU that is loaded into this process."""
+
+from __future__ import annotations
+
+from hapticlink.orchestrator.fmi.capabilities import has_event_mode
+from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.event_mode import InProcessWithEvents
+from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.in_process_fmi3 import InProcess3
+
+
+def in_process(description: Description) -> type[InProcess]:
+    """The class of an FMU in this process, by its version of FMI and what it offers."""
+    if has_event_mode(description):
+        return InProcessWithEvents
+    return {"2": InProcess, "3": InProcess3}[description.fmi]
