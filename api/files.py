@@ -24,6 +24,15 @@ from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
 
+BLOCKS = "Blocks, with their rates, signals and holds."
+SHOWN = {
+    "mechanism": "The mechanism in a reference run of the scene.",
+    "distance": "Distance of handle and operational point in this run.",
+}
+"""Figures of a run, with their captions, on the page of a scene as one FMU."""
+DPI = 90
+"""Of these pictures, which are a part of the file."""
+
 
 def build(
     scene: str | Path | Scene,
@@ -55,7 +64,13 @@ def build(
 
         name = scene if isinstance(scene, str | Path) else read.title
         path = build_program(
-            read, name, out=out, without=without, all_platforms=all_platforms, fmi=fmi
+            read,
+            name,
+            out=out,
+            without=without,
+            all_platforms=all_platforms,
+            fmi=fmi,
+            pictures=lambda: _pictures(read),
         )
         return {path.stem: path}
     if without:
@@ -92,6 +107,21 @@ def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path)
         for line in uneven(system.timeline):
             logging.getLogger(__name__).warning(line)
         return write.write(read, start_parameters.settled(system), Path(out))
+
+
+def _pictures(scene: Scene) -> dict[str, bytes]:
+    """PNGs by caption: the blocks of a scene and, as far as it gets, a reference run of it."""
+    from hapticlink.orchestrator.experiment import simulate
+    from hapticlink.visualization.figure_axes import png  # loads Matplotlib
+    from hapticlink.visualization.figures import block_diagram, run_figures
+
+    with temporary_folders.room() as room:
+        run = simulate(scene, room, in_memory=True, csv=False)
+        pictures = {BLOCKS: png(block_diagram.figure(run.system, scene.title), DPI)}
+        drawn = run_figures.drawings(run.results)
+        return pictures | {
+            caption: png(drawn[name](), DPI) for name, caption in SHOWN.items() if name in drawn
+        }
 
 
 def uneven(timeline: Timeline) -> Iterator[str]:

@@ -10,6 +10,9 @@ from hapticlink.components.component import Component, Variable
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 52em; margin: 2em auto; padding: 0 1em; }
 pre { background: #f4f6f8; padding: .8em; overflow-x: auto; }
+figure { margin: 1em 0; }
+img { max-width: 100%; }
+figcaption { color: #556; }
 table { border-collapse: collapse; width: 100%; }
 th, td { border-bottom: 1px solid #ccd; padding: .25em .6em; text-align: left; }
 """

@@ -6,7 +6,7 @@ import re
 import shutil
 import tempfile
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -42,6 +42,8 @@ from hapticlink.programs.sources import fmi3_sources, identifiers, sources
 OPTIONS = ("-DEXPORT=",)
 """The functions of the loop are not exported."""
 
+Pictures = Callable[[], Mapping[str, bytes]]
+
 
 def build_program(
     scene: Scene,
@@ -51,6 +53,7 @@ def build_program(
     without: str | None = None,
     all_platforms: bool = False,
     fmi: int = 2,
+    pictures: Pictures = dict,
 ) -> Path:
     """Write a scene as one native FMU into the folder `out`, and return its path. It needs no
     Python, and its outputs have the bits of a run of the scene.
@@ -59,8 +62,9 @@ def build_program(
 
     without: a block to leave out, whose outputs that others need are inputs of the FMU.
     all_platforms: compiles for Linux, Windows and macOS instead of this machine alone. fmi: 2 or 3,
-    the version of the standard. Raises InputFault if the scene is invalid or cannot become a
-    program, with what stands in the way; Fault if the compiler fails.
+    the version of the standard. pictures: gives PNGs for its page of documentation, by caption.
+    Raises InputFault if the scene is invalid or cannot become a program, with what stands in the
+    way; Fault if the compiler fails.
     """
     if fmi not in (2, 3):
         raise InputFault(f"--fmi: {fmi!r} is not 2 or 3")
@@ -70,7 +74,7 @@ def build_program(
             compiler_version()
             every = PLATFORMS if fmi == 2 else PLATFORMS_3
             platforms = every if all_platforms else (host_platform(fmi),)
-            files = program_files(scene, identifier, without, fmi)
+            files = program_files(scene, identifier, without, fmi, pictures)
             material = {"block": identifier, "program": digest(files), "platforms": platforms,
                         "compiler": [compiler_version(), *FLAGS]}  # fmt: skip
 
@@ -97,7 +101,11 @@ def _identifier(name: str | Path) -> str:
 
 
 def program_files(
-    scene: Scene, identifier: str, without: str | None = None, fmi: int = 2
+    scene: Scene,
+    identifier: str,
+    without: str | None = None,
+    fmi: int = 2,
+    pictures: Pictures = dict,
 ) -> dict[str, bytes]:
     """All files of the FMU but its binaries. Raises InputFault as `build_program`."""
     with resolved(scene, without) as program:
@@ -113,7 +121,7 @@ def program_files(
     described = description_fmi3.described if fmi == 3 else description.described
     about = partial(
         described, scene, identifier, variables,
-        capable=capable, step_size=step_size, files=compiled,
+        capable=capable, step_size=step_size, files=compiled, pictures=pictures(),
     )  # fmt: skip
     content = {f"sources/{name}": text.encode() for name, text in texts.items()} | resources
     guid = f"{{{uuid.UUID(digest({**content, **about(guid='')})[:32])}}}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from pathlib import PurePosixPath
 from xml.etree import ElementTree as ET
 
 from hapticlink.components.base_units import BASES
@@ -36,10 +37,11 @@ def described(
     guid: str,
     step_size: float,
     files: Iterable[str],
+    pictures: Mapping[str, bytes],
 ) -> dict[str, bytes]:
     """The files that describe the program, the same for the same arguments. capable: its
     capabilities, as FMI 2.0 calls them. step_size (s): of the default experiment. files: the C
-    files to compile, in sources/."""
+    files to compile, in sources/. pictures: PNGs of the page, by caption."""
     attributes = of_model(scene, identifier)
     root = ET.Element("fmiModelDescription", attributes, fmiVersion="2.0", guid=guid)
     runs = {"modelIdentifier": identifier, "needsExecutionTool": "false"}
@@ -53,7 +55,7 @@ def described(
     return {
         "modelDescription.xml": as_text(root),
         "model.png": icon("continuous"),
-        PAGE: documentation(scene, ports),
+        **documentation(scene, ports, pictures),
     }
 
 
@@ -137,14 +139,22 @@ def _structure(root: ET.Element, ports: Sequence[Port]) -> None:
         ET.SubElement(parent, "Unknown", index=index[port.name])
 
 
-def documentation(scene: Scene, ports: Sequence[Port]) -> bytes:
-    """One HTML page without external references."""
+def documentation(
+    scene: Scene, ports: Sequence[Port], pictures: Mapping[str, bytes]
+) -> dict[str, bytes]:
+    """An HTML page without references to elsewhere, and the files of its pictures."""
+    images = {f"picture{i}.png": data for i, data in enumerate(pictures.values())}
     body = [
         f"<h1>{escape(scene.title)}</h1>",
         *(f"<p>{escape(part)}</p>" for part in scene.description.split("\n\n") if part.strip()),
         "<p>A scene of hapticlink as one FMU: its blocks, each at its own rate, with the holds "
         "between them. A communication step that ends between two ticks of the scene takes it to "
         "the last tick before.</p>",
+        *(
+            f'<figure><img src="{image}" alt="{escape(caption)}">'
+            f"<figcaption>{escape(caption)}</figcaption></figure>"
+            for image, caption in zip(images, pictures, strict=True)
+        ),
     ]
     for title, kinds in (
         ("Inputs", ("INPUT", "OUTSIDE")),
@@ -161,7 +171,8 @@ def documentation(scene: Scene, ports: Sequence[Port]) -> bytes:
         *body,
         "</body></html>",
     ]
-    return "\n".join(page).encode() + b"\n"
+    files = {PAGE: "\n".join(page).encode() + b"\n"}
+    return files | {f"{PurePosixPath(PAGE).parent}/{image}": images[image] for image in images}
 
 
 def _table(ports: Iterable[Port]) -> list[str]:

@@ -15,7 +15,6 @@ from hapticlink.fmus.python_fmu import icon
 from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE, VARIABLE_STEP
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.description import (
-    PAGE,
     SECOND,
     about,
     definitions,
@@ -41,6 +40,7 @@ def described(
     guid: str,
     step_size: float,
     files: Iterable[str],
+    pictures: Mapping[str, bytes],
 ) -> dict[str, bytes]:
     """As `description.described`. guid: the instantiation token."""
     variables = [*arrays(ports)]
@@ -52,7 +52,7 @@ def described(
         "terminalsAndIcons/terminalsAndIcons.xml": _terminals(variables),
         "terminalsAndIcons/icon.png": icon("continuous"),
         "sources/buildDescription.xml": _build_description(identifier, files),
-        PAGE: documentation(scene, ports),
+        **documentation(scene, ports, pictures),
     }
 
 

@@ -131,11 +131,11 @@ def legend_above_curves(axes: Axes, columns: int) -> None:
     axes.set_ylim(low, low + (high - low) / (1 - covered))
 
 
-def png(figure: Figure) -> bytes:
-    """A figure as a PNG, at 150 dots per inch."""
+def png(figure: Figure, dpi: int = 150) -> bytes:
+    """A figure as a PNG; dpi: dots per inch."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure.set_dpi(150)
+    figure.set_dpi(dpi)
     file = BytesIO()
     FigureCanvasAgg(figure).print_png(
         file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import zipfile
 from collections.abc import Iterator
@@ -289,6 +290,15 @@ def test_the_command_makes_it(tmp_path: Path) -> None:
     assert fmpy.read_model_description(str(built["pendulum"])).fmiVersion == "3.0"
     found = simulate_fmu(str(built["pendulum"]), stop_time=0.5, output_interval=1 / 64)
     assert len(found) == 33
+    with zipfile.ZipFile(built["pendulum"]) as archive:
+        page = archive.read("documentation/index.html").decode()
+        shown = re.findall(r'<img src="(.+?)" alt="(.+?)">', page)
+        pictures = [archive.read(f"documentation/{image}") for image, _ in shown]
+    assert [caption.split()[:2] for _, caption in shown] == [
+        ["Blocks,", "with"],
+        ["The", "mechanism"],
+    ]
+    assert all(picture.startswith(b"\x89PNG") for picture in pictures)
     with pytest.raises(InputFault, match="--fmi is for one FMU: add --as-one"):
         hl.build("pendulum", out=tmp_path, fmi=3)
     with pytest.raises(InputFault, match="--fmi: 4 is not 2 or 3"):
