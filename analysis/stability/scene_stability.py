@@ -96,7 +96,8 @@ def stability(
                 visited += settled(scene, given, read.linkage)
         if grid:
             visited += grid_poses(run, read, read.linkage, grid)
-        return _judged(scene, given, visited, hands_of(read.hand), bounds, progress, rounded)
+        judged = _judged(scene, given, visited, hands_of(read.hand), bounds, progress, rounded)
+    return replace(judged, run_fault=run.record.fault.message if run.record.fault else "")
 
 
 def equilibrium_stability(

@@ -35,6 +35,9 @@ class Stability:
     """Lines of text on what is removed or stays as at rest."""
     rounded: str = ""
     """At which rate it was judged instead of its own, and why."""
+    run_fault: str = ""
+    """How the run of the scene failed from which the poses are taken, "" where it reached its
+    end."""
 
     @property
     def in_hands(self) -> str:
@@ -86,11 +89,16 @@ class Stability:
             "cases": [case.record() for case in self.cases],
             "frozen": list(self.frozen),
             "rounded": self.rounded,
+            "run_fault": self.run_fault or None,
         }
 
     @property
     def finding(self) -> str:
         """The verdict in one line."""
+        return f"{self._finding}{'; but its own run fails' if self.run_fault else ''}"
+
+    @property
+    def _finding(self) -> str:
         poses = len({case.pose for case in self.cases})
         held = {case.hand for case in self.cases if not case.free}
         edge = {c.hand for c in self.cases if c.hand in held and c.verdict == "marginal"}
@@ -122,6 +130,11 @@ class Stability:
 
     def lines(self) -> Iterator[str]:
         """The result as text, below the finding."""
+        if self.run_fault:
+            yield (
+                f"warning: its own run fails: {self.run_fault}; the poses are those up to there, "
+                "in which small motions alone are judged"
+            )
         yield f"{'hand':28s} {'worst pose':24s} {'growth 1/s':>11s} {'Hz':>7s}  what"
         for hand in _hands(self.cases):
             worst = max((c for c in self.cases if c.hand == hand.hand), key=lambda c: c.severity)

@@ -132,6 +132,19 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     assert len(found.cases) >= len(HANDS)
 
 
+def test_a_run_that_fails_is_said_first() -> None:
+    """A spring of 1e7 N/m on 1 kg, sampled at 20 Hz, throws it off; at 512 Hz it swings."""
+    found = hl.stability("sampled-spring", {"hand.stiffness": [1e7, 0.0, 0.0]}, poses=1)
+    assert found.finding.startswith("unstable: ")
+    assert found.finding.endswith("; but its own run fails")
+    assert "the run has diverged" in found.record()["run_fault"]
+    assert next(found.lines()).startswith("warning: its own run fails: virtual_mechanism: output ")
+    calm = hl.stability("sampled-spring", {"haptics.rate": 512}, poses=1)
+    assert calm.record()["run_fault"] is None
+    assert "fails" not in calm.finding
+    assert next(calm.lines()).startswith("hand ")
+
+
 def test_what_cannot_be_held_is_refused() -> None:
     with pytest.raises(hl.InputFault, match="--equilibrium"):
         hl.stability("closed-loop", {"graphics.rate": {"min": 20, "max": 60, "seed": 1}})
