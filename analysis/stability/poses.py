@@ -122,6 +122,11 @@ def simulated(
         return load(room, binary=True)
 
 
+def fault_of(run: Results) -> str:
+    """How a run failed of which poses are taken, "" where it reached its end."""
+    return run.record.fault.message if run.record.fault else ""
+
+
 def evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     """Of a run, `count` evenly spaced ones from its start on, and the one in contact as the last
     one if there was any. Raises InputFault where the poses are not recorded."""

@@ -25,6 +25,7 @@ from hapticlink.analysis.stability.mode_kinds import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import (
     Pose,
     evenly_spaced,
+    fault_of,
     presses,
     replaced,
     rest,
@@ -97,7 +98,7 @@ def stability(
         if grid:
             visited += grid_poses(run, read, read.linkage, grid)
         judged = _judged(scene, given, visited, hands_of(read.hand), bounds, progress, rounded)
-    return replace(judged, run_fault=run.record.fault.message if run.record.fault else "")
+    return replace(judged, run_fault=fault_of(run))
 
 
 def equilibrium_stability(

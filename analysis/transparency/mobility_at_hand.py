@@ -16,6 +16,7 @@ and gravity of the mechanism are not in the ideal.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ import numpy as np
 
 from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.port_response import hand_port, response
-from hapticlink.analysis.stability.poses import evenly_spaced, simulated
+from hapticlink.analysis.stability.poses import Pose, evenly_spaced, fault_of, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.tune.stability_limits import Judge
@@ -166,7 +167,7 @@ def transparency(
     linkage = _linkage(read)
     found, why = [], ""
     given = tuple(options)
-    for pose in evenly_spaced(simulated(scene, given), linkage, count):
+    for pose in _visited(scene, given, linkage, count):
         try:
             found.append(at_pose(scene, pose.options(whole_frames(read, given)), pose.name))
         except (InputFault, FmuFault) as fault:
@@ -174,6 +175,17 @@ def transparency(
     if not found:
         raise InputFault(f"no pose of the run has an equilibrium: {why}")
     return found
+
+
+def _visited(
+    scene: str | Path | Scene, given: Sequence[str], linkage: Linkage, count: int
+) -> list[Pose]:
+    """Poses of the scene's own run, which is said where it fails."""
+    run = simulated(scene, given)
+    if why := fault_of(run):
+        warning = "warning: the scene's own run fails: %s; its poses are those up to there"
+        logging.getLogger(__name__).warning(warning, why)
+    return evenly_spaced(run, linkage, count)
 
 
 def at_pose(scene: str | Path | Scene, options: Sequence[str], name: str) -> Transparency:
@@ -257,7 +269,7 @@ def costs(
     """How the scene feels at its start with other rates, delays and holds, and how stiff it can be
     made."""
     read, given = open_scene.load(scene, options), tuple(options)
-    pose = evenly_spaced(simulated(scene, given), _linkage(read), 1)[0]
+    pose = _visited(scene, given, _linkage(read), 1)[0]
     rate = float(exact(read.haptics.rate))
     late = {"motors": ("controller.F_motor",), "handle": ("haptic_device.x", "haptic_device.v")}
     late["mechanism"] = ("virtual_mechanism.x", "virtual_mechanism.v")

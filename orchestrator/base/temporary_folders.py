@@ -32,11 +32,9 @@ def new() -> str:
 @contextmanager
 def room() -> Iterator[Path]:
     """A temporary folder that exists within the context."""
-    path = new()
-    try:
-        yield Path(path)
-    finally:
-        shutil.rmtree(path, ignore_errors=True)
+    with room_if_needed() as path:
+        path.mkdir(mode=0o700)
+        yield path
 
 
 @contextmanager

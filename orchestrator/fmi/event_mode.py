@@ -63,7 +63,7 @@ class InProcessWithEvents(InProcess3):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.has_events = True
+        self.in_c = False
         self.restored = 0
         """How often its state was restored."""
         self._cuts = varies_step(self.description)
@@ -75,8 +75,9 @@ class InProcessWithEvents(InProcess3):
         self._saved_pending: dict[int, Pending] = {}
 
     @property
-    def in_c(self) -> bool:
-        return not self.has_events
+    def has_events(self) -> bool:
+        """Whether its events are handled here, by Python."""
+        return not self.in_c
 
     def _instantiate(self) -> Any:
         """One whose library refuses what its modelDescription.xml declares handles its events
@@ -86,7 +87,7 @@ class InProcessWithEvents(InProcess3):
         except Exception:  # FMPy raises bare Exception, which comes again where this was not it
             if self._clocks:
                 raise
-        self.has_events = False
+        self.in_c = True
         slave = super()._instantiate()
         warning = "%s declares event mode (hasEventMode) and refuses it: it handles its own events"
         logging.getLogger(__name__).warning(warning, self.name)

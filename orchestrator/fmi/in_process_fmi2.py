@@ -51,11 +51,6 @@ class InProcess(WithStates):
 
     _library: Callable[..., Any] = fmi2.FMU2Slave
 
-    @property
-    def in_c(self) -> bool:
-        """Whether the compiled loop may call its functions itself."""
-        return True
-
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.retry: Retry | None = None

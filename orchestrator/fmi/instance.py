@@ -33,6 +33,9 @@ class Instance(ABC):
     row is written.
     """
 
+    in_c: bool = True
+    """Whether its functions may be called by the compiled loop, where they are in this process."""
+
     def __init__(
         self,
         name: str,

@@ -99,10 +99,8 @@ def _push_on(system: System, event: Event, group: list[Fmu]) -> Iterator[Operati
 
 def _step(system: System, event: Event, fmu: Fmu, loop: list[Connection]) -> Iterator[Operation]:
     """The step of a plant; each substep uses mean and first moment of the inputs from `loop`."""
-    parts, dticks = (
-        system.coupling.substeps.get(fmu.name, 1),
-        operation_sequences.dticks(event, fmu),
-    )
+    parts = system.coupling.substeps.get(fmu.name, 1)
+    dticks = operation_sequences.dticks(event, fmu)
     inside = {c.name for c in loop}
     for part in range(parts):
         for operation in operation_sequences.feed(system, event, fmu, part):

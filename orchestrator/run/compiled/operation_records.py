@@ -236,9 +236,7 @@ class Machine:
                 return "the FMU runs in a process of its own"
             case Get(fmu) | Set(fmu) | Step(fmu) if fmu in simulation.isolated:
                 return "the FMU runs in a process of its own"
-            case Get(fmu) | Set(fmu) | Step(fmu) if not getattr(
-                simulation.instances[fmu], "in_c", True
-            ):
+            case Get(fmu) | Set(fmu) | Step(fmu) if not simulation.instances[fmu].in_c:
                 return "the FMU has event mode"
         return "Python repeats steps, whose operations are in C"
 
@@ -252,7 +250,7 @@ class Machine:
 
     def _fmu(self, name: str) -> int | None:
         instance = self._simulation.instances[name]
-        if not isinstance(instance, InProcess) or not instance.in_c:
+        if not (isinstance(instance, InProcess) and instance.in_c):
             return None
         check = self._simulation.step_checks.get(name)
         return self._index(

@@ -152,3 +152,12 @@ def test_costs_are_those_of_changed_scenes_and_their_limit_that_of_runs() -> Non
     for delays, rests in (({}, False), ({"controller.F_motor": T}, True)):
         run = hl.run("closed-loop", given | {"delays": delays}, figures=False)
         assert (np.abs(run["haptic_device.v"][-200:]).max() < 1e-4) == rests
+
+
+def test_a_run_that_fails_is_said(caplog: pytest.LogCaptureFixture) -> None:
+    """A coupling of 1 MN/m throws the body off within .1 s; as shipped nothing is said."""
+    stiff = "controller.teleoperation.stiffness=[1e6, 1e6, 1e3]"
+    for options, said in (((stiff,), 1), ((), 0)):
+        caplog.clear()
+        assert transparency.transparency("single-body", options, count=1)
+        assert caplog.text.count("the scene's own run fails: virtual_mechanism: output ") == said
