@@ -20,6 +20,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.sparse import block_diag, csr_array, hstack
 
 from hapticlink.analysis.fit.estimate import FROM_ZERO, Estimate, standard_deviations
 from hapticlink.analysis.fit.log import Log
@@ -98,20 +99,19 @@ class _Shooting:
             p[entries.index(name)] = theta[i]
         after = component.step(state, u, p, 0.0, log.period)
         angles = pantograph.base_angles(pose, values) / device.encoder_resolution
-        self._counts = ca.Function("counts", [pose], [angles])
+        counts = ca.Function("counts", [pose], [angles, ca.jacobian(angles, pose)])
         step = ca.Function("step", [state, u, theta], [after])
-        s, U, at = ca.MX.sym("s", 6), ca.MX.sym("U", 6, n), ca.MX.sym("theta", len(names))
-        path = step.mapaccum(n)(s, U, ca.repmat(at, 1, n))
-        path = ca.vec(self._counts.map(n)(path[:3, :]))
-        both = ca.vertcat(at, s)
-        self._path = ca.Function("path", [at, s, U], [path])
-        self._slopes = ca.Function("slopes", [at, s, U], [ca.jacobian(path, both)])
+        slopes = [ca.jacobian(after, state), ca.jacobian(after, theta)]
+        samples = n * len(self._windows)
+        self._path = step.mapaccum(n).map(len(self._windows))
+        self._counts = counts.map(samples)
+        self._slopes = ca.Function("slopes", [state, u, theta], slopes).map(samples)
         hand = np.zeros_like(log.pose) if log.hand is None else log.hand
         # The motors hold their wrench from sample to sample, a hand of flesh does not.
         assert log.motors is not None
         acts = hand[:-1] if log.held else (hand[:-1] + hand[1:]) / 2
-        self._inputs = np.hstack([log.motors[:-1], acts])
-        self._measured = np.asarray(self._counts.map(len(log.pose))(log.pose.T)).T
+        self._inputs = np.hstack([log.motors[:-1], acts])[:samples].T
+        self._measured = np.asarray(self._counts(log.pose[1 : samples + 1].T)[0]).T
 
     def first_states(self) -> Matrix:
         """Poses and velocities at the begin of the windows, (windows, 6), as measured."""
@@ -127,20 +127,35 @@ class _Shooting:
 
     def errors(self, theta: Vector, states: Matrix) -> Vector:
         """All errors (counts), window by window."""
-        return np.concatenate(
-            [
-                np.asarray(self._path(theta, s, self._inputs[begin:end].T)).ravel()
-                - self._measured[begin + 1 : end + 1].ravel()
-                for s, (begin, end) in zip(states, self._windows, strict=True)
-            ]
+        counts, _ = self._counts(self._after(theta, states)[:3])
+        return (np.asarray(counts).T - self._measured).ravel()
+
+    def slopes(self, theta: Vector, states: Matrix, scale: Vector) -> csr_array:
+        """By theta over its scale, then by all states: S_k+1 = A_k S_k + B_k from the identity on,
+        with A and B those of one step."""
+        m, n, windows = len(theta), self._n, len(states)
+        after = self._after(theta, states)
+        earlier = after.reshape(6, windows, n)[:, :, :-1]
+        before = np.concatenate([states.T[:, :, None], earlier], axis=2).reshape(6, -1)
+        all_theta = np.repeat(theta[:, None], n * windows, axis=1)
+        by_state, by_theta = (
+            np.asarray(slopes).reshape(6, windows, n, -1).transpose(2, 1, 0, 3)
+            for slopes in self._slopes(before, self._inputs, all_theta)
+        )
+        S = np.tile(np.hstack([np.zeros((6, m)), np.eye(6)]), (windows, 1, 1))
+        along = np.empty((windows, n, 3, m + 6))
+        for k in range(n):
+            S = by_state[k] @ S
+            S[:, :, :m] += by_theta[k]
+            along[:, k] = S[:, :3]
+        by_pose = np.asarray(self._counts(after[:3])[1])
+        by_pose = by_pose.reshape(4, windows, n, 3).transpose(1, 2, 0, 3)
+        parts = (by_pose @ along).reshape(windows, 4 * n, m + 6)
+        return csr_array(
+            hstack([parts[:, :, :m].reshape(-1, m) * scale, block_diag(parts[:, :, m:])])
         )
 
-    def slopes(self, theta: Vector, states: Matrix, scale: Vector) -> Matrix:
-        """By theta over its scale, then by all states."""
-        m, rows = len(theta), 4 * self._n
-        J = np.zeros((rows * len(states), m + states.size))
-        for w, (s, (begin, end)) in enumerate(zip(states, self._windows, strict=True)):
-            part = np.asarray(self._slopes(theta, s, self._inputs[begin:end].T))
-            J[w * rows : (w + 1) * rows, :m] = part[:, :m] * scale
-            J[w * rows : (w + 1) * rows, m + 6 * w : m + 6 * (w + 1)] = part[:, m:]
-        return J
+    def _after(self, theta: Vector, states: Matrix) -> Matrix:
+        """The states after each step, (6, windows * n)."""
+        each = np.repeat(theta[:, None], self._inputs.shape[1], axis=1)
+        return np.asarray(self._path(states.T, self._inputs, each))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.results.numbers import short
@@ -48,18 +49,22 @@ class Estimate:
         }
 
 
-def standard_deviations(J: Matrix, residuals: Vector, blocks: int, common: int) -> Vector:
+def standard_deviations(
+    J: Matrix | csr_array, residuals: Vector, blocks: int, common: int
+) -> Vector:
     """Standard deviations of least-squares estimates whose residuals are correlated within, but not
     between blocks of successive rows (Liang, Zeger, Biometrika 73 (1986), 13):
 
         cov = (J'J)^-1 [sum over blocks of J_b' r_b r_b' J_b] (J'J)^-1
 
-    J (n, p) and residuals (n,) at the estimate; `common` of the parameters act on all blocks.
-    Infinite where J'J is singular.
+    J (n, p), dense or sparse, and residuals (n,) at the estimate; `common` of the parameters act on
+    all blocks. Infinite where J'J is singular.
     """
-    inverse = np.linalg.pinv(J.T @ J)
-    rows = zip(np.array_split(J, blocks), np.array_split(residuals, blocks), strict=True)
-    scores = np.array([part.T @ r for part, r in rows])
+    J = csr_array(J)
+    normal = (J.T @ J).toarray()
+    inverse = np.linalg.pinv(normal)
+    rows = np.array_split(np.arange(len(residuals)), blocks)
+    scores = np.array([J[part].T @ residuals[part] for part in rows])
     covariance = inverse @ (scores.T @ scores) @ inverse * blocks / (blocks - common)
-    undetermined = np.diag(inverse @ (J.T @ J)) < 0.5
+    undetermined = np.diag(inverse @ normal) < 0.5
     return np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
