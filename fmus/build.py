@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fmpy import read_model_description
-from fmpy.model_description import ValidationError
-from fmpy.validation import validate_fmu
-
 from hapticlink.components.component import Component
-from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.python_fmu import entries, require_platform
-from hapticlink.fmus.reproducible_zip import write
+from hapticlink.fmus.write_fmu import write_fmu
 
 
 def build(
@@ -32,7 +25,8 @@ def build(
     FmuError with the findings, and UnsupportedPlatform where pythonfmu has no binary.
     """
     require_platform()
-    return _publish(component, entries(component, stop_time=stop_time, step_size=step_size), folder)
+    files = entries(component, stop_time=stop_time, step_size=step_size)
+    return write_fmu(files, folder, component.name)
 
 
 def build_engine(
@@ -49,7 +43,7 @@ def build_engine(
 
     require_platform()
     files = mujoco_fmu.entries(component, settings, stop_time=stop_time, step_size=step_size)
-    return _publish(component, files, folder)
+    return write_fmu(files, folder, component.name)
 
 
 def build_native(
@@ -77,36 +71,4 @@ def build_native(
         step_size=step_size,
         platforms=tuple(platforms) or (host_platform(),),
     )
-    return _publish(component, files, folder)
-
-
-def _publish(component: Component, files: Mapping[str, bytes], folder: Path | str) -> Path:
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    target = folder / f"{component.name}.fmu"
-    with atomic_file(target) as unfinished:
-        with unfinished.open("xb") as file:
-            write(files, file)
-        findings = _findings(component, str(unfinished))
-        if findings:
-            raise FmuError(f"`{component.name}` fails validation:\n  " + "\n  ".join(findings))
-    return target
-
-
-_PLAIN = re.compile(
-    r"(?!der\()[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.A
-)
-"""Names that the grammar of FMI 2.0.5 section 2.2.9 allows, without quotes or derivatives."""
-
-
-def _findings(component: Component, path: str) -> list[str]:
-    """The findings of FMPy's validation. Its parser of names takes 1 ms for each (N = 40: 2 s of
-    11), and is left out if all names are plain."""
-    variables = (*component.inputs, *component.parameters, *component.outputs)
-    if not all(_PLAIN.fullmatch(name) for v in variables for name in v.names):
-        return validate_fmu(path)
-    try:
-        read_model_description(path, validate=True, validate_model_structure=True)
-    except ValidationError as error:
-        return list(error.problems)
-    return []
+    return write_fmu(files, folder, component.name)

@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from fmpy.validation import validate_fmu
-
 from hapticlink.components.component import Component
 from hapticlink.fmus import cache
 from hapticlink.fmus.atomic_file import atomic_file
@@ -26,7 +24,8 @@ from hapticlink.fmus.native.compiler import (
     compiler_version,
     host_platform,
 )
-from hapticlink.fmus.reproducible_zip import digest, write
+from hapticlink.fmus.reproducible_zip import digest
+from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE
@@ -175,10 +174,4 @@ def _built(
             path.write_bytes(files[entry])
         texts = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
         entries |= binaries(texts, identifier, room, platforms, OPTIONS)
-    target = folder / f"{identifier}.fmu"
-    with atomic_file(target) as unfinished:
-        with unfinished.open("xb") as file:
-            write(entries, file)
-        if findings := validate_fmu(str(unfinished)):
-            raise FmuError(f"`{identifier}` fails validation:\n  " + "\n  ".join(findings))
-    return target
+    return write_fmu(entries, folder, identifier)

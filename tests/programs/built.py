@@ -13,9 +13,8 @@ from pathlib import Path
 
 import pytest
 from fmpy import platform, platform_tuple, sharedLibraryExtension
-from fmpy.validation import validate_fmu
 
-from hapticlink.fmus.reproducible_zip import write
+from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator import open_scene
 from hapticlink.programs.build import OPTIONS, program_files
 
@@ -43,11 +42,7 @@ def program(
     library = compiled({n.removeprefix("sources/"): files[n] for n in sources})
     place = platform if fmi == 2 else platform_tuple
     whole = {**files, f"binaries/{place}/program{sharedLibraryExtension}": library}
-    path = Path(tempfile.mkdtemp(dir=_folder())) / "program.fmu"
-    with path.open("xb") as file:
-        write(whole, file)
-    assert validate_fmu(str(path)) == []
-    return path
+    return write_fmu(whole, tempfile.mkdtemp(dir=_folder()), "program")
 
 
 def compiled(sources: dict[str, bytes], flags: Sequence[str] = FLAGS) -> bytes:
