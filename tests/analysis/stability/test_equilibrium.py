@@ -32,6 +32,7 @@ SERIAL = held("arm", 161.7, 18.0, 0.08416, 0.05309, -1.0502, turn=1.0)
         ("serial", SERIAL | {"controller.teleoperation.damping": [70.0, 70.0, 0.1]}),
     ],
 )
+@pytest.mark.usefixtures("no_margins")
 def test_it_is_the_one_at_which_the_run_rests(scene: str | Path, options: dict[str, Any]) -> None:
     """Newton's method from the start of these scenes ends at others, which are unstable."""
     found = hl.equilibrium_stability(scene, options)

@@ -154,6 +154,7 @@ def test_what_cannot_be_held_is_refused() -> None:
         hl.equilibrium_stability("closed-loop", bounds=0.2)  # type: ignore[arg-type]
 
 
+@pytest.mark.usefixtures("no_margins")
 def test_rates_that_hardly_repeat_are_judged_with_frames_of_whole_periods() -> None:
     """29.97 Hz at 512 Hz: 17 periods, 30.118 Hz, instead of a period of 100 s."""
     odd = hl.stability("closed-loop", {"graphics.rate": 29.97}, poses=1)

@@ -259,7 +259,7 @@ def test_slopes_of_operations_have_the_radius_of_the_whole_map() -> None:
     """A judgement takes the slopes of single operations; the whole map, by differences along all of
     its columns, has the same spectral radius."""
     pose = poses(recorded("closed-loop"))[0]
-    given = pose.options(("sensing=encoders", "graphics.rate=32"))
+    given = pose.options(("sensing=encoders", "graphics.rate=128"))
     with resting("closed-loop", given) as place:
         for scale in (0.1, 1.0, 3.0):
             period = place.period(dict.fromkeys(("drift", "topology"), scale))
