@@ -12,42 +12,47 @@ from hapticlink.orchestrator.open_scene import load
 from hapticlink.orchestrator.scene.blocks import blocks
 from tests.fmus import sample_components
 
-
-def components(scene, *options):
-    read = load(scene, options)
-    return {block.name: component(block.block, block.settings) for block in blocks(read).built}
-
-
 PULLED = ("closed-loop", "graphics.sync=operational")
-EVERY = [
-    *((f"{scene} {name}", made)
-      for scene in (("closed-loop",), PULLED, ("local-model",), ("obstacles",), ("virtual-wall",))
-      for name, made in components(*scene).items()),
-    *((c.name, c) for c in sample_components.EVERY),
-]  # fmt: skip
+SCENES = (("closed-loop",), PULLED, ("local-model",), ("obstacles",), ("virtual-wall",))
+
+
+def planned(scene, *options):
+    return {block.name: block for block in blocks(load(scene, options)).built}
+
+
+def made(scene, name):
+    """The component of a block of a scene, its name and options."""
+    block = planned(*scene)[name]
+    return component(block.block, block.settings)
+
+
+EVERY = [(scene, name) for scene in SCENES for name in planned(*scene)]
+EVERY += [(None, c.name) for c in sample_components.EVERY]
+SAMPLES = {c.name: c for c in sample_components.EVERY}
 
 
 def column(values):
     return np.asarray(values, dtype=float).ravel()
 
 
-@pytest.mark.parametrize(("name", "made"), EVERY, ids=[name for name, _ in EVERY])
-def test_one_pass_gives_the_bits_of_step_and_output(name, made):
+@pytest.mark.parametrize(("scene", "name"), EVERY)
+def test_one_pass_gives_the_bits_of_step_and_output(scene, name):
     """Two steps in turn, of inputs that differ between them, and what the first hands on."""
-    parts, draw = one_pass(made), np.random.default_rng(1)
-    p = np.array(made.start_parameters)
-    u = [np.array(made.start_inputs) + 1e-3 * draw.standard_normal(len(made.start_inputs))
+    block = made(scene, name) if scene else SAMPLES[name]
+    parts, draw = one_pass(block), np.random.default_rng(1)
+    p = np.array(block.start_parameters)
+    u = [np.array(block.start_inputs) + 1e-3 * draw.standard_normal(len(block.start_inputs))
          for _ in range(2)]  # fmt: skip
-    x, t, h = column(made.initialize(u[0], p)), 0.3, 0.002
+    x, t, h = column(block.initialize(u[0], p)), 0.3, 0.002
     x = x + 1e-4 * draw.standard_normal(x.size)
     z = parts.output(x, u[0], p, t)[1]
     for k in range(2):
         end = t + h
         got = [column(part) for part in parts.advance(x, u[k], p, t, h, end, z)]
-        after = column(made.step(x, u[k], p, t, h))
-        at = (x, u[k], p, t) if made.timing == "sampled" else (after, u[k], p, end)
+        after = column(block.step(x, u[k], p, t, h))
+        at = (x, u[k], p, t) if block.timing == "sampled" else (after, u[k], p, end)
         np.testing.assert_array_equal(got[0], after)
-        np.testing.assert_array_equal(got[1], column(made.output(*at)))
+        np.testing.assert_array_equal(got[1], column(block.output(*at)))
         np.testing.assert_array_equal(got[2], column(parts.output(after, u[k], p, end)[1]))
         x, t, z = got[0], end, got[2]
 
@@ -78,9 +83,9 @@ def test_nothing_is_simplified_across_the_two():
 )
 def test_operations_saved(scene, name, share):
     """Loads and stores of the values that are handed on do not count as operations."""
-    made = components(*scene)[name]
-    parts = one_pass(made)
-    apart = made.step.n_instructions() + made.output.n_instructions()
+    block = made(scene, name)
+    parts = one_pass(block)
+    apart = block.step.n_instructions() + block.output.n_instructions()
     assert parts.advance.n_instructions() - 2 * parts.n_shared < share * apart
 
 
@@ -88,7 +93,7 @@ def test_exact_copy_takes_a_fifteenth_of_the_operations_of_a_pulled_one():
     """20 substeps of 1,679 operations, with outputs after the last, against 2,321."""
 
     def operations(*scene):
-        parts = one_pass(components(*scene)["virtual_environment"])
+        parts = one_pass(made(scene, "virtual_environment"))
         before = (parts.substeps - 1) * parts.substep.n_instructions()
         return before + parts.advance.n_instructions()
 
@@ -97,8 +102,8 @@ def test_exact_copy_takes_a_fifteenth_of_the_operations_of_a_pulled_one():
 
 def test_a_pulled_copy_counts_its_constrained_directions_once_a_frame():
     """The substeps before the last move it; the count is of eigenvalues of Lambda^-1."""
-    made = components(*PULLED)["virtual_environment"]
-    assert made.substep.n_instructions() < 0.6 * made.step.n_instructions()
-    arguments = made.substep.sx_in()
-    after, before = made.substep(*arguments)[-1], arguments[0][-1]
+    block = made(PULLED, "virtual_environment")
+    assert block.substep.n_instructions() < 0.6 * block.step.n_instructions()
+    arguments = block.substep.sx_in()
+    after, before = block.substep(*arguments)[-1], arguments[0][-1]
     assert ca.is_equal(after, before)

@@ -14,7 +14,7 @@ from hapticlink.components.contact.broad_phase import near, out_of_reach, reach
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
-from tests.blocks import Running, running, virtual_environment
+from tests.blocks import Running, once, running, virtual_environment
 from tests.components import appendix_a
 from tests.components.appendix_a import L
 from tests.mechanisms import five_bar, one_body
@@ -31,9 +31,15 @@ def loose(capsule, start=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0), center=None, gra
 
 
 BAR, POINT = ((0.0, 0.0), (LENGTH, 0.0)), ((0.0, 0.0),)
-DISC = running(loose(BAR), {"disc": (Disc(center=(0.3, 0.2), radius=0.1),)})
-POLYGON = running(loose(BAR), {"polygon": (Polygon(corners=SQUARE),)})
-WALLS = running(loose(BAR), {"enclosure": SQUARE[::-1]})
+DISC = {"disc": (Disc(center=(0.3, 0.2), radius=0.1),)}
+POLYGON = {"polygon": (Polygon(corners=SQUARE),)}
+WALLS = {"enclosure": SQUARE[::-1]}
+
+
+@once
+def among(contacts, capsule=BAR):
+    """A capsule among these, which a test puts somewhere."""
+    return running(loose(capsule), contacts)
 
 
 def points(pose):
@@ -66,10 +72,11 @@ def nearest(distance):
 @given(poses)
 @example((0.25, 0.2, 0.0))  # through the centre
 def test_gap_of_disc_and_capsule(pose):
-    DISC.put(q=pose)
+    bar = among(DISC)
+    bar.put(q=pose)
     at = points(pose)
     exact = nearest(lambda s: np.linalg.norm(at(s) - (0.3, 0.2))) - R - 0.1
-    assert DISC.y["contact_gap"] == pytest.approx(exact, abs=1e-8)
+    assert bar.y["contact_gap"] == pytest.approx(exact, abs=1e-8)
 
 
 @given(poses)
@@ -83,17 +90,19 @@ def test_gap_of_polygon_and_capsule(pose):
         return min(to_segment(at(s), *edge) for edge in edges)
 
     exact = nearest(distance)
-    POLYGON.put(q=pose)
+    bar = among(POLYGON)
+    bar.put(q=pose)
     if exact > 1e-6:  # the capsule's axis stays outside
-        assert POLYGON.y["contact_gap"] == pytest.approx(exact - R, abs=1e-7)
+        assert bar.y["contact_gap"] == pytest.approx(exact - R, abs=1e-7)
 
 
 @given(poses)
 def test_gap_to_the_walls_of_an_enclosure(pose):
     at = points(pose)
-    WALLS.put(q=pose)
+    bar = among(WALLS)
+    bar.put(q=pose)
     exact = min(-max(plane_distances(at(s))) for s in (0, 1)) - R
-    assert WALLS.y["contact_gap"] == pytest.approx(exact, abs=1e-12)
+    assert bar.y["contact_gap"] == pytest.approx(exact, abs=1e-12)
 
 
 FLOOR = {"enclosure": ((-5.0, 0.0), (5.0, 0.0), (5.0, 5.0), (-5.0, 5.0))}
@@ -129,15 +138,13 @@ def test_a_damped_bounce_never_gains_energy_and_comes_to_rest_on_its_spring():
     assert ball.y["F_env"] == pytest.approx([0, 2.0 * 9.81, 0], abs=1e-2)
 
 
-BALL = running(loose(POINT), FLOOR)
-
-
 @given(st.floats(-0.3, 0.05), st.floats(-2, 2))
 def test_contacts_push_and_never_pull(height, speed):
-    BALL.put(q=(0.0, R + height, 0.0), qd=(0.0, speed, 0.0))
+    ball = among(FLOOR, POINT)
+    ball.put(q=(0.0, R + height, 0.0), qd=(0.0, speed, 0.0))
     height = (R + height) - R  # as rounded
     exact = max(0.0, -15000 * height - 300 * speed) if height < 0 else 0.0
-    np.testing.assert_allclose(BALL.y["qdd"], (0, exact / 2.0, 0), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(ball.y["qdd"], (0, exact / 2.0, 0), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("omega", [-1.0, 0.02, 1.0])

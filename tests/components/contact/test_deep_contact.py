@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
-from tests.blocks import Running, running, virtual_environment
+from tests.blocks import Running, once, running, virtual_environment
 from tests.mechanisms import one_body
 
 R, LENGTH, MASS, INERTIA = 0.05, 0.4, 2.0, 0.03
@@ -17,6 +17,7 @@ SQUARE = ((0.1, -0.3), (0.7, -0.1), (0.5, 0.5), (0.0, 0.3))
 SPIKE = ((-0.06, -0.3), (0.06, -0.3), (0.02, 0.0))
 
 
+@once
 def loose(corners, **law):
     """A free bar by a polygon."""
     shape = ((0.0, 0.0), (LENGTH, 0.0))
@@ -24,9 +25,6 @@ def loose(corners, **law):
     bar = Body(name="bar", mass=MASS, inertia=INERTIA, center=middle, radius=R, capsule=shape)
     contacts = {"polygon": (Polygon(corners=corners),), "damping": 0.0} | law
     return running(one_body(bar, type="free"), contacts)
-
-
-BY_SQUARE, BY_SPIKE = loose(SQUARE), loose(SPIKE)
 
 
 def farthest_axis(corners, ends):
@@ -46,9 +44,10 @@ def farthest_axis(corners, ends):
 def test_an_axis_inside_is_pushed_out_by_no_more_than_the_way_out(x, y, angle):
     along = np.array([math.cos(angle), math.sin(angle)])
     way = farthest_axis(SQUARE, (np.array([x, y]), np.array([x, y]) + LENGTH * along))
-    BY_SQUARE.put(q=(x, y, angle))
+    bar = loose(SQUARE)
+    bar.put(q=(x, y, angle))
     if way < -1e-9:
-        assert way - R - 1e-12 <= BY_SQUARE.y["contact_gap"] <= -R
+        assert way - R - 1e-12 <= bar.y["contact_gap"] <= -R
 
 
 @given(st.floats(0.3, 0.7), st.floats(-0.4, 0.4), st.floats(-0.08, 0.06))
@@ -56,11 +55,12 @@ def test_a_corner_pushes_out_a_bar_that_sank_in_past_its_axis(share, angle, heig
     """Both sides of the axis on the corner: F = k (r - height) along the bar's normal."""
     along, normal = (math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))
     start = np.array(SPIKE[2]) + height * np.array(normal) - share * LENGTH * np.array(along)
-    BY_SPIKE.put(q=(*start, angle))
+    bar = loose(SPIKE)
+    bar.put(q=(*start, angle))
     push = 15000.0 * max(0.0, R - height)
     exact = (*(push * np.array(normal) / MASS), push * share * LENGTH / INERTIA)
-    assert BY_SPIKE.y["contact_gap"] == pytest.approx(height - R, abs=1e-12)
-    np.testing.assert_allclose(BY_SPIKE.y["qdd"], exact, rtol=1e-9, atol=1e-8)
+    assert bar.y["contact_gap"] == pytest.approx(height - R, abs=1e-12)
+    np.testing.assert_allclose(bar.y["qdd"], exact, rtol=1e-9, atol=1e-8)
 
 
 def dropped(obstacle, detection, speed):
