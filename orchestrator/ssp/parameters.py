@@ -1,4 +1,4 @@
-"""Parameter values of an SSP as start values of its FMUs (SSP 1.0, sections 5.3.3, 6 and 7).
+"""Parameter values of an SSP as start values of its FMUs (SSP 2.0, sections 5.3.3, 6 and 7).
 
 A binding applies a parameter set to an element, by the names in the set with its `prefix`, or by
 the names of its mapping if it has one. In a system, `connector` is its own connector, and
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import logging
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import unquote
@@ -21,22 +21,24 @@ from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.base.terminal_output import printable
 from hapticlink.orchestrator.fmi.archive import read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
+from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp.connections import Reach, Wires
-from hapticlink.orchestrator.ssp.names import SSD, SSM, SSV
+from hapticlink.orchestrator.ssp.names import SSC, SSD, SSM, SSV
 from hapticlink.orchestrator.ssp.tree import (
     Part,
     Place,
     checked,
     converts,
     dotted,
+    indices,
     transformation,
     units,
 )
 
 Value = bool | int | float | str
 READ: dict[str, Callable[[str], Value]] = {
-    "Real": float,
-    "Integer": int,
+    **dict.fromkeys(("Real", "Float64", "Float32"), float),
+    **dict.fromkeys(("Integer", *(f"{u}Int{n}" for u in ("", "U") for n in (8, 16, 32, 64))), int),
     "Boolean": lambda text: text in ("true", "1"),
     "String": str,
     "Binary": str,
@@ -98,7 +100,7 @@ class Parameters:
             mapping = binding.find(f"{{{SSD}}}ParameterMapping")
             if mapping is not None:
                 entries = self._content(mapping, where, "ParameterMapping", SSM)
-                given = [*self._mapped(entries, {g.name: g for g in given}, part)]
+                given = [*self._mapped(entries, given, part)]
             yield from given
 
     def _content(self, element: Element, where: str, kind: str, space: str) -> Element:
@@ -125,12 +127,25 @@ class Parameters:
         for parameter in set_.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
             name, value = f"{prefix}{parameter.get('name')}", parameter[0]
             kind, unit = value.tag.removeprefix(f"{{{SSV}}}"), value.get("unit")
-            if kind not in READ:
-                raise InputFault(f"{self.path}: parameter {name}: type {kind} is not read")
             of = known.get(unit, Unit(unit)) if unit else None
-            yield Given(name, READ[kind](value.get("value", "")), of)
+            given = [v.get("value", "") for v in value.iterfind(f"{{{SSV}}}Value")]
+            sizes = [d.get("size") for d in parameter.iterfind(f"{{{SSC}}}Dimension")]
+            given = given or value.get("value", "").split(None if sizes else "\0")
+            entries = indices([int(n or len(given)) for n in sizes])
+            try:
+                for entry, text in zip(entries, given, strict=True):
+                    yield Given(name + entry, READ[kind](text), of)
+            except ValueError as error:  # also of a list for a scalar
+                what = f"{len(given)} values for {len(entries)} entries, {error}"
+                raise InputFault(f"{self.path}: parameter {name}: {what}") from None
 
-    def _mapped(self, mapping: Element, given: Mapping[str, Given], part: Part) -> Iterator[Given]:
+    def _mapped(self, mapping: Element, values: Iterable[Given], part: Part) -> Iterator[Given]:
+        """The values of the set under the names that they are mapped to, those of an array entry by
+        entry."""
+        given: dict[str, list[Given]] = {}
+        for value in values:
+            for name in {value.name, entry_of(value.name)[0]}:
+                given.setdefault(name, []).append(value)
         targets = set()
         for entry in mapping.iterfind(f"{{{SSM}}}MappingEntry"):
             source, target = entry.get("source", ""), entry.get("target", "")
@@ -140,9 +155,11 @@ class Parameters:
             targets.add(target)
             if source not in given:
                 self.unused.append(dotted(part.place, source))
-            else:
-                linear = transformation(self.path, f"the mapping of {source}", entry)
-                yield replace(given[source], name=target, linear=linear, convert=converts(entry))
+                continue
+            linear = transformation(self.path, f"the mapping of {source}", entry)
+            for value in given[source]:
+                name = target + value.name.removeprefix(source)
+                yield replace(value, name=name, linear=linear, convert=converts(entry))
 
     def _targets(self, part: Part, name: str) -> Iterator[Reach]:
         """The variables that `name` refers to in `part`."""

@@ -1,22 +1,25 @@
 """The elements of a SystemStructure.ssd as records: nested systems, components, connectors and
-connections (SSP 1.0, chapter 5). Unsupported elements are errors."""
+connections (SSP 2.0, chapter 5). Unsupported elements are errors."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from itertools import product
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element, fromstring
 
-from fmpy.ssp.ssd import validate_tree
 from lxml import etree
 
 from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
-from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD, SSP1
+from hapticlink.orchestrator.fmi.variables import MAX_NUMBERS
+from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD
 
 Place = tuple[str, ...]
 """The names of the elements from the root system, (), down to this one."""
@@ -26,10 +29,12 @@ Node = tuple[Place, str]
 
 @dataclass(frozen=True)
 class Connector:
-    """kind is "input", "output", "parameter" or "calculatedParameter"."""
+    """A connector, as it is written. sizes: of the dimensions of an array, None for one that is
+    left open; empty for a scalar."""
 
     kind: str
     unit: str | None
+    sizes: tuple[int | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,20 +72,22 @@ def dotted(place: Place, *names: str) -> str:
 
 
 def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
-    """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 1.0.
-
-    A file of version 2.0 in the namespaces of 1.0, as OMSimulator writes it, is read as 1.0.
-    """
+    """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 2.0, whose
+    elements and namespaces include those of 1.0."""
     try:
         root = etree.fromstring(text)
-        if root.get("version", "").startswith("2.") and str(root.tag).startswith(f"{{{SSP1}"):
-            root.set("version", "1.0")
-            text = etree.tostring(root)
-        validate_tree(root, f"{schema}.xsd")
-    except Exception as error:  # FMPy raises bare Exception
-        what = str(error).removeprefix("Failed to validate SystemStructure.ssd:").strip()
-        raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {what[:300]}") from error
+        if (version := root.get("version", "")).partition(".")[0] in ("1", "2"):
+            root.set("version", f"{version[0]}.0")  # also of 1.0.1 and drafts
+        _schema(schema).assertValid(root)
+    except (etree.LxmlError, ValueError) as error:
+        what = f"{path}: {entry} is no SSP 1.0 or 2.0 ({schema})"
+        raise InputFault(f"{what}: {str(error)[:300]}") from error
     return fromstring(text)
+
+
+@cache
+def _schema(name: str) -> etree.XMLSchema:
+    return etree.XMLSchema(file=str(Path(__file__).parent / "schema" / f"{name}.xsd"))
 
 
 def units(root: Element, space: str = SSD) -> dict[str, Unit]:
@@ -105,11 +112,11 @@ def tree(path: Path, element: Element, place: Place = ()) -> Part:
     }
     bindings = (*element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"),)
     if kind == "Component":
-        type_, how = element.get("type", FMU), element.get("implementation")
-        if type_ == FMU and how != "ModelExchange":
-            entry = unquote(element.get("source", "")).removeprefix("./")
-            return Part(place, connectors, bindings, entry)
-        kind += " for model exchange" if type_ == FMU else f" of type {type_}"
+        type_, how = element.get("type", FMU), element.get("implementation", "CoSimulation")
+        source = element.get("source")
+        if type_ == FMU and how == "CoSimulation" and source:
+            return Part(place, connectors, bindings, unquote(source).removeprefix("./"))
+        kind += f" of type {type_}" if type_ != FMU else f" for {how}" if source else " without FMU"
     if kind != "System":
         raise InputFault(
             f"{path}: {where} is a {kind}; supported are systems, and components that are FMUs for "
@@ -130,17 +137,31 @@ def tree(path: Path, element: Element, place: Place = ()) -> Part:
 
 
 def _connector(path: Path, place: Place, element: Element) -> Connector:
-    kind, real = element.get("kind", ""), element.find(f"{{{SSC}}}Real")
-    if kind == "inout":
-        name = dotted(place, element.get("name", ""))
-        raise InputFault(f"{path}: {name} is inout; give its kind as input or output")
-    return Connector(kind, real.get("unit") if real is not None else None)
+    kind, name = element.get("kind", ""), dotted(place, element.get("name", ""))
+    if kind in ("inout", "unspecified"):
+        raise InputFault(f"{path}: {name} is {kind}; give its kind as input or output")
+    unit = next((e.get("unit") for e in element if e.get("unit")), None)
+    sizes = (d.get("size") for d in element.iterfind(f"{{{SSC}}}Dimension"))
+    return Connector(kind, unit, tuple(int(size) if size else None for size in sizes))
+
+
+def indices(sizes: Sequence[int | None]) -> list[str]:
+    """The indices of all entries of an array row by row, as "[1,1]", "[1,2]" ...; [""] of a
+    scalar, [] where a size is left open. Raises InputFault for more than MAX_NUMBERS entries."""
+    if None in sizes:
+        return []
+    if math.prod(size or 0 for size in sizes) > MAX_NUMBERS:
+        raise InputFault(f"an array of the sizes {sizes}; at most {MAX_NUMBERS} entries")
+    every = product(*(range(1, 1 + (size or 0)) for size in sizes))
+    return [f"[{','.join(map(str, entry))}]" if entry else "" for entry in every]
 
 
 def _line(path: Path, place: Place, element: Element) -> Line:
     def node(end: str) -> Node:
-        inside = element.get(f"{end}Element")
-        return (*place, inside) if inside else place, element.get(f"{end}Connector", "")
+        inside, name = element.get(f"{end}Element"), element.get(f"{end}Connector", "")
+        if indices := element.get(f"{end}Indices", "").split():  # from 1, by its authors' examples
+            name += f"[{','.join(indices)}]"
+        return (*place, inside) if inside else place, name
 
     ends = (node("start"), node("end"))
     names = " and ".join(dotted(*end) for end in ends)

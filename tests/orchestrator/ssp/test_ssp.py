@@ -117,13 +117,6 @@ def test_a_foreign_ssp_runs_at_the_rate_that_is_asked_for(tmp_path):
     assert len(ended.results.haptics["a_b.y"]) == 11
 
 
-def test_version_2_in_the_namespaces_of_1_is_read(tmp_path):
-    """As OMSimulator writes it."""
-    path = foreign(tmp_path, 'version="1.0" name', 'version="2.0" name')
-    ended = simulate(path, tmp_path / "out", ["haptics.rate=50", "duration=0.2"])
-    np.testing.assert_allclose(ended.results.haptics["c.y"][-1], 2.0, rtol=1e-15)
-
-
 def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path):
     with pytest.raises(SceneFault) as refused:
         open_scene.load(foreign(tmp_path))

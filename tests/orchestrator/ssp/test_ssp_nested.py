@@ -156,7 +156,7 @@ REFERENCE = '<ssd:SignalDictionaryReference name="p" dictionary="d"/>'
         ('name="p" source', 'name="t" source', r"right has two elements named 't'"),
         (linear(-1, 0.25), TABLE, "BooleanMappingTransformation is not read"),
         ('source="resources/Plain', 'implementation="ModelExchange" source="resources/Plain',
-         r"right\.p is a Component for model exchange"),
+         r"right\.p is a Component for ModelExchange"),
         ('startTime="0.0"', 'startTime="1.0"', "starts at 1.0 s; runs start at 0"),
         ('kind="input"', 'kind="inout"', r"right\.u is inout"),
         (component("p", "Plain"), REFERENCE, r"right\.p is a SignalDictionaryReference"),
