@@ -51,7 +51,6 @@ class Wires:
     path: Path
     root: Part
     described: Mapping[Place, Description]
-    units: Mapping[str, Unit]
     rows: list[Row] = field(default_factory=list)
     reach: dict[Node, list[Reach]] = field(default_factory=dict)
 
@@ -192,8 +191,7 @@ class Wires:
         variable, connector = self.variables.get(node), self._connector(node)
         if variable and variable.unit is not None:
             return self.described[node[0]].unit(variable)
-        name = connector and connector.unit
-        return self.units.get(name, Unit(name)) if name else None
+        return connector.unit if connector else None
 
     def _unit_is_of_fmu(self, node: Node) -> bool:
         connector = self._connector(node)

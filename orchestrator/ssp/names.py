@@ -12,6 +12,8 @@ RUN = "urn:hapticlink:run"
 ANNOTATION = "hapticlink.run"
 STRUCTURE = "SystemStructure.ssd"
 FMU = "application/x-fmu-sharedlibrary"
+PACKAGE, DEFINITION = "application/x-ssp-package", "application/x-ssp-definition"
+"""The types of components: an FMU, an .ssp and an .ssd."""
 
 NOT_IN_ANNOTATION = frozenset(
     (

@@ -10,11 +10,9 @@ transformed.
 from __future__ import annotations
 
 import logging
-import zipfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from urllib.parse import unquote
 from xml.etree.ElementTree import Element, tostring
 
 from hapticlink.orchestrator.base.errors import SHOWN, InputFault
@@ -25,6 +23,7 @@ from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp.connections import Reach, Wires
 from hapticlink.orchestrator.ssp.names import SSC, SSD, SSM, SSV
 from hapticlink.orchestrator.ssp.tree import (
+    File,
     Part,
     Place,
     checked,
@@ -64,7 +63,6 @@ class Parameters:
     """Reads the parameter bindings of the elements of `wires`."""
 
     path: Path
-    archive: zipfile.ZipFile
     wires: Wires
     unused: list[str] = field(default_factory=list)
 
@@ -93,17 +91,19 @@ class Parameters:
         return starts
 
     def _given(self, part: Part) -> Iterator[Given]:
-        for binding in part.bindings:
+        for file, binding in part.bindings:
             where = f"parameters of {dotted(part.place)}"
-            set_ = self._content(binding, where, "ParameterSet", SSV)
-            given = [*self._values(set_, binding.get("prefix", ""))]
+            set_ = self._content(file, binding, where, "ParameterSet", SSV)
+            given = [
+                *self._values({**file.units, **units(set_, SSV)}, set_, binding.get("prefix", ""))
+            ]
             mapping = binding.find(f"{{{SSD}}}ParameterMapping")
             if mapping is not None:
-                entries = self._content(mapping, where, "ParameterMapping", SSM)
+                entries = self._content(file, mapping, where, "ParameterMapping", SSM)
                 given = [*self._mapped(entries, given, part)]
             yield from given
 
-    def _content(self, element: Element, where: str, kind: str, space: str) -> Element:
+    def _content(self, file: File, element: Element, where: str, kind: str, space: str) -> Element:
         """The parameter set or mapping inside `element`, or in the file that it names."""
         if element.get("type", SETS[0]) not in SETS:
             raise InputFault(f"{self.path}: {where}: type {element.get('type')} is not read")
@@ -114,16 +114,15 @@ class Parameters:
             )
         entry, schema = element.get("source"), f"SystemStructure{kind.replace('Set', 'Values')}"
         if entry:
-            entry = unquote(entry).removeprefix("./")
-            return checked(self.path, entry, read_xml(self.archive, entry), schema)
+            entry = file.resolved(entry)
+            return checked(file.path, entry, read_xml(file.archive, entry), schema)
         inside = next(element.iter(f"{{{space}}}{kind}"), None)
         if inside is None:
             raise InputFault(f"{self.path}: {where}: a {kind} has neither source nor content")
         inside.attrib.setdefault("version", "1.0")  # OMSimulator writes none in the .ssd
         return checked(self.path, where, tostring(inside), schema)
 
-    def _values(self, set_: Element, prefix: str) -> Iterator[Given]:
-        known = {**self.wires.units, **units(set_, SSV)}
+    def _values(self, known: Mapping[str, Unit], set_: Element, prefix: str) -> Iterator[Given]:
         for parameter in set_.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
             name, value = f"{prefix}{parameter.get('name')}", parameter[0]
             kind, unit = value.tag.removeprefix(f"{{{SSV}}}"), value.get("unit")

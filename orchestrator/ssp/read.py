@@ -13,9 +13,8 @@ import atexit
 import hashlib
 import re
 import shutil
-import zipfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -26,13 +25,13 @@ from hapticlink.fmus import cache
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.archive import opened
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.ssp import annotation
 from hapticlink.orchestrator.ssp.connections import Row, Wires
-from hapticlink.orchestrator.ssp.names import SSD, STRUCTURE
+from hapticlink.orchestrator.ssp.names import SSD
 from hapticlink.orchestrator.ssp.parameters import Parameters, Value
-from hapticlink.orchestrator.ssp.tree import Part, Place, checked, dotted, tree, units
+from hapticlink.orchestrator.ssp.tree import File, Part, Place, Tree, dotted
 
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
 
@@ -40,19 +39,14 @@ _ENTRY = re.compile(r"\[[\d, ]+\]$")
 def tables(path: Path) -> dict[str, Any]:
     """The tables of the SSP's scene; its FMUs are unpacked into the cache. Raises InputFault, with
     file and element, for what is malformed or not supported."""
-    with opened(path, "SSP") as archive:
-        text = read_xml(archive, STRUCTURE)
-        root = checked(path, STRUCTURE, text, "SystemStructureDescription")
-        element = root.find(f"{{{SSD}}}System")
-        assert element is not None  # required by the schema
-        system, defined = tree(path, element), units(root)
-        names = _names(part.place for part in system if part.source is not None)
-        with _room() as room:
-            described = _described(path, archive, system, room)
-        unconnected = Wires(path, _unconnected(system), described, defined)
-        described = _resized(described, Parameters(path, archive, unconnected).values())
-        wires = Wires(path, system, described, defined)
-        starts = Parameters(path, archive, wires).starts()
+    with opened(path, "SSP") as archive, _room() as room, ExitStack() as archives:
+        root, system = Tree(archives).root(File(path, archive))
+        names = _names(part.place for part in system if part.source)
+        described = _described(system, room)
+        unconnected = Wires(path, _unconnected(system), described)
+        described = _resized(described, Parameters(path, unconnected).values())
+        wires = Wires(path, system, described)
+        starts = Parameters(path, wires).starts()
     rest = annotation.read(path, root)
     tables: dict[str, Any] = {
         "title": root.get("description") or root.get("name") or path.stem,
@@ -121,18 +115,16 @@ def _names(places: Iterable[Place]) -> dict[Place, str]:
     return names
 
 
-def _described(
-    path: Path, archive: zipfile.ZipFile, system: Part, room: Path
-) -> dict[Place, Description]:
+def _described(system: Part, room: Path) -> dict[Place, Description]:
     """The FMU of each component; an entry that several of them have is read once."""
-    known: dict[str, Description] = {}
+    known: dict[tuple[Path, str], Description] = {}
     fmus = {}
     for part in system:
-        if part.source is None:
-            continue
-        if part.source not in known:
-            known[part.source] = describe(_unpacked(path, archive, part, part.source, room))
-        fmus[part.place] = known[part.source]
+        if part.source:
+            file, entry = part.source
+            if (file.path, entry) not in known:
+                known[file.path, entry] = describe(_unpacked(room, file, entry, part.place))
+            fmus[part.place] = known[file.path, entry]
     return fmus
 
 
@@ -153,23 +145,24 @@ def _resized(
     return fmus
 
 
-def _unpacked(path: Path, archive: zipfile.ZipFile, part: Part, source: str, room: Path) -> Path:
+def _unpacked(room: Path, file: File, source: str, place: Place) -> Path:
     """The FMU at an entry of the archive, in the cache, or in `room` where that is off."""
+    archive = file.archive
     if source not in archive.NameToInfo:
         held = ", ".join(n for n in archive.namelist() if n.endswith(".fmu")) or "none"
-        where = f"{path}: {dotted(part.place)}"
+        where = f"{file.path}: {dotted(place)}"
         raise InputFault(f"{where}: there is no {source!r} in it; FMUs in it: {held}")
-    name = re.sub(r"\W", "_", Path(source).stem)
-    file = f"{name[:100]}.fmu"
+    stem = re.sub(r"\W", "_", Path(source).stem)
+    name = f"{stem[:100]}.fmu"
     with archive.open(source) as content:
         digest = hashlib.file_digest(content, "sha256").hexdigest()  # type: ignore[arg-type]
 
     def unpack(folder: Path) -> Path:
-        with archive.open(source) as content, (folder / file).open("wb") as unpacked:
+        with archive.open(source) as content, (folder / name).open("wb") as unpacked:
             shutil.copyfileobj(content, unpacked)
-        return folder / file
+        return folder / name
 
-    return cache.cached({"ssp": digest, "file": file}, unpack, room)
+    return cache.cached({"ssp": digest, "file": name}, unpack, room)
 
 
 def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterator[Row]:

@@ -4,10 +4,14 @@ connections (SSP 2.0, chapter 5). Unsupported elements are errors."""
 from __future__ import annotations
 
 import math
+import posixpath
+import zipfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from functools import cache
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 from urllib.parse import unquote
@@ -17,14 +21,34 @@ from lxml import etree
 
 from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
 from hapticlink.orchestrator.fmi.variables import MAX_NUMBERS
-from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD
+from hapticlink.orchestrator.ssp.names import DEFINITION, FMU, PACKAGE, SSC, SSD, STRUCTURE
 
 Place = tuple[str, ...]
 """The names of the elements from the root system, (), down to this one."""
 Node = tuple[Place, str]
 """A connector or variable: its element, and its name there."""
+
+
+DEEPEST = 32
+"""Systems in systems in which a component may be a file with further ones."""
+
+
+@dataclass(frozen=True)
+class File:
+    """An .ssd, an entry of an archive, with the units that it defines. path: for errors, of the
+    archive, or of its place in another one."""
+
+    path: Path
+    archive: zipfile.ZipFile
+    entry: str = STRUCTURE
+    units: Mapping[str, Unit] = field(default_factory=dict)
+
+    def resolved(self, source: str) -> str:
+        """The entry of the archive that a relative URI refers to."""
+        return posixpath.normpath(posixpath.join(posixpath.dirname(self.entry), unquote(source)))
 
 
 @dataclass(frozen=True)
@@ -33,7 +57,7 @@ class Connector:
     left open; empty for a scalar."""
 
     kind: str
-    unit: str | None
+    unit: Unit | None
     sizes: tuple[int | None, ...] = ()
 
 
@@ -49,13 +73,14 @@ class Line:
 
 @dataclass(frozen=True)
 class Part:
-    """A component, with `source` its FMU's entry in the archive; or a system, with `parts` and with
-    `lines`, the connections between its own connectors and those of its parts."""
+    """A component, with `source` its FMU's file and entry; or a system, with `parts` and with
+    `lines`, the connections between its own connectors and those of its parts. bindings: its
+    parameter bindings, each with the file that it is in."""
 
     place: Place
     connectors: Mapping[str, Connector]
-    bindings: tuple[Element, ...]
-    source: str | None = None
+    bindings: tuple[tuple[File, Element], ...]
+    source: tuple[File, str] | None = None
     parts: tuple[Part, ...] = ()
     lines: tuple[Line, ...] = ()
 
@@ -102,47 +127,84 @@ def units(root: Element, space: str = SSD) -> dict[str, Unit]:
     return units
 
 
-def tree(path: Path, element: Element, place: Place = ()) -> Part:
-    """The part of a System or Component element, with all parts inside it. Raises InputFault for
-    elements that are not supported and for names that are not unique."""
-    kind, where = element.tag.removeprefix(f"{{{SSD}}}"), dotted(place)
-    connectors = {
-        c.get("name", ""): _connector(path, place, c)
-        for c in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
-    }
-    bindings = (*element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"),)
-    if kind == "Component":
-        type_, how = element.get("type", FMU), element.get("implementation", "CoSimulation")
-        source = element.get("source")
-        if type_ == FMU and how == "CoSimulation" and source:
-            return Part(place, connectors, bindings, unquote(source).removeprefix("./"))
-        kind += f" of type {type_}" if type_ != FMU else f" for {how}" if source else " without FMU"
-    if kind != "System":
-        raise InputFault(
-            f"{path}: {where} is a {kind}; supported are systems, and components that are FMUs for "
-            "co-simulation: put the system of another file into this one, and connect signals one "
-            "by one"
-        )
-    names = [e.get("name", "") for e in element.iterfind(f"{{{SSD}}}Elements/*")]
-    if twice := {n for n, count in Counter(names).items() if count > 1}:
-        raise InputFault(f"{path}: {where} has two elements named {min(twice)!r}: name each once")
-    parts = (
-        tree(path, e, (*place, name))
-        for e, name in zip(element.iterfind(f"{{{SSD}}}Elements/*"), names, strict=True)
-    )
-    lines = (
-        _line(path, place, c) for c in element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")
-    )
-    return Part(place, connectors, bindings, parts=tuple(parts), lines=tuple(lines))
+@dataclass(frozen=True)
+class Tree:
+    """Reads .ssd files. archives: keeps those open that are in another one."""
+
+    archives: ExitStack
+
+    def root(self, file: File, place: Place = ()) -> tuple[Element, Part]:
+        """The content of an .ssd, and its root system as the element at `place`."""
+        text = read_xml(file.archive, file.entry)
+        root = checked(file.path, file.entry, text, "SystemStructureDescription")
+        element = root.find(f"{{{SSD}}}System")
+        assert element is not None  # required by the schema
+        return root, self._part(replace(file, units=units(root)), element, place)
+
+    def _part(self, file: File, element: Element, place: Place) -> Part:
+        """The part of a System or Component element, with all parts inside it. Raises InputFault
+        for elements that are not supported and for names that are not unique."""
+        path, where = file.path, dotted(place)
+        connectors = {
+            c.get("name", ""): _connector(file, place, c)
+            for c in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
+        }
+        bound = element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding")
+        bindings = tuple((file, binding) for binding in bound)
+        if element.tag != f"{{{SSD}}}System":
+            source = file, file.resolved(_source_of(path, where, element))
+            if element.get("type", FMU) == FMU:
+                return Part(place, connectors, bindings, source)
+            system = self._inner(*source, element, place)
+            return replace(system, bindings=(*system.bindings, *bindings))
+        inside = [*element.iterfind(f"{{{SSD}}}Elements/*")]
+        names = [e.get("name", "") for e in inside]
+        if twice := {n for n, count in Counter(names).items() if count > 1}:
+            what = f"{where} has two elements named {min(twice)!r}"
+            raise InputFault(f"{path}: {what}: name each once")
+        parts = (self._part(file, e, (*place, e.get("name", ""))) for e in inside)
+        lines = element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")
+        read = tuple(_line(path, place, line) for line in lines)
+        return Part(place, connectors, bindings, parts=tuple(parts), lines=read)
+
+    def _inner(self, file: File, entry: str, element: Element, place: Place) -> Part:
+        """The root system of the .ssp or .ssd that a component is (SSP 2.0, section 5.4)."""
+        if len(place) > DEEPEST:
+            raise InputFault(f"{file.path}: {dotted(place)}: more than {DEEPEST} files in files")
+        if element.get("type") == PACKAGE:
+            if entry not in file.archive.NameToInfo:
+                raise InputFault(f"{file.path}: {dotted(place)}: there is no {entry!r} in it")
+            path, content = file.path / entry, BytesIO(file.archive.read(entry))
+            archive = self.archives.enter_context(opened(path, "SSP", content))
+            return self.root(File(path, archive), place)[1]
+        return self.root(replace(file, entry=entry), place)[1]
 
 
-def _connector(path: Path, place: Place, element: Element) -> Connector:
+def _source_of(path: Path, where: str, element: Element) -> str:
+    """The source of a component. Raises InputFault for an element that is none to run."""
+    kind, type_ = element.tag.removeprefix(f"{{{SSD}}}"), element.get("type", FMU)
+    how, source = element.get("implementation", "CoSimulation"), element.get("source")
+    if kind == "Component" and type_ not in (FMU, PACKAGE, DEFINITION):
+        kind += f" of type {type_}"
+    elif kind == "Component" and how != "CoSimulation":
+        kind += f" for {how}"
+    elif kind == "Component" and source:
+        return source
+    raise InputFault(
+        f"{path}: {where} is a {kind}{' without source' if not source else ''}; supported are "
+        "systems, and components that are FMUs for co-simulation, .ssp or .ssd: connect signals "
+        "one by one"
+    )
+
+
+def _connector(file: File, place: Place, element: Element) -> Connector:
     kind, name = element.get("kind", ""), dotted(place, element.get("name", ""))
     if kind in ("inout", "unspecified"):
-        raise InputFault(f"{path}: {name} is {kind}; give its kind as input or output")
+        raise InputFault(f"{file.path}: {name} is {kind}; give its kind as input or output")
     unit = next((e.get("unit") for e in element if e.get("unit")), None)
     sizes = (d.get("size") for d in element.iterfind(f"{{{SSC}}}Dimension"))
-    return Connector(kind, unit, tuple(int(size) if size else None for size in sizes))
+    of = file.units.get(unit, Unit(unit)) if unit else None
+    return Connector(kind, of, tuple(int(size) if size else None for size in sizes))
 
 
 def indices(sizes: Sequence[int | None]) -> list[str]:

@@ -131,7 +131,8 @@ def test_a_foreign_ssp_without_rate_or_duration_says_what_to_give(tmp_path):
         ('endConnector="u"', 'endConnector="w"', "names c.w, which does not exist"),
         ('startElement="a b"', 'startElement="ab"', "names ab.y, which does not exist"),
         ('kind="input"', 'kind="inward"', "is no SSP 1.0"),
-        ("fmu\"><ssd", "fmu\" type=\"application/x-ssp-package\"><ssd", "system of another"),
+        ("fmu\"><ssd", "fmu\" type=\"application/x-ssp-package\"><ssd", "holds no SystemStr"),
+        ("fmu\"><ssd", "fmu\" type=\"text/csv\"><ssd", "is a Component of type text/csv"),
         ("resources/a.ssv", "resources/b.ssv", "holds no resources/b.ssv"),
     ],
 )  # fmt: skip

@@ -136,7 +136,7 @@ def test_values_that_do_not_fit_are_refused(tmp_path, given, how, message):
     ("old", "new", "message"),
     [
         ('size="2"', 'size="3"', r"box\.m\.x and box\.x are connected, and have 2 and 3 entries"),
-        (' source="resources/Moves.fmu"', "", r"box\.m is a Component without FMU"),
+        (' source="resources/Moves.fmu"', "", r"box\.m is a Component without source"),
         ('kind="output"', 'kind="unspecified"', r"box\.x is unspecified"),
         ('size="2"', 'size="1000001"', "at most 1000000 entries"),
     ],
