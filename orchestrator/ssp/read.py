@@ -30,7 +30,7 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.ssp import annotation
 from hapticlink.orchestrator.ssp.connections import Row, Wires
 from hapticlink.orchestrator.ssp.names import SSD
-from hapticlink.orchestrator.ssp.parameters import Parameters, Value
+from hapticlink.orchestrator.ssp.parameters import Parameters
 from hapticlink.orchestrator.ssp.tree import File, Part, Place, Tree, dotted
 
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
@@ -39,31 +39,37 @@ _ENTRY = re.compile(r"\[[\d, ]+\]$")
 def tables(path: Path) -> dict[str, Any]:
     """The tables of the SSP's scene; its FMUs are unpacked into the cache. Raises InputFault, with
     file and element, for what is malformed or not supported."""
-    with opened(path, "SSP") as archive, _room() as room, ExitStack() as archives:
-        root, system = Tree(archives).root(File(path, archive))
-        names = _names(part.place for part in system if part.source)
-        described = _described(system, room)
-        unconnected = Wires(path, _unconnected(system), described)
-        described = _resized(described, Parameters(path, unconnected).values())
+    with structure(path) as (root, system, described):
         wires = Wires(path, system, described)
         starts = Parameters(path, wires).starts()
-    rest = annotation.read(path, root)
+    rest, named = annotation.read(path, root), names(described)
     tables: dict[str, Any] = {
         "title": root.get("description") or root.get("name") or path.stem,
         **rest,
     }
     about = rest.get("fmu", {})
     tables["fmu"] = [
-        {"path": str(fmu.path), "start": starts[place], "name": names[place]}
+        {"path": str(fmu.path), "start": starts[place], "name": named[place]}
         | about.get(dotted(place), {})
         for place, fmu in described.items()
     ]
     tables["connection"] = [
-        {"from": f"{names[a]}.{p}", "to": f"{names[b]}.{q}", **how}
+        {"from": f"{named[a]}.{p}", "to": f"{named[b]}.{q}", **how}
         for (a, p), (b, q), how in _grouped(wires.rows, described)
     ] + rest.get("connection", [])
     _experiment(path, tables, root, described.values())
     return tables
+
+
+@contextmanager
+def structure(path: Path) -> Iterator[tuple[Element, Part, dict[Place, Description]]]:
+    """The content of SystemStructure.ssd, its root system with all files open, and the FMUs with
+    arrays of the sizes that the parameters give them."""
+    with opened(path, "SSP") as archive, _room() as room, ExitStack() as archives:
+        root, system = Tree(archives).root(File(path, archive))
+        described = _described(system, room)
+        unconnected = Wires(path, _unconnected(system), described)
+        yield root, system, resized(described, Parameters(path, unconnected).values())
 
 
 @contextmanager
@@ -102,17 +108,17 @@ def _seconds(text: str) -> Fraction:
         return Fraction(0)
 
 
-def _names(places: Iterable[Place]) -> dict[Place, str]:
+def names(places: Iterable[Place]) -> dict[Place, str]:
     """The name of each component in [[fmu]]: its own, numbered where it is not unique."""
-    names: dict[Place, str] = {}
+    named: dict[Place, str] = {}
     counts: dict[str, int] = {}  # by the names that are taken
     for place in places:
         name = wanted = re.sub(r"\W", "_", "_".join(place))
         while name in counts:
             counts[wanted] += 1
             name = f"{wanted}_{counts[wanted]}"
-        counts[name], names[place] = 1, name
-    return names
+        counts[name], named[place] = 1, name
+    return named
 
 
 def _described(system: Part, room: Path) -> dict[Place, Description]:
@@ -133,8 +139,8 @@ def _unconnected(part: Part) -> Part:
     return replace(part, lines=(), parts=tuple(map(_unconnected, part.parts)))
 
 
-def _resized(
-    described: Mapping[Place, Description], starts: Mapping[Place, Mapping[str, Value]]
+def resized(
+    described: Mapping[Place, Description], starts: Mapping[Place, Mapping[str, Any]]
 ) -> dict[Place, Description]:
     """The FMUs with arrays of the sizes that their structural parameters get."""
     fmus = {}
