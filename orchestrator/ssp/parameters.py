@@ -30,7 +30,8 @@ from hapticlink.orchestrator.ssp.tree import (
     converts,
     dotted,
     indices,
-    transformation,
+    linear_of,
+    table_of,
     units,
 )
 
@@ -155,10 +156,23 @@ class Parameters:
             if source not in given:
                 self.unused.append(dotted(part.place, source))
                 continue
-            linear = transformation(self.path, f"the mapping of {source}", entry)
+            linear, convert = linear_of(entry), converts(entry)
             for value in given[source]:
                 name = target + value.name.removeprefix(source)
-                yield replace(value, name=name, linear=linear, convert=converts(entry))
+                mapped = self._looked_up(entry, value)
+                yield replace(value, name=name, value=mapped, linear=linear, convert=convert)
+
+    def _looked_up(self, entry: Element, given: Given) -> Value:
+        """The value after the mapping transformation of an entry, if it has one: unchanged where
+        its table does not contain it. An enumeration goes by the names of its items."""
+        if not (table := table_of(entry)):
+            return given.value
+        kind, targets = table
+        as_kind = READ[kind]
+        if type(given.value) is not type(as_kind("0")):
+            what = f"{given.value!r} is no {kind}, of which its mapping has a table"
+            raise InputFault(f"{self.path}: parameter {given.name}: {what}")
+        return {as_kind(a): as_kind(b) for a, b in targets.items()}.get(given.value, given.value)
 
     def _targets(self, part: Part, name: str) -> Iterator[Reach]:
         """The variables that `name` refers to in `part`."""

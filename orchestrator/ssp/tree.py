@@ -227,20 +227,28 @@ def _line(path: Path, place: Place, element: Element) -> Line:
 
     ends = (node("start"), node("end"))
     names = " and ".join(dotted(*end) for end in ends)
-    linear = transformation(path, f"the connection of {names}", element)
-    return Line(ends, linear, converts(element))
+    if table := table_of(element):
+        what = f"{table[0]}MappingTransformation is read in parameter mappings only"
+        raise InputFault(f"{path}: connection of {names}: {what}; put its table into an FMU")
+    return Line(ends, linear_of(element), converts(element))
 
 
-def transformation(path: Path, where: str, element: Element) -> Linear:
-    """The linear transformation of a connection or mapping. Raises InputFault for mapping
-    transformations, which are tables of values."""
+def linear_of(element: Element) -> Linear:
+    """The linear transformation of a connection or mapping."""
+    linear = element.find(f"{{{SSC}}}LinearTransformation")
+    if linear is None:
+        return SAME
+    return Linear(float(linear.get("factor", "1")), float(linear.get("offset", "0")))
+
+
+def table_of(element: Element) -> tuple[str, dict[str, str]] | None:
+    """The mapping transformation of a connection or mapping: the type of its values, "Boolean",
+    "Integer" or "Enumeration", and the target of each source."""
     for child in element:
-        if child.tag == f"{{{SSC}}}LinearTransformation":
-            return Linear(float(child.get("factor", "1")), float(child.get("offset", "0")))
-        if child.tag.endswith("MappingTransformation"):
-            name = child.tag.removeprefix(f"{{{SSC}}}")
-            raise InputFault(f"{path}: {where}: {name} is not read; put its table into an FMU")
-    return SAME
+        if child.tag.endswith(end := "MappingTransformation"):
+            kind = child.tag.removeprefix(f"{{{SSC}}}").removesuffix(end)
+            return kind, {e.get("source", ""): e.get("target", "") for e in child}
+    return None
 
 
 def converts(element: Element) -> bool:

@@ -196,7 +196,7 @@ REFERENCE = '<ssd:SignalDictionaryReference name="p" dictionary="d"/>'
         (line("p.u", "u"), line("p.y", "u"), r"right\.u are connected, and both are outputs"),
         (line("p.u", "u"), line("u", "t.u"), r"right\.t\.u is fed by right\.u and by right\.u"),
         ('name="p" source', 'name="t" source', r"right has two elements named 't'"),
-        (linear(-1, 0.25), TABLE, "BooleanMappingTransformation is not read"),
+        (linear(-1, 0.25), TABLE, "BooleanMappingTransformation is read in parameter"),
         ('source="resources/Plain', 'implementation="ModelExchange" source="resources/Plain',
          r"right\.p is a Component for ModelExchange"),
         ('startTime="0.0"', 'startTime="1.0"', "starts at 1.0 s; runs start at 0"),
