@@ -154,7 +154,7 @@ class Parameters:
                 raise InputFault(f"{self.path}: two parameters are mapped to {name}; keep one")
             targets.add(target)
             if source not in given:
-                self.unused.append(dotted(part.place, source))
+                self.unused.append(dotted(part.place, source or f"source of {target}"))
                 continue
             linear, convert = linear_of(entry), converts(entry)
             for value in given[source]:
