@@ -1,7 +1,8 @@
 """Writes a scene as an SSP, SystemStructure.ssd and the FMUs, for this and other tools.
 
-Each connection is from scalar to scalar. Rates, holds and connections to parameters and of clocks,
-which SSP 1.0 does not have, are in an annotation, as JSON with the keys of a scene.
+Its version is 1.0, or 2.0 with an FMU of FMI 3.0, whose types, arrays and clocks 1.0 does not have.
+Each connection is from scalar to scalar. Rates, holds and connections to parameters, which no SSP
+has, are in an annotation, as JSON with the keys of a scene.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 import zipfile
+from collections import Counter
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -30,14 +32,12 @@ from hapticlink.orchestrator.ssp import step_sizes
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
     FMU,
-    LARGEST,
     NOT_IN_ANNOTATION,
     RUN,
     SSC,
     SSD,
     SSV,
     STRUCTURE,
-    type_of,
 )
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
@@ -76,20 +76,27 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
     """The text of SystemStructure.ssd, of a system of this name."""
     for prefix, space in PREFIXES.items():
         register_namespace(prefix, space)
-    about = {"version": "1.0", "name": name, "description": scene.title}
+    version = "2.0" if any(unit.description.fmi == "3" for unit in system.fmus) else "1.0"
+    about = {"version": version, "name": name, "description": scene.title}
     root = Element(f"{{{SSD}}}SystemStructureDescription", about)
     top = SubElement(root, f"{{{SSD}}}System", name="system")
     elements = SubElement(top, f"{{{SSD}}}Elements")
     for unit in system.fmus:
-        step_sizes.of_component(_component(elements, unit), system, unit)
+        step_sizes.of_component(_component(elements, unit, version), system, unit)
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
-    lines = [c for c in system.connections if _has_line(c)]
+    lines = [c for c in system.connections if not c.to_parameter]
+    arrays = {unit.name: _arrays(unit) for unit in system.fmus}
     if lines:
         connections = SubElement(top, f"{{{SSD}}}Connections")
     for c in lines:
         for a, b in zip(c.outputs, c.inputs, strict=True):
-            ends = {"startElement": c.source, "startConnector": a.name}
-            ends |= {"endElement": c.target, "endConnector": b.name}
+            ends = {}
+            for end, name, scalar in (("start", c.source, a), ("end", c.target, b)):
+                whole = scalar.port in arrays[name]
+                ends[f"{end}Element"] = name
+                ends[f"{end}Connector"] = scalar.port if whole else scalar.name
+                if whole:
+                    ends[f"{end}Indices"] = " ".join(map(str, scalar.indices))
             wire = wires.get(c.name)
             if wire and not wire.convert:
                 ends["suppressUnitConversion"] = "true"
@@ -109,38 +116,65 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
     return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def _component(elements: Element, unit: Fmu) -> Element:
+def _component(elements: Element, unit: Fmu, version: str) -> Element:
     about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
     component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
-    causalities = ("input", "output", "parameter")
-    every = (s for s in unit.description.scalars if s.causality in causalities)
-    shown = [s for s in every if s.type != "Clock"]
+    causalities, arrays = ("input", "output", "parameter"), _arrays(unit)
+    shown = [
+        s
+        for s in unit.description.scalars
+        if s.causality in causalities and (s.port not in arrays or s.entry == 0)
+    ]
     if shown:
         connectors = SubElement(component, f"{{{SSD}}}Connectors")
     for s in shown:
+        name = s.port if s.port in arrays else s.name
         connector = SubElement(
-            connectors, f"{{{SSD}}}Connector", {"name": s.name, "kind": s.causality}
+            connectors, f"{{{SSD}}}Connector", {"name": name, "kind": s.causality}
         )
         unit_of = {"unit": s.unit} if s.unit and unit.description.units.get(s.unit) else {}
-        SubElement(connector, f"{{{SSC}}}{type_of(s.type)}", unit_of)
+        SubElement(connector, f"{{{SSC}}}{s.type}", unit_of)
+        _dimensions(connector, arrays.get(s.port, []))
     if unit.starts:
         bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
         binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
         values = SubElement(binding, f"{{{SSD}}}ParameterValues")
-        set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version="1.0", name="start")
+        set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version=version, name="start")
         parameters = SubElement(set_, f"{{{SSV}}}Parameters")
-        for scalar, value in unit.starts:
-            parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=scalar.name)
-            SubElement(parameter, f"{{{SSV}}}{type_of(scalar.type)}", value=_text(scalar, value))
+        given = {scalar.name: value for scalar, value in unit.starts}
+        written = {s.port if s.port in arrays else s.name: s for s, _ in unit.starts}
+        for name, s in written.items():
+            entries = arrays.get(s.port, [s])
+            text = " ".join(_text(e, given.get(e.name, e.start)) for e in entries)
+            parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+            SubElement(parameter, f"{{{SSV}}}{s.type}", value=text)
+            _dimensions(parameter, arrays.get(s.port, []))
     return component
 
 
+def _arrays(unit: Fmu) -> dict[str, list[Scalar]]:
+    """The entries of each array of FMI 3.0, row by row, by its name. They share a reference, unlike
+    scalars with the names of entries."""
+    references = Counter(s.reference for s in unit.description.scalars)
+    arrays: dict[str, list[Scalar]] = {}
+    for s in unit.description.scalars if unit.description.fmi == "3" else ():
+        if references[s.reference] > 1:
+            arrays.setdefault(s.port, []).append(s)
+    return arrays
+
+
+def _dimensions(element: Element, entries: list[Scalar]) -> None:
+    for size in entries[-1].indices if entries else ():
+        SubElement(element, f"{{{SSC}}}Dimension", size=str(size))
+
+
 def _text(scalar: Scalar, value: bool | int | float | str) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if type_of(scalar.type) == "Integer" and not -LARGEST <= int(value) < LARGEST:
-        raise InputFault(f"start.{scalar.name}: {value}: integers of an SSP have 32 bits")
-    return repr(float(value)) if type_of(scalar.type) == "Real" else str(value)
+    if isinstance(value, str):
+        return value
+    if scalar.type == "Boolean":
+        return str(bool(value)).lower()
+    real = scalar.type.startswith(("Real", "Float"))
+    return repr(float(value)) if real else str(int(value))
 
 
 def _units(root: Element, system: System) -> None:
@@ -185,14 +219,9 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     }
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
     tables["connection"] = [
-        _row(c, wires.get(c.name)) for c in system.connections if not _has_line(c)
+        _row(c, wires.get(c.name)) for c in system.connections if c.to_parameter
     ]
     return tables
-
-
-def _has_line(c: Connection) -> bool:
-    """Whether a connection is one that the standard has."""
-    return not c.to_parameter and c.outputs[0].type != "Clock"
 
 
 def _row(c: Connection, wire: Wire | None) -> dict[str, Any]:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
-import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
@@ -188,17 +187,8 @@ def test_sizes_of_arrays_and_binary_starts_come_back(tmp_path):
 
 
 def test_a_connection_of_clocks_comes_back(tmp_path):
-    """By the annotation: SSP 1.0 has no connector for it."""
     clock_fmu3(tmp_path)
     wire = wire_table("one.fired", "two.go")
     fmus = fmu_table("one", "clocks") + fmu_table("two", "clocks")
     found = come_back(str(scene(tmp_path, fmus + wire)), tmp_path)
     assert found.haptics["two.go_count"][-1] == 1
-
-
-def test_a_start_that_no_ssp_can_hold_is_refused(tmp_path):
-    c_fmu3(tmp_path)
-    source = scene(tmp_path, SIZES.replace("size = 3", "in_Int64 = 2147483648, size = 3"))
-    with pytest.raises(InputFault, match=r"start\.in_Int64: 2147483648: integers of an SSP"):
-        hl.export(source, out=tmp_path / "made.ssp")
-    assert not (tmp_path / "made.ssp").exists()

@@ -1,11 +1,15 @@
 """What SSP 2.0 has and 1.0 has not: arrays, types of FMI 3.0, further kinds of connectors."""
 
+import zipfile
+from xml.etree import ElementTree
+
 import pytest
 
+import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.foreign_fmus import c_fmu3, clock_fmu3
+from tests.orchestrator.foreign_fmus import c_fmu3, clock_fmu3, fmu_table, scene, wire_table
 from tests.orchestrator.run.test_bonds import fmus
 from tests.orchestrator.ssps import (
     binding,
@@ -156,3 +160,34 @@ def test_a_binary_is_not_connected(tmp_path):
     )
     with pytest.raises(InputFault, match=r"a\.blob, which is a Binary, set at the start only"):
         open_scene.load(path, ["haptics.rate=50"])
+
+
+def test_a_scene_with_fmi_3_is_written_as_2_0_and_comes_back(tmp_path):
+    """Arrays are connectors of their own; whole numbers of 64 bits are parameters."""
+    hl.build("five-bar", out=tmp_path, as_one=True, fmi=3)
+    c_fmu3(tmp_path)
+    text = fmu_table("a", "five_bar") + fmu_table("b", "five_bar")
+    text += fmu_table("c", "types", "start = { in_Int64 = 1099511627776 }\n")
+    wire = wire_table("a.hand.F", "b.virtual_mechanism.F_drift", "factor = 0.5\n")
+    ours = scene(tmp_path, text + wire)
+    theirs = hl.export(ours, out=tmp_path / "made.ssp")
+    with zipfile.ZipFile(theirs) as archive:
+        root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+    assert root.get("version") == "2.0"
+    found = {
+        connector.get("name"): [d.get("size") for d in connector.iterfind("{*}Dimension")]
+        for connector in root.iterfind(".//{*}Component[@name='b']/{*}Connectors/{*}Connector")
+    }
+    assert found["virtual_mechanism.q"] == ["4"]
+    lines = [line.attrib for line in root.iterfind(".//{*}Connection")]
+    assert [line["startConnector"] for line in lines] == ["hand.F"] * 3
+    assert [line["endIndices"] for line in lines] == ["1", "2", "3"]
+    tables = []
+    for path in (ours, theirs):
+        run = simulate(str(path), tmp_path / "out")
+        tables.append(run.results.haptics)
+        assert run.results.haptics["c.out_Int64"][-1] == 2**40
+    assert tables[0].keys() == tables[1].keys()
+    assert all((tables[0][name] == tables[1][name]).all() for name in tables[0])
+    moved = tables[0]["b.virtual_mechanism.x"] - tables[0]["a.virtual_mechanism.x"]
+    assert abs(moved).max() > 1e-6
