@@ -27,13 +27,12 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.archive import opened
 from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp import annotation
 from hapticlink.orchestrator.ssp.connections import Row, Wires
 from hapticlink.orchestrator.ssp.names import SSD
 from hapticlink.orchestrator.ssp.parameters import Parameters
 from hapticlink.orchestrator.ssp.tree import File, Part, Place, Tree, dotted
-
-_ENTRY = re.compile(r"\[[\d, ]+\]$")
 
 
 def tables(path: Path) -> dict[str, Any]:
@@ -176,7 +175,7 @@ def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterato
     i = 0
     while i < len(rows):
         (a, p), (b, q), how = rows[i]
-        whole = (_ENTRY.sub("", p), _ENTRY.sub("", q))
+        whole = entry_of(p)[0], entry_of(q)[0]
         outputs = described[a].port(whole[0], "output")
         inputs = described[b].port(whole[1], "input")
         pairs = zip(outputs, inputs, strict=False)

@@ -184,16 +184,15 @@ def _source_of(path: Path, where: str, element: Element) -> str:
     """The source of a component. Raises InputFault for an element that is none to run."""
     kind, type_ = element.tag.removeprefix(f"{{{SSD}}}"), element.get("type", FMU)
     how, source = element.get("implementation", "CoSimulation"), element.get("source")
-    if kind == "Component" and type_ not in (FMU, PACKAGE, DEFINITION):
-        kind += f" of type {type_}"
-    elif kind == "Component" and how != "CoSimulation":
-        kind += f" for {how}"
-    elif kind == "Component" and source:
-        return source
+    if kind == "Component":
+        known = type_ in (FMU, PACKAGE, DEFINITION)
+        if known and source and how == "CoSimulation":
+            return source
+        unfit = f" for {how}" if how != "CoSimulation" else " without source"
+        kind += unfit if known else f" of type {type_}"
     raise InputFault(
-        f"{path}: {where} is a {kind}{' without source' if not source else ''}; supported are "
-        "systems, and components that are FMUs for co-simulation, .ssp or .ssd: connect signals "
-        "one by one"
+        f"{path}: {where} is a {kind}; supported are systems, and components that are FMUs for "
+        "co-simulation, .ssp or .ssd: connect signals one by one"
     )
 
 
@@ -221,8 +220,8 @@ def indices(sizes: Sequence[int | None]) -> list[str]:
 def _line(path: Path, place: Place, element: Element) -> Line:
     def node(end: str) -> Node:
         inside, name = element.get(f"{end}Element"), element.get(f"{end}Connector", "")
-        if indices := element.get(f"{end}Indices", "").split():  # from 1, by its authors' examples
-            name += f"[{','.join(indices)}]"
+        if entry := element.get(f"{end}Indices", "").split():  # from 1, by its authors' examples
+            name += f"[{','.join(entry)}]"
         return (*place, inside) if inside else place, name
 
     ends = (node("start"), node("end"))

@@ -85,18 +85,22 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
         step_sizes.of_component(_component(elements, unit, version), system, unit)
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
     lines = [c for c in system.connections if not c.to_parameter]
-    arrays = {unit.name: _arrays(unit) for unit in system.fmus}
+    variable = {
+        (unit.name, s.name): (name, s.indices if len(entries) > 1 else ())
+        for unit in system.fmus
+        for name, entries in _variables(unit).items()
+        for s in entries
+    }
     if lines:
         connections = SubElement(top, f"{{{SSD}}}Connections")
     for c in lines:
         for a, b in zip(c.outputs, c.inputs, strict=True):
             ends = {}
-            for end, name, scalar in (("start", c.source, a), ("end", c.target, b)):
-                whole = scalar.port in arrays[name]
-                ends[f"{end}Element"] = name
-                ends[f"{end}Connector"] = scalar.port if whole else scalar.name
-                if whole:
-                    ends[f"{end}Indices"] = " ".join(map(str, scalar.indices))
+            for end, fmu, scalar in (("start", c.source, a), ("end", c.target, b)):
+                ends[f"{end}Element"] = fmu
+                ends[f"{end}Connector"], indices = variable[fmu, scalar.name]
+                if indices:
+                    ends[f"{end}Indices"] = " ".join(map(str, indices))
             wire = wires.get(c.name)
             if wire and not wire.convert:
                 ends["suppressUnitConversion"] = "true"
@@ -119,52 +123,47 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
 def _component(elements: Element, unit: Fmu, version: str) -> Element:
     about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
     component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
-    causalities, arrays = ("input", "output", "parameter"), _arrays(unit)
-    shown = [
-        s
-        for s in unit.description.scalars
-        if s.causality in causalities and (s.port not in arrays or s.entry == 0)
-    ]
+    variables = _variables(unit)
+    taken = ("input", "output", "parameter")
+    shown = {n: e for n, e in variables.items() if e[0].causality in taken}
     if shown:
         connectors = SubElement(component, f"{{{SSD}}}Connectors")
-    for s in shown:
-        name = s.port if s.port in arrays else s.name
-        connector = SubElement(
-            connectors, f"{{{SSD}}}Connector", {"name": name, "kind": s.causality}
-        )
+    for name, (s, *_) in shown.items():
+        about = {"name": name, "kind": s.causality}
+        connector = SubElement(connectors, f"{{{SSD}}}Connector", about)
         unit_of = {"unit": s.unit} if s.unit and unit.description.units.get(s.unit) else {}
         SubElement(connector, f"{{{SSC}}}{s.type}", unit_of)
-        _dimensions(connector, arrays.get(s.port, []))
+        _dimensions(connector, shown[name])
     if unit.starts:
         bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
         binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
         values = SubElement(binding, f"{{{SSD}}}ParameterValues")
         set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version=version, name="start")
         parameters = SubElement(set_, f"{{{SSV}}}Parameters")
-        given = {scalar.name: value for scalar, value in unit.starts}
-        written = {s.port if s.port in arrays else s.name: s for s, _ in unit.starts}
-        for name, s in written.items():
-            entries = arrays.get(s.port, [s])
-            text = " ".join(_text(e, given.get(e.name, e.start)) for e in entries)
-            parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-            SubElement(parameter, f"{{{SSV}}}{s.type}", value=text)
-            _dimensions(parameter, arrays.get(s.port, []))
+    given = {scalar.name: value for scalar, value in unit.starts}
+    started = {n: e for n, e in variables.items() if any(s.name in given for s in e)}
+    for name, entries in started.items():
+        text = " ".join(_text(s, given.get(s.name, s.start)) for s in entries)
+        parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+        SubElement(parameter, f"{{{SSV}}}{entries[0].type}", value=text)
+        _dimensions(parameter, entries)
     return component
 
 
-def _arrays(unit: Fmu) -> dict[str, list[Scalar]]:
-    """The entries of each array of FMI 3.0, row by row, by its name. They share a reference, unlike
-    scalars with the names of entries."""
-    references = Counter(s.reference for s in unit.description.scalars)
-    arrays: dict[str, list[Scalar]] = {}
-    for s in unit.description.scalars if unit.description.fmi == "3" else ():
-        if references[s.reference] > 1:
-            arrays.setdefault(s.port, []).append(s)
-    return arrays
+def _variables(unit: Fmu) -> dict[str, list[Scalar]]:
+    """The scalars of each variable by its name: of an array of FMI 3.0 all entries, row by row,
+    which share a reference."""
+    description = unit.description
+    references = Counter(s.reference for s in description.scalars)
+    variables: dict[str, list[Scalar]] = {}
+    for s in (*description.scalars, *description.strings):
+        array = description.fmi == "3" and references[s.reference] > 1
+        variables.setdefault(s.port if array else s.name, []).append(s)
+    return variables
 
 
 def _dimensions(element: Element, entries: list[Scalar]) -> None:
-    for size in entries[-1].indices if entries else ():
+    for size in entries[-1].indices if len(entries) > 1 else ():
         SubElement(element, f"{{{SSC}}}Dimension", size=str(size))
 
 
