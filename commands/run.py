@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +24,16 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
+SetFile = Annotated[
+    list[Path] | None,
+    Parameter(
+        name="--set-file",
+        consume_multiple=False,
+        negative="",
+        help="Parameter set (.ssv) for the FMUs of an SSP, or the [[fmu]] of a scene, by name; "
+        "repeatable. --set takes precedence.",
+    ),
+]
 Explain = Annotated[
     bool, Parameter(negative="", help="Print what would run when, from which samples; do not run.")
 ]
@@ -57,6 +68,7 @@ def run(
     *,
     out: Out = None,
     changes: Changes = UNCHANGED,
+    set_file: SetFile = None,
     figures: Figures = True,
     explain: Explain = False,
     real_time: RealTime = False,
@@ -79,6 +91,12 @@ def run(
         hapticlink run my-scene.toml --no-figures --json > result.json
     """
     import hapticlink as hl
+
+    if set_file:
+        from hapticlink.orchestrator.ssp import set_files
+
+        given = set_files.options(hl.scene(scene, changes.options), set_file)
+        changes = replace(changes, set=[*given, *(changes.set or ())])
     from hapticlink.analysis.findings import summary
 
     if explain:

@@ -3,13 +3,14 @@
 A connector of a system passes its value on, so an input of an FMU is fed by a chain of connections,
 y_0 -> y_1 -> ... -> y_k, each with y_i = a_i C_i(y_{i-1}) + b_i, where C_i converts the units
 (SSP 1.0, section 5.4.2). The chain is one linear function of y_0. A connector without a unit has
-that of the connectors inside its system.
+that of the connectors inside its system. A connection of arrays (SSP 2.0) is one of each pair of
+their entries, row by row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,10 @@ from typing import Any
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
-from hapticlink.orchestrator.ssp.tree import Line, Node, Part, Place, dotted
+from hapticlink.orchestrator.fmi.variables import WRITTEN, entry_of
+from hapticlink.orchestrator.ssp.tree import Connector, Line, Node, Part, Place, dotted, indices
 
-TAKES = ("input", "parameter")
+TAKES = ("input", "parameter", "structuralParameter")
 Row = tuple[Node, Node, dict[str, Any]]
 """An output, the input that it feeds, and the keys of [[connection]] for what is done between."""
 
@@ -49,7 +51,6 @@ class Wires:
     path: Path
     root: Part
     described: Mapping[Place, Description]
-    units: Mapping[str, Unit]
     rows: list[Row] = field(default_factory=list)
     reach: dict[Node, list[Reach]] = field(default_factory=dict)
 
@@ -61,9 +62,13 @@ class Wires:
             for place, d in self.described.items()
             for s in (*d.scalars, *d.strings)
         }
+        self._arrays: dict[Node, list[str]] = {}
+        for place, d in self.described.items():
+            for s in sorted(d.scalars, key=lambda s: s.indices):
+                self._arrays.setdefault((place, s.port), []).append(s.name.removeprefix(s.port))
         fed: dict[Node, tuple[Node, Line]] = {}
         for system in self._systems.values():
-            for line in system.lines:
+            for line in (entry for whole in system.lines for entry in self._entries(whole)):
                 source, sink = self._directed(system, line)
                 if sink in fed:
                     names = f"{dotted(*fed[sink][0])} and by {dotted(*source)}"
@@ -72,6 +77,33 @@ class Wires:
         for sink in fed:
             if sink[0] in self.described:
                 self._follow(sink, fed)
+
+    def _entries(self, line: Line) -> Iterator[Line]:
+        """The connection itself, or those of the entries of its arrays."""
+        first, second = (self._indices(*end) for end in line.ends)
+        first, second = first or second or [""], second or first or [""]
+        if len(first) != len(second):
+            names = " and ".join(dotted(*end) for end in line.ends)
+            sizes = f"have {len(first)} and {len(second)} entries"
+            raise InputFault(f"{self.path}: {names} are connected, and {sizes}; connect equal ones")
+        (a, p), (b, q) = line.ends
+        for i, j in zip(first, second, strict=True):
+            yield replace(line, ends=((a, f"{p}{i}"), (b, f"{q}{j}")))
+
+    def _indices(self, place: Place, name: str) -> list[str]:
+        """The indices of all entries of an array of an FMU or a system, as `indices` gives
+        them."""
+        if (place, name) in self.variables:
+            return [""]
+        if entries := self._arrays.get((place, name)):
+            return entries
+        connector = self._connectors.get((place, name))
+        return [""] if connector is None else indices(connector.sizes)
+
+    def _connector(self, node: Node) -> Connector | None:
+        """The connector of a node, which may be an entry of it."""
+        place, name = node
+        return self._connectors.get(node) or self._connectors.get((place, entry_of(name)[0]))
 
     def _directed(self, system: Part, line: Line) -> tuple[Node, Node]:
         """The ends of a connection as (source, target), seen from inside `system`."""
@@ -85,12 +117,14 @@ class Wires:
     def _is_source(self, node: Node, inside: Place) -> bool:
         place, _ = node
         variable = self.variables.get(node)
-        if variable and variable.type != "String":
+        if variable and variable.type not in WRITTEN:
             return variable.causality not in TAKES
-        if place in self._systems and (connector := self._connectors.get(node)):
+        if place in self._systems and (connector := self._connector(node)):
             # Seen from inside, a system's own input is a source.
             return (connector.kind in TAKES) == (place == inside)
-        why = "is a String, set at the start only" if variable else "does not exist"
+        why = "does not exist, or is a clock that is not triggered"
+        if variable:
+            why = f"is a {variable.type}, set at the start only"
         raise InputFault(f"{self.path}: a connection names {dotted(*node)}, which {why}")
 
     def _follow(self, sink: Node, fed: Mapping[Node, tuple[Node, Line]]) -> None:
@@ -140,7 +174,10 @@ class Wires:
         """The unit of each node of a chain. A system's connector without a unit takes that of its
         source if it is an output, and that of its target if it is an input."""
         units = [self.unit(n) for n in nodes]
-        takes = [n[0] in self._systems and self._connectors[n].kind in TAKES for n in nodes]
+        takes = [
+            (c := self._connector(n)) is not None and n[0] in self._systems and c.kind in TAKES
+            for n in nodes
+        ]
         for i, node in enumerate(nodes):
             if i and units[i] is None and node[0] in self._systems and not takes[i]:
                 units[i] = units[i - 1]
@@ -151,14 +188,13 @@ class Wires:
 
     def unit(self, node: Node) -> Unit | None:
         """The unit of a node: the FMU's own, or else that of its connector."""
-        variable, connector = self.variables.get(node), self._connectors.get(node)
+        variable, connector = self.variables.get(node), self._connector(node)
         if variable and variable.unit is not None:
             return self.described[node[0]].unit(variable)
-        name = connector and connector.unit
-        return self.units.get(name, Unit(name)) if name else None
+        return connector.unit if connector else None
 
     def _unit_is_of_fmu(self, node: Node) -> bool:
-        connector = self._connectors.get(node)
+        connector = self._connector(node)
         return self.variables[node].unit is not None or connector is None or connector.unit is None
 
 

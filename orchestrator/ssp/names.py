@@ -1,5 +1,5 @@
-"""Names of SSP 1.0 (System Structure and Parameterization), and the keys of a scene that are kept
-in an annotation, because the standard has no rates and no holds."""
+"""Names of SSP (System Structure and Parameterization), and the keys of a scene that are kept in an
+annotation, because the standard has no rates and no holds."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ RUN = "urn:hapticlink:run"
 ANNOTATION = "hapticlink.run"
 STRUCTURE = "SystemStructure.ssd"
 FMU = "application/x-fmu-sharedlibrary"
+PACKAGE, DEFINITION = "application/x-ssp-package", "application/x-ssp-definition"
+"""The types of components: an FMU, an .ssp and an .ssd."""
 
 NOT_IN_ANNOTATION = frozenset(
     (
@@ -24,21 +26,9 @@ NOT_IN_ANNOTATION = frozenset(
 annotation."""
 
 
-SCALAR = {"Boolean": "Boolean", "String": "String", "Binary": "Binary", "Real": "Real"}
-LARGEST = 2**31
-"""Beyond integers of SSP 1.0, which are those of xs:int."""
-
-
 def is_fixed(names: tuple[str, ...]) -> bool:
     """Whether a key determines the FMUs, which are built already, so that no option can change
     it."""
     if names[0] == "graphics":
         return len(names) > 1 and names[1] not in ("rate", "align", "phase")
     return names[0] in NOT_IN_ANNOTATION - {"fmu", "connection"}
-
-
-def type_of(fmi_type: str) -> str:
-    """The type of a connector or parameter for an FMI type."""
-    if fmi_type.startswith("Float"):
-        return "Real"
-    return SCALAR.get(fmi_type, "Integer")

@@ -1,4 +1,4 @@
-"""Parameter values of an SSP as start values of its FMUs (SSP 1.0, sections 5.3.3, 6 and 7).
+"""Parameter values of an SSP as start values of its FMUs (SSP 2.0, sections 5.3.3, 6 and 7).
 
 A binding applies a parameter set to an element, by the names in the set with its `prefix`, or by
 the names of its mapping if it has one. In a system, `connector` is its own connector, and
@@ -10,33 +10,35 @@ transformed.
 from __future__ import annotations
 
 import logging
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from urllib.parse import unquote
 from xml.etree.ElementTree import Element, tostring
 
 from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.base.terminal_output import printable
 from hapticlink.orchestrator.fmi.archive import read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
+from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp.connections import Reach, Wires
-from hapticlink.orchestrator.ssp.names import SSD, SSM, SSV
+from hapticlink.orchestrator.ssp.names import SSC, SSD, SSM, SSV
 from hapticlink.orchestrator.ssp.tree import (
+    File,
     Part,
     Place,
     checked,
     converts,
     dotted,
-    transformation,
+    indices,
+    linear_of,
+    table_of,
     units,
 )
 
 Value = bool | int | float | str
 READ: dict[str, Callable[[str], Value]] = {
-    "Real": float,
-    "Integer": int,
+    **dict.fromkeys(("Real", "Float64", "Float32"), float),
+    **dict.fromkeys(("Integer", *(f"{u}Int{n}" for u in ("", "U") for n in (8, 16, 32, 64))), int),
     "Boolean": lambda text: text in ("true", "1"),
     "String": str,
     "Binary": str,
@@ -62,7 +64,6 @@ class Parameters:
     """Reads the parameter bindings of the elements of `wires`."""
 
     path: Path
-    archive: zipfile.ZipFile
     wires: Wires
     unused: list[str] = field(default_factory=list)
 
@@ -91,17 +92,19 @@ class Parameters:
         return starts
 
     def _given(self, part: Part) -> Iterator[Given]:
-        for binding in part.bindings:
+        for file, binding in part.bindings:
             where = f"parameters of {dotted(part.place)}"
-            set_ = self._content(binding, where, "ParameterSet", SSV)
-            given = [*self._values(set_, binding.get("prefix", ""))]
+            set_ = self._content(file, binding, where, "ParameterSet", SSV)
+            given = [
+                *self._values({**file.units, **units(set_, SSV)}, set_, binding.get("prefix", ""))
+            ]
             mapping = binding.find(f"{{{SSD}}}ParameterMapping")
             if mapping is not None:
-                entries = self._content(mapping, where, "ParameterMapping", SSM)
-                given = [*self._mapped(entries, {g.name: g for g in given}, part)]
+                entries = self._content(file, mapping, where, "ParameterMapping", SSM)
+                given = [*self._mapped(entries, given, part)]
             yield from given
 
-    def _content(self, element: Element, where: str, kind: str, space: str) -> Element:
+    def _content(self, file: File, element: Element, where: str, kind: str, space: str) -> Element:
         """The parameter set or mapping inside `element`, or in the file that it names."""
         if element.get("type", SETS[0]) not in SETS:
             raise InputFault(f"{self.path}: {where}: type {element.get('type')} is not read")
@@ -112,25 +115,37 @@ class Parameters:
             )
         entry, schema = element.get("source"), f"SystemStructure{kind.replace('Set', 'Values')}"
         if entry:
-            entry = unquote(entry).removeprefix("./")
-            return checked(self.path, entry, read_xml(self.archive, entry), schema)
+            entry = file.resolved(entry)
+            return checked(file.path, entry, read_xml(file.archive, entry), schema)
         inside = next(element.iter(f"{{{space}}}{kind}"), None)
         if inside is None:
             raise InputFault(f"{self.path}: {where}: a {kind} has neither source nor content")
         inside.attrib.setdefault("version", "1.0")  # OMSimulator writes none in the .ssd
         return checked(self.path, where, tostring(inside), schema)
 
-    def _values(self, set_: Element, prefix: str) -> Iterator[Given]:
-        known = {**self.wires.units, **units(set_, SSV)}
+    def _values(self, known: Mapping[str, Unit], set_: Element, prefix: str) -> Iterator[Given]:
         for parameter in set_.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
             name, value = f"{prefix}{parameter.get('name')}", parameter[0]
             kind, unit = value.tag.removeprefix(f"{{{SSV}}}"), value.get("unit")
-            if kind not in READ:
-                raise InputFault(f"{self.path}: parameter {name}: type {kind} is not read")
             of = known.get(unit, Unit(unit)) if unit else None
-            yield Given(name, READ[kind](value.get("value", "")), of)
+            given = [v.get("value", "") for v in value.iterfind(f"{{{SSV}}}Value")]
+            sizes = [d.get("size") for d in parameter.iterfind(f"{{{SSC}}}Dimension")]
+            given = given or value.get("value", "").split(None if sizes else "\0")
+            entries = indices([int(n or len(given)) for n in sizes])
+            try:
+                for entry, text in zip(entries, given, strict=True):
+                    yield Given(name + entry, READ[kind](text), of)
+            except ValueError as error:  # also of a list for a scalar
+                what = f"{len(given)} values for {len(entries)} entries, {error}"
+                raise InputFault(f"{self.path}: parameter {name}: {what}") from None
 
-    def _mapped(self, mapping: Element, given: Mapping[str, Given], part: Part) -> Iterator[Given]:
+    def _mapped(self, mapping: Element, values: Iterable[Given], part: Part) -> Iterator[Given]:
+        """The values of the set under the names that they are mapped to, those of an array entry by
+        entry."""
+        given: dict[str, list[Given]] = {}
+        for value in values:
+            for name in {value.name, entry_of(value.name)[0]}:
+                given.setdefault(name, []).append(value)
         targets = set()
         for entry in mapping.iterfind(f"{{{SSM}}}MappingEntry"):
             source, target = entry.get("source", ""), entry.get("target", "")
@@ -139,10 +154,25 @@ class Parameters:
                 raise InputFault(f"{self.path}: two parameters are mapped to {name}; keep one")
             targets.add(target)
             if source not in given:
-                self.unused.append(dotted(part.place, source))
-            else:
-                linear = transformation(self.path, f"the mapping of {source}", entry)
-                yield replace(given[source], name=target, linear=linear, convert=converts(entry))
+                self.unused.append(dotted(part.place, source or f"source of {target}"))
+                continue
+            linear, convert = linear_of(entry), converts(entry)
+            for value in given[source]:
+                name = target + value.name.removeprefix(source)
+                mapped = self._looked_up(entry, value)
+                yield replace(value, name=name, value=mapped, linear=linear, convert=convert)
+
+    def _looked_up(self, entry: Element, given: Given) -> Value:
+        """The value after the mapping transformation of an entry, if it has one: unchanged where
+        its table does not contain it. An enumeration goes by the names of its items."""
+        if not (table := table_of(entry)):
+            return given.value
+        kind, targets = table
+        as_kind = READ[kind]
+        if type(given.value) is not type(as_kind("0")):
+            what = f"{given.value!r} is no {kind}, of which its mapping has a table"
+            raise InputFault(f"{self.path}: parameter {given.name}: {what}")
+        return {as_kind(a): as_kind(b) for a, b in targets.items()}.get(given.value, given.value)
 
     def _targets(self, part: Part, name: str) -> Iterator[Reach]:
         """The variables that `name` refers to in `part`."""

@@ -13,9 +13,8 @@ import atexit
 import hashlib
 import re
 import shutil
-import zipfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -26,50 +25,50 @@ from hapticlink.fmus import cache
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.archive import opened
 from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp import annotation
 from hapticlink.orchestrator.ssp.connections import Row, Wires
-from hapticlink.orchestrator.ssp.names import SSD, STRUCTURE
-from hapticlink.orchestrator.ssp.parameters import Parameters, Value
-from hapticlink.orchestrator.ssp.tree import Part, Place, checked, dotted, tree, units
-
-_ENTRY = re.compile(r"\[[\d, ]+\]$")
+from hapticlink.orchestrator.ssp.names import SSD
+from hapticlink.orchestrator.ssp.parameters import Parameters
+from hapticlink.orchestrator.ssp.tree import File, Part, Place, Tree, dotted
 
 
 def tables(path: Path) -> dict[str, Any]:
     """The tables of the SSP's scene; its FMUs are unpacked into the cache. Raises InputFault, with
     file and element, for what is malformed or not supported."""
-    with opened(path, "SSP") as archive:
-        text = read_xml(archive, STRUCTURE)
-        root = checked(path, STRUCTURE, text, "SystemStructureDescription")
-        element = root.find(f"{{{SSD}}}System")
-        assert element is not None  # required by the schema
-        system, defined = tree(path, element), units(root)
-        names = _names(part.place for part in system if part.source is not None)
-        with _room() as room:
-            described = _described(path, archive, system, room)
-        unconnected = Wires(path, _unconnected(system), described, defined)
-        described = _resized(described, Parameters(path, archive, unconnected).values())
-        wires = Wires(path, system, described, defined)
-        starts = Parameters(path, archive, wires).starts()
-    rest = annotation.read(path, root)
+    with structure(path) as (root, system, described):
+        wires = Wires(path, system, described)
+        starts = Parameters(path, wires).starts()
+    rest, named = annotation.read(path, root), names(described)
     tables: dict[str, Any] = {
         "title": root.get("description") or root.get("name") or path.stem,
         **rest,
     }
     about = rest.get("fmu", {})
     tables["fmu"] = [
-        {"path": str(fmu.path), "start": starts[place], "name": names[place]}
+        {"path": str(fmu.path), "start": starts[place], "name": named[place]}
         | about.get(dotted(place), {})
         for place, fmu in described.items()
     ]
     tables["connection"] = [
-        {"from": f"{names[a]}.{p}", "to": f"{names[b]}.{q}", **how}
+        {"from": f"{named[a]}.{p}", "to": f"{named[b]}.{q}", **how}
         for (a, p), (b, q), how in _grouped(wires.rows, described)
     ] + rest.get("connection", [])
     _experiment(path, tables, root, described.values())
     return tables
+
+
+@contextmanager
+def structure(path: Path) -> Iterator[tuple[Element, Part, dict[Place, Description]]]:
+    """The content of SystemStructure.ssd, its root system with all files open, and the FMUs with
+    arrays of the sizes that the parameters give them."""
+    with opened(path, "SSP") as archive, _room() as room, ExitStack() as archives:
+        root, system = Tree(archives).root(File(path, archive))
+        described = _described(system, room)
+        unconnected = Wires(path, _unconnected(system), described)
+        yield root, system, resized(described, Parameters(path, unconnected).values())
 
 
 @contextmanager
@@ -108,31 +107,29 @@ def _seconds(text: str) -> Fraction:
         return Fraction(0)
 
 
-def _names(places: Iterable[Place]) -> dict[Place, str]:
+def names(places: Iterable[Place]) -> dict[Place, str]:
     """The name of each component in [[fmu]]: its own, numbered where it is not unique."""
-    names: dict[Place, str] = {}
+    named: dict[Place, str] = {}
     counts: dict[str, int] = {}  # by the names that are taken
     for place in places:
         name = wanted = re.sub(r"\W", "_", "_".join(place))
         while name in counts:
             counts[wanted] += 1
             name = f"{wanted}_{counts[wanted]}"
-        counts[name], names[place] = 1, name
-    return names
+        counts[name], named[place] = 1, name
+    return named
 
 
-def _described(
-    path: Path, archive: zipfile.ZipFile, system: Part, room: Path
-) -> dict[Place, Description]:
+def _described(system: Part, room: Path) -> dict[Place, Description]:
     """The FMU of each component; an entry that several of them have is read once."""
-    known: dict[str, Description] = {}
+    known: dict[tuple[Path, str], Description] = {}
     fmus = {}
     for part in system:
-        if part.source is None:
-            continue
-        if part.source not in known:
-            known[part.source] = describe(_unpacked(path, archive, part, part.source, room))
-        fmus[part.place] = known[part.source]
+        if part.source:
+            file, entry = part.source
+            if (file.path, entry) not in known:
+                known[file.path, entry] = describe(_unpacked(room, file, entry, part.place))
+            fmus[part.place] = known[file.path, entry]
     return fmus
 
 
@@ -141,8 +138,8 @@ def _unconnected(part: Part) -> Part:
     return replace(part, lines=(), parts=tuple(map(_unconnected, part.parts)))
 
 
-def _resized(
-    described: Mapping[Place, Description], starts: Mapping[Place, Mapping[str, Value]]
+def resized(
+    described: Mapping[Place, Description], starts: Mapping[Place, Mapping[str, Any]]
 ) -> dict[Place, Description]:
     """The FMUs with arrays of the sizes that their structural parameters get."""
     fmus = {}
@@ -153,23 +150,24 @@ def _resized(
     return fmus
 
 
-def _unpacked(path: Path, archive: zipfile.ZipFile, part: Part, source: str, room: Path) -> Path:
+def _unpacked(room: Path, file: File, source: str, place: Place) -> Path:
     """The FMU at an entry of the archive, in the cache, or in `room` where that is off."""
+    archive = file.archive
     if source not in archive.NameToInfo:
         held = ", ".join(n for n in archive.namelist() if n.endswith(".fmu")) or "none"
-        where = f"{path}: {dotted(part.place)}"
+        where = f"{file.path}: {dotted(place)}"
         raise InputFault(f"{where}: there is no {source!r} in it; FMUs in it: {held}")
-    name = re.sub(r"\W", "_", Path(source).stem)
-    file = f"{name[:100]}.fmu"
+    stem = re.sub(r"\W", "_", Path(source).stem)
+    name = f"{stem[:100]}.fmu"
     with archive.open(source) as content:
         digest = hashlib.file_digest(content, "sha256").hexdigest()  # type: ignore[arg-type]
 
     def unpack(folder: Path) -> Path:
-        with archive.open(source) as content, (folder / file).open("wb") as unpacked:
+        with archive.open(source) as content, (folder / name).open("wb") as unpacked:
             shutil.copyfileobj(content, unpacked)
-        return folder / file
+        return folder / name
 
-    return cache.cached({"ssp": digest, "file": file}, unpack, room)
+    return cache.cached({"ssp": digest, "file": name}, unpack, room)
 
 
 def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterator[Row]:
@@ -177,7 +175,7 @@ def _grouped(rows: list[Row], described: Mapping[Place, Description]) -> Iterato
     i = 0
     while i < len(rows):
         (a, p), (b, q), how = rows[i]
-        whole = (_ENTRY.sub("", p), _ENTRY.sub("", q))
+        whole = entry_of(p)[0], entry_of(q)[0]
         outputs = described[a].port(whole[0], "output")
         inputs = described[b].port(whole[1], "input")
         pairs = zip(outputs, inputs, strict=False)

@@ -1,22 +1,30 @@
 """The elements of a SystemStructure.ssd as records: nested systems, components, connectors and
-connections (SSP 1.0, chapter 5). Unsupported elements are errors."""
+connections (SSP 2.0, chapter 5). Unsupported elements are errors."""
 
 from __future__ import annotations
 
+import math
+import posixpath
+import zipfile
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import cache
+from io import BytesIO
+from itertools import product
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element, fromstring
 
-from fmpy.ssp.ssd import validate_tree
 from lxml import etree
 
 from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
-from hapticlink.orchestrator.ssp.names import FMU, SSC, SSD, SSP1
+from hapticlink.orchestrator.fmi.variables import MAX_NUMBERS
+from hapticlink.orchestrator.ssp.names import DEFINITION, FMU, PACKAGE, SSC, SSD, STRUCTURE
 
 Place = tuple[str, ...]
 """The names of the elements from the root system, (), down to this one."""
@@ -24,12 +32,33 @@ Node = tuple[Place, str]
 """A connector or variable: its element, and its name there."""
 
 
+DEEPEST = 32
+"""Systems in systems in which a component may be a file with further ones."""
+
+
+@dataclass(frozen=True)
+class File:
+    """An .ssd, an entry of an archive, with the units that it defines. path: for errors, of the
+    archive, or of its place in another one."""
+
+    path: Path
+    archive: zipfile.ZipFile
+    entry: str = STRUCTURE
+    units: Mapping[str, Unit] = field(default_factory=dict)
+
+    def resolved(self, source: str) -> str:
+        """The entry of the archive that a relative URI refers to."""
+        return posixpath.normpath(posixpath.join(posixpath.dirname(self.entry), unquote(source)))
+
+
 @dataclass(frozen=True)
 class Connector:
-    """kind is "input", "output", "parameter" or "calculatedParameter"."""
+    """A connector, as it is written. sizes: of the dimensions of an array, None for one that is
+    left open; empty for a scalar."""
 
     kind: str
-    unit: str | None
+    unit: Unit | None
+    sizes: tuple[int | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -44,13 +73,14 @@ class Line:
 
 @dataclass(frozen=True)
 class Part:
-    """A component, with `source` its FMU's entry in the archive; or a system, with `parts` and with
-    `lines`, the connections between its own connectors and those of its parts."""
+    """A component, with `source` its FMU's file and entry; or a system, with `parts` and with
+    `lines`, the connections between its own connectors and those of its parts. bindings: its
+    parameter bindings, each with the file that it is in."""
 
     place: Place
     connectors: Mapping[str, Connector]
-    bindings: tuple[Element, ...]
-    source: str | None = None
+    bindings: tuple[tuple[File, Element], ...]
+    source: tuple[File, str] | None = None
     parts: tuple[Part, ...] = ()
     lines: tuple[Line, ...] = ()
 
@@ -67,20 +97,22 @@ def dotted(place: Place, *names: str) -> str:
 
 
 def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
-    """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 1.0.
-
-    A file of version 2.0 in the namespaces of 1.0, as OMSimulator writes it, is read as 1.0.
-    """
+    """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 2.0, whose
+    elements and namespaces include those of 1.0."""
     try:
         root = etree.fromstring(text)
-        if root.get("version", "").startswith("2.") and str(root.tag).startswith(f"{{{SSP1}"):
-            root.set("version", "1.0")
-            text = etree.tostring(root)
-        validate_tree(root, f"{schema}.xsd")
-    except Exception as error:  # FMPy raises bare Exception
-        what = str(error).removeprefix("Failed to validate SystemStructure.ssd:").strip()
-        raise InputFault(f"{path}: {entry} is no SSP 1.0 ({schema}): {what[:300]}") from error
+        if (version := root.get("version", "")).partition(".")[0] in ("1", "2"):
+            root.set("version", f"{version[0]}.0")  # also of 1.0.1 and drafts
+        _schema(schema).assertValid(root)
+    except (etree.LxmlError, ValueError) as error:
+        what = f"{path}: {entry} is no SSP 1.0 or 2.0 ({schema})"
+        raise InputFault(f"{what}: {str(error)[:300]}") from error
     return fromstring(text)
+
+
+@cache
+def _schema(name: str) -> etree.XMLSchema:
+    return etree.XMLSchema(file=str(Path(__file__).parent / "schema" / f"{name}.xsd"))
 
 
 def units(root: Element, space: str = SSD) -> dict[str, Unit]:
@@ -95,69 +127,127 @@ def units(root: Element, space: str = SSD) -> dict[str, Unit]:
     return units
 
 
-def tree(path: Path, element: Element, place: Place = ()) -> Part:
-    """The part of a System or Component element, with all parts inside it. Raises InputFault for
-    elements that are not supported and for names that are not unique."""
-    kind, where = element.tag.removeprefix(f"{{{SSD}}}"), dotted(place)
-    connectors = {
-        c.get("name", ""): _connector(path, place, c)
-        for c in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
-    }
-    bindings = (*element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding"),)
+@dataclass(frozen=True)
+class Tree:
+    """Reads .ssd files. archives: keeps those open that are in another one."""
+
+    archives: ExitStack
+
+    def root(self, file: File, place: Place = ()) -> tuple[Element, Part]:
+        """The content of an .ssd, and its root system as the element at `place`."""
+        text = read_xml(file.archive, file.entry)
+        root = checked(file.path, file.entry, text, "SystemStructureDescription")
+        element = root.find(f"{{{SSD}}}System")
+        assert element is not None  # required by the schema
+        return root, self._part(replace(file, units=units(root)), element, place)
+
+    def _part(self, file: File, element: Element, place: Place) -> Part:
+        """The part of a System or Component element, with all parts inside it. Raises InputFault
+        for elements that are not supported and for names that are not unique."""
+        path, where = file.path, dotted(place)
+        connectors = {
+            c.get("name", ""): _connector(file, place, c)
+            for c in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
+        }
+        bound = element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding")
+        bindings = tuple((file, binding) for binding in bound)
+        if element.tag != f"{{{SSD}}}System":
+            source = file, file.resolved(_source_of(path, where, element))
+            if element.get("type", FMU) == FMU:
+                return Part(place, connectors, bindings, source)
+            system = self._inner(*source, element, place)
+            return replace(system, bindings=(*system.bindings, *bindings))
+        inside = [*element.iterfind(f"{{{SSD}}}Elements/*")]
+        names = [e.get("name", "") for e in inside]
+        if twice := {n for n, count in Counter(names).items() if count > 1}:
+            what = f"{where} has two elements named {min(twice)!r}"
+            raise InputFault(f"{path}: {what}: name each once")
+        parts = (self._part(file, e, (*place, e.get("name", ""))) for e in inside)
+        lines = element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")
+        read = tuple(_line(path, place, line) for line in lines)
+        return Part(place, connectors, bindings, parts=tuple(parts), lines=read)
+
+    def _inner(self, file: File, entry: str, element: Element, place: Place) -> Part:
+        """The root system of the .ssp or .ssd that a component is (SSP 2.0, section 5.4)."""
+        if len(place) > DEEPEST:
+            raise InputFault(f"{file.path}: {dotted(place)}: more than {DEEPEST} files in files")
+        if element.get("type") == PACKAGE:
+            if entry not in file.archive.NameToInfo:
+                raise InputFault(f"{file.path}: {dotted(place)}: there is no {entry!r} in it")
+            path, content = file.path / entry, BytesIO(file.archive.read(entry))
+            archive = self.archives.enter_context(opened(path, "SSP", content))
+            return self.root(File(path, archive), place)[1]
+        return self.root(replace(file, entry=entry), place)[1]
+
+
+def _source_of(path: Path, where: str, element: Element) -> str:
+    """The source of a component. Raises InputFault for an element that is none to run."""
+    kind, type_ = element.tag.removeprefix(f"{{{SSD}}}"), element.get("type", FMU)
+    how, source = element.get("implementation", "CoSimulation"), element.get("source")
     if kind == "Component":
-        type_, how = element.get("type", FMU), element.get("implementation")
-        if type_ == FMU and how != "ModelExchange":
-            entry = unquote(element.get("source", "")).removeprefix("./")
-            return Part(place, connectors, bindings, entry)
-        kind += " for model exchange" if type_ == FMU else f" of type {type_}"
-    if kind != "System":
-        raise InputFault(
-            f"{path}: {where} is a {kind}; supported are systems, and components that are FMUs for "
-            "co-simulation: put the system of another file into this one, and connect signals one "
-            "by one"
-        )
-    names = [e.get("name", "") for e in element.iterfind(f"{{{SSD}}}Elements/*")]
-    if twice := {n for n, count in Counter(names).items() if count > 1}:
-        raise InputFault(f"{path}: {where} has two elements named {min(twice)!r}: name each once")
-    parts = (
-        tree(path, e, (*place, name))
-        for e, name in zip(element.iterfind(f"{{{SSD}}}Elements/*"), names, strict=True)
+        known = type_ in (FMU, PACKAGE, DEFINITION)
+        if known and source and how == "CoSimulation":
+            return source
+        unfit = f" for {how}" if how != "CoSimulation" else " without source"
+        kind += unfit if known else f" of type {type_}"
+    raise InputFault(
+        f"{path}: {where} is a {kind}; supported are systems, and components that are FMUs for "
+        "co-simulation, .ssp or .ssd: connect signals one by one"
     )
-    lines = (
-        _line(path, place, c) for c in element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")
-    )
-    return Part(place, connectors, bindings, parts=tuple(parts), lines=tuple(lines))
 
 
-def _connector(path: Path, place: Place, element: Element) -> Connector:
-    kind, real = element.get("kind", ""), element.find(f"{{{SSC}}}Real")
-    if kind == "inout":
-        name = dotted(place, element.get("name", ""))
-        raise InputFault(f"{path}: {name} is inout; give its kind as input or output")
-    return Connector(kind, real.get("unit") if real is not None else None)
+def _connector(file: File, place: Place, element: Element) -> Connector:
+    kind, name = element.get("kind", ""), dotted(place, element.get("name", ""))
+    if kind in ("inout", "unspecified"):
+        raise InputFault(f"{file.path}: {name} is {kind}; give its kind as input or output")
+    unit = next((e.get("unit") for e in element if e.get("unit")), None)
+    sizes = (d.get("size") for d in element.iterfind(f"{{{SSC}}}Dimension"))
+    of = file.units.get(unit, Unit(unit)) if unit else None
+    return Connector(kind, of, tuple(int(size) if size else None for size in sizes))
+
+
+def indices(sizes: Sequence[int | None]) -> list[str]:
+    """The indices of all entries of an array row by row, as "[1,1]", "[1,2]" ...; [""] of a
+    scalar, [] where a size is left open. Raises InputFault for more than MAX_NUMBERS entries."""
+    if None in sizes:
+        return []
+    if math.prod(size or 0 for size in sizes) > MAX_NUMBERS:
+        raise InputFault(f"an array of the sizes {sizes}; at most {MAX_NUMBERS} entries")
+    every = product(*(range(1, 1 + (size or 0)) for size in sizes))
+    return [f"[{','.join(map(str, entry))}]" if entry else "" for entry in every]
 
 
 def _line(path: Path, place: Place, element: Element) -> Line:
     def node(end: str) -> Node:
-        inside = element.get(f"{end}Element")
-        return (*place, inside) if inside else place, element.get(f"{end}Connector", "")
+        inside, name = element.get(f"{end}Element"), element.get(f"{end}Connector", "")
+        if entry := element.get(f"{end}Indices", "").split():  # from 1, by its authors' examples
+            name += f"[{','.join(entry)}]"
+        return (*place, inside) if inside else place, name
 
     ends = (node("start"), node("end"))
     names = " and ".join(dotted(*end) for end in ends)
-    linear = transformation(path, f"the connection of {names}", element)
-    return Line(ends, linear, converts(element))
+    if table := table_of(element):
+        what = f"{table[0]}MappingTransformation is read in parameter mappings only"
+        raise InputFault(f"{path}: connection of {names}: {what}; put its table into an FMU")
+    return Line(ends, linear_of(element), converts(element))
 
 
-def transformation(path: Path, where: str, element: Element) -> Linear:
-    """The linear transformation of a connection or mapping. Raises InputFault for mapping
-    transformations, which are tables of values."""
+def linear_of(element: Element) -> Linear:
+    """The linear transformation of a connection or mapping."""
+    linear = element.find(f"{{{SSC}}}LinearTransformation")
+    if linear is None:
+        return SAME
+    return Linear(float(linear.get("factor", "1")), float(linear.get("offset", "0")))
+
+
+def table_of(element: Element) -> tuple[str, dict[str, str]] | None:
+    """The mapping transformation of a connection or mapping: the type of its values, "Boolean",
+    "Integer" or "Enumeration", and the target of each source."""
     for child in element:
-        if child.tag == f"{{{SSC}}}LinearTransformation":
-            return Linear(float(child.get("factor", "1")), float(child.get("offset", "0")))
-        if child.tag.endswith("MappingTransformation"):
-            name = child.tag.removeprefix(f"{{{SSC}}}")
-            raise InputFault(f"{path}: {where}: {name} is not read; put its table into an FMU")
-    return SAME
+        if child.tag.endswith(end := "MappingTransformation"):
+            kind = child.tag.removeprefix(f"{{{SSC}}}").removesuffix(end)
+            return kind, {e.get("source", ""): e.get("target", "") for e in child}
+    return None
 
 
 def converts(element: Element) -> bool:

@@ -1,7 +1,8 @@
 """Writes a scene as an SSP, SystemStructure.ssd and the FMUs, for this and other tools.
 
-Each connection is from scalar to scalar. Rates, holds and connections to parameters and of clocks,
-which SSP 1.0 does not have, are in an annotation, as JSON with the keys of a scene.
+Its version is 1.0, or 2.0 with an FMU of FMI 3.0, whose types, arrays and clocks 1.0 does not have.
+Each connection is from scalar to scalar. Rates, holds and connections to parameters, which no SSP
+has, are in an annotation, as JSON with the keys of a scene.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 import zipfile
+from collections import Counter
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -30,14 +32,12 @@ from hapticlink.orchestrator.ssp import step_sizes
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
     FMU,
-    LARGEST,
     NOT_IN_ANNOTATION,
     RUN,
     SSC,
     SSD,
     SSV,
     STRUCTURE,
-    type_of,
 )
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
@@ -76,20 +76,31 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
     """The text of SystemStructure.ssd, of a system of this name."""
     for prefix, space in PREFIXES.items():
         register_namespace(prefix, space)
-    about = {"version": "1.0", "name": name, "description": scene.title}
+    version = "2.0" if any(unit.description.fmi == "3" for unit in system.fmus) else "1.0"
+    about = {"version": version, "name": name, "description": scene.title}
     root = Element(f"{{{SSD}}}SystemStructureDescription", about)
     top = SubElement(root, f"{{{SSD}}}System", name="system")
     elements = SubElement(top, f"{{{SSD}}}Elements")
     for unit in system.fmus:
-        step_sizes.of_component(_component(elements, unit), system, unit)
+        step_sizes.of_component(_component(elements, unit, version), system, unit)
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
-    lines = [c for c in system.connections if _has_line(c)]
+    lines = [c for c in system.connections if not c.to_parameter]
+    variable = {
+        (unit.name, s.name): (name, s.indices if len(entries) > 1 else ())
+        for unit in system.fmus
+        for name, entries in _variables(unit).items()
+        for s in entries
+    }
     if lines:
         connections = SubElement(top, f"{{{SSD}}}Connections")
     for c in lines:
         for a, b in zip(c.outputs, c.inputs, strict=True):
-            ends = {"startElement": c.source, "startConnector": a.name}
-            ends |= {"endElement": c.target, "endConnector": b.name}
+            ends = {}
+            for end, fmu, scalar in (("start", c.source, a), ("end", c.target, b)):
+                ends[f"{end}Element"] = fmu
+                ends[f"{end}Connector"], indices = variable[fmu, scalar.name]
+                if indices:
+                    ends[f"{end}Indices"] = " ".join(map(str, indices))
             wire = wires.get(c.name)
             if wire and not wire.convert:
                 ends["suppressUnitConversion"] = "true"
@@ -109,38 +120,60 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
     return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
 
-def _component(elements: Element, unit: Fmu) -> Element:
+def _component(elements: Element, unit: Fmu, version: str) -> Element:
     about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
     component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
-    causalities = ("input", "output", "parameter")
-    every = (s for s in unit.description.scalars if s.causality in causalities)
-    shown = [s for s in every if s.type != "Clock"]
+    variables = _variables(unit)
+    taken = ("input", "output", "parameter")
+    shown = {n: e for n, e in variables.items() if e[0].causality in taken}
     if shown:
         connectors = SubElement(component, f"{{{SSD}}}Connectors")
-    for s in shown:
-        connector = SubElement(
-            connectors, f"{{{SSD}}}Connector", {"name": s.name, "kind": s.causality}
-        )
+    for name, (s, *_) in shown.items():
+        about = {"name": name, "kind": s.causality}
+        connector = SubElement(connectors, f"{{{SSD}}}Connector", about)
         unit_of = {"unit": s.unit} if s.unit and unit.description.units.get(s.unit) else {}
-        SubElement(connector, f"{{{SSC}}}{type_of(s.type)}", unit_of)
+        SubElement(connector, f"{{{SSC}}}{s.type}", unit_of)
+        _dimensions(connector, shown[name])
     if unit.starts:
         bindings = SubElement(component, f"{{{SSD}}}ParameterBindings")
         binding = SubElement(bindings, f"{{{SSD}}}ParameterBinding")
         values = SubElement(binding, f"{{{SSD}}}ParameterValues")
-        set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version="1.0", name="start")
+        set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version=version, name="start")
         parameters = SubElement(set_, f"{{{SSV}}}Parameters")
-        for scalar, value in unit.starts:
-            parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=scalar.name)
-            SubElement(parameter, f"{{{SSV}}}{type_of(scalar.type)}", value=_text(scalar, value))
+    given = {scalar.name: value for scalar, value in unit.starts}
+    started = {n: e for n, e in variables.items() if any(s.name in given for s in e)}
+    for name, entries in started.items():
+        text = " ".join(_text(s, given.get(s.name, s.start)) for s in entries)
+        parameter = SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+        SubElement(parameter, f"{{{SSV}}}{entries[0].type}", value=text)
+        _dimensions(parameter, entries)
     return component
 
 
+def _variables(unit: Fmu) -> dict[str, list[Scalar]]:
+    """The scalars of each variable by its name: of an array of FMI 3.0 all entries, row by row,
+    which share a reference."""
+    description = unit.description
+    references = Counter(s.reference for s in description.scalars)
+    variables: dict[str, list[Scalar]] = {}
+    for s in (*description.scalars, *description.strings):
+        array = description.fmi == "3" and references[s.reference] > 1
+        variables.setdefault(s.port if array else s.name, []).append(s)
+    return variables
+
+
+def _dimensions(element: Element, entries: list[Scalar]) -> None:
+    for size in entries[-1].indices if len(entries) > 1 else ():
+        SubElement(element, f"{{{SSC}}}Dimension", size=str(size))
+
+
 def _text(scalar: Scalar, value: bool | int | float | str) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if type_of(scalar.type) == "Integer" and not -LARGEST <= int(value) < LARGEST:
-        raise InputFault(f"start.{scalar.name}: {value}: integers of an SSP have 32 bits")
-    return repr(float(value)) if type_of(scalar.type) == "Real" else str(value)
+    if isinstance(value, str):
+        return value
+    if scalar.type == "Boolean":
+        return str(bool(value)).lower()
+    real = scalar.type.startswith(("Real", "Float"))
+    return repr(float(value)) if real else str(int(value))
 
 
 def _units(root: Element, system: System) -> None:
@@ -185,14 +218,9 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     }
     wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
     tables["connection"] = [
-        _row(c, wires.get(c.name)) for c in system.connections if not _has_line(c)
+        _row(c, wires.get(c.name)) for c in system.connections if c.to_parameter
     ]
     return tables
-
-
-def _has_line(c: Connection) -> bool:
-    """Whether a connection is one that the standard has."""
-    return not c.to_parameter and c.outputs[0].type != "Clock"
 
 
 def _row(c: Connection, wire: Wire | None) -> dict[str, Any]:

@@ -78,6 +78,8 @@ NOT_RUN = {
         "needs a cluster; tests/analysis/sweep/test_sweep.py",
     "hapticlink run their.ssp --set haptics.rate=100 --set duration=10 --set fmu.engine.rate=20":
         "is of somebody else's file; tests/orchestrator/ssp/test_ssp.py",
+    "hapticlink run their.ssp --set-file cold.ssv":
+        "is of somebody else's file; tests/orchestrator/ssp/test_set_files.py",
 }  # fmt: skip
 """Commands that are parsed, with their scene, keys and values, but not run; the reason."""
 UNTIL_STOPPED = re.compile("hapticlink (view (?!.*--export)|serve )")

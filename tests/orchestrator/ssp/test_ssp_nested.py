@@ -14,15 +14,19 @@ from hapticlink.orchestrator.ssp import read
 from tests.orchestrator.foreign_fmus import edited, python_fmu
 from tests.orchestrator.run.test_bonds import fmus
 from tests.orchestrator.ssps import (
+    HEAD,
     ON,
     TABLE,
     TAIL,
+    binding,
+    bindings,
     component,
     connectors,
     line,
     linear,
     ssp,
     system,
+    values,
 )
 
 
@@ -138,6 +142,44 @@ def test_an_fmu_of_many_components_is_read_once(tmp_path, monkeypatch):
     assert len(opened) == 1
 
 
+PACKAGE, DEFINITION = "application/x-ssp-package", "application/x-ssp-definition"
+
+
+def as_component(name: str, type_: str, source: str, bound: str = "") -> str:
+    return f'<ssd:Component name="{name}" type="{type_}" source="{source}">{bound}</ssd:Component>'
+
+
+def inner_ssp(folder: Path, root: str, **entries: str | bytes) -> bytes:
+    folder.mkdir()
+    return Path(ssp(folder, root, **entries)).read_bytes()
+
+
+def test_an_ssp_and_an_ssd_are_components(tmp_path):
+    """Their units, FMUs and parameter files are their own; a component's bindings go before those
+    of the system in it (SSP 2.0, section 5.3.3)."""
+    own = bindings(binding(about='source="resources/a.ssv"'))
+    strong = system(
+        "any", connectors(out="output"), component("g", "Gives"), line("g.y", "out"), own
+    )
+    given = inner_ssp(tmp_path / "in", strong, a_ssv=values(("g.gain", "50 cm")))
+    taker = system("any", connectors(u="input"), component("t", "Takes", ON), line("u", "t.u"))
+    ssd = (HEAD + taker + TAIL).replace('source="resources/', 'source="')
+    for bound, expected in (("", 0.5), (bindings(binding(values(("g.gain", "2")))), 2.0)):
+        parts = as_component("left", PACKAGE, "resources/in.ssp", bound)
+        parts += as_component("right", DEFINITION, "resources/right.ssd")
+        root = system("top", "", parts, line("left.out", "right.u"))
+        path = ssp(tmp_path, root, in_ssp=given, right_ssd=ssd)
+        found = ended(path, tmp_path)
+        assert found["left_g.y"] == 1000.0 * expected
+        assert found["right_t.y"] == pytest.approx(expected, rel=1e-14)
+
+
+def test_files_in_files_end(tmp_path):
+    again = as_component("again", DEFINITION, "SystemStructure.ssd")
+    with pytest.raises(InputFault, match="more than 32 files in files"):
+        open_scene.load(ssp(tmp_path, system("top", "", again, line("again.y", "again.u"))))
+
+
 OTHERS = component("p", "Plain") + component("t", "Text")
 TEXT = system("top", "", OTHERS, line("p.y", "t.on"))
 LOOP = system("loop", connectors(a="input", b="output"), component("p", "Plain"), line("a", "b"))
@@ -154,9 +196,9 @@ REFERENCE = '<ssd:SignalDictionaryReference name="p" dictionary="d"/>'
         (line("p.u", "u"), line("p.y", "u"), r"right\.u are connected, and both are outputs"),
         (line("p.u", "u"), line("u", "t.u"), r"right\.t\.u is fed by right\.u and by right\.u"),
         ('name="p" source', 'name="t" source', r"right has two elements named 't'"),
-        (linear(-1, 0.25), TABLE, "BooleanMappingTransformation is not read"),
+        (linear(-1, 0.25), TABLE, "BooleanMappingTransformation is read in parameter"),
         ('source="resources/Plain', 'implementation="ModelExchange" source="resources/Plain',
-         r"right\.p is a Component for model exchange"),
+         r"right\.p is a Component for ModelExchange"),
         ('startTime="0.0"', 'startTime="1.0"', "starts at 1.0 s; runs start at 0"),
         ('kind="input"', 'kind="inout"', r"right\.u is inout"),
         (component("p", "Plain"), REFERENCE, r"right\.p is a SignalDictionaryReference"),

@@ -116,6 +116,30 @@ def test_an_item_of_an_enumeration_goes_by_its_name(tmp_path):
     assert starts(tmp_path, gives=bindings(binding(item)))["g"]["gain"] == "2"
 
 
+def table(kind: str, **targets: str) -> str:
+    entries = "".join(
+        f'<ssc:MapEntry source="{a.lstrip("_")}" target="{b}"/>' for a, b in targets.items()
+    )
+    return f"<ssc:{kind}MappingTransformation>{entries}</ssc:{kind}MappingTransformation>"
+
+
+def test_a_table_of_a_mapping_replaces_what_it_contains(tmp_path):
+    given = values(("on", "true"), ("n", "2"), ("m", "3"), ("item", "slow"))
+    for name, kind in (("n", "Integer"), ("m", "Integer"), ("item", "Enumeration")):
+        old = f'"{name}"><ssv:Real'
+        given = given.replace(old, f'"{name}"><ssv:{kind}')
+    mapped = mapping(
+        ("on", "t.on", table("Boolean", true="0")),
+        ("n", "box.p.u", table("Integer", _2="7", _4="8")),
+        ("m", "box.q.u", table("Integer", _2="7")),
+        ("item", "g.gain", table("Enumeration", slow="1", fast="2")),
+    )
+    found = starts(tmp_path, top=bindings(binding(given, mapped)))
+    assert found["t"]["on"] is False
+    assert (found["box_p"]["u"], found["box_q"]["u"]) == (7, 3)
+    assert found["g"]["gain"] == "1"
+
+
 def test_values_that_match_nothing_are_passed_over_and_told(tmp_path, caplog):
     bound = binding(
         values(("gain", "2"), ("lost", "1")), mapping(("lost", "away", ""), ("no", "u", ""))
@@ -135,7 +159,8 @@ def test_of_what_is_passed_over_few_are_told_without_escape_codes(tmp_path, capl
     [
         (binding(values(("gain", "1 N"))), r"parameter g\.gain does not fit: kg\.m\.s-2 is not m"),
         (binding(values(("gain", "true")), mapping(("gain", "gain", linear(2, 0)))), "no number"),
-        (binding(values(("gain", "1")), mapping(("gain", "gain", TABLE))), "is not read"),
+        (binding(values(("gain", "1")), mapping(("gain", "gain", TABLE))),
+         r"parameter gain: 1\.0 is no Boolean, of which its mapping has a table"),
         (binding(values(("a", "1"), ("b", "1")), mapping(("a", "gain", ""), ("b", "gain", ""))),
          r"two parameters are mapped to g\.gain"),
         (binding(values(("gain", "much"))), "is no SSP 1.0"),

@@ -1,0 +1,193 @@
+"""What SSP 2.0 has and 1.0 has not: arrays, types of FMI 3.0, further kinds of connectors."""
+
+import zipfile
+from xml.etree import ElementTree
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.experiment import simulate
+from tests.orchestrator.foreign_fmus import c_fmu3, clock_fmu3, fmu_table, scene, wire_table
+from tests.orchestrator.run.test_bonds import fmus
+from tests.orchestrator.ssps import (
+    binding,
+    bindings,
+    component,
+    foreign,
+    line,
+    mapping,
+    ssp,
+    system,
+)
+
+SPACES = (
+    'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" '
+    'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"'
+)
+
+
+def array(name: str, kind: str, *sizes: str) -> str:
+    """A connector of these dimensions, each 'size="2"', 'sizeConnector="n"' or ''."""
+    each = "".join(f"<ssc:Dimension {size}/>" for size in sizes)
+    connector = f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Float64/>{each}</ssd:Connector>'
+    return f"<ssd:Connectors>{connector}</ssd:Connectors>"
+
+
+def parameters(*inside: str) -> str:
+    given = "".join(f"<ssv:Parameter {each}</ssv:Parameter>" for each in inside)
+    set_ = f'<ssv:ParameterSet version="2.0" name="p" {SPACES}><ssv:Parameters>{given}'
+    return f"{set_}</ssv:Parameters></ssv:ParameterSet>"
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.0.1", "2.0", "2.0-rc.1"])
+def test_every_version_of_the_namespaces_is_read(tmp_path, version):
+    path = foreign(tmp_path, 'version="1.0" name', f'version="{version}" name')
+    ended = simulate(path, tmp_path / "out", ["haptics.rate=50", "duration=0.2"])
+    assert ended.results.haptics["c.y"][-1] == pytest.approx(2.0, rel=1e-15)
+
+
+SPRING = component("s", "Spring")
+
+
+def moved(folder, root: str) -> str:
+    fmus(folder, "m")
+    made = {f"{n}_fmu": (folder / f"{n}.fmu").read_bytes() for n in ("Moves", "Spring")}
+    return ssp(folder, root, **made)
+
+
+def boxed(sizes: tuple[str, ...], inner: str, across: str) -> str:
+    """Moves, with its path x[2], in a box with an array x; and Spring, with d[2]."""
+    box = system("box", array("x", "output", *sizes), component("m", "Moves"), inner)
+    return system("top", "", box + SPRING, across)
+
+
+WHOLE, ACROSS = line("m.x", "x", "3 0"), line("box.x", "s.d")
+
+
+@pytest.mark.parametrize("size", ['size="2"', 'sizeConnector="n"', ""])
+def test_arrays_are_connected_whole_through_borders(tmp_path, size):
+    """The size of a system's connector is that of the other end where it is left open."""
+    path = moved(tmp_path, boxed((size,), WHOLE, ACROSS))
+    (only,) = open_scene.load(path, ["haptics.rate=50"]).connection
+    assert (only.from_, only.to, only.factor) == ("box_m.x", "s.d", 3.0)
+
+
+def test_an_entry_is_connected_by_its_indices(tmp_path):
+    first = line("m.x", "x", how='startIndices="2" endIndices="1 1"')
+    across = line("box.x", "s.d", how='startIndices="1 1" endIndices="2"')
+    path = moved(tmp_path, boxed(('size="1"', 'size="1"'), first, across))
+    (only,) = open_scene.load(path, ["haptics.rate=50"]).connection
+    assert (only.from_, only.to) == ("box_m.x[2]", "s.d[2]")
+
+
+def test_a_connection_of_clocks_is_read(tmp_path):
+    root = component("one", "clocks") + component("two", "clocks") + component("p", "Plain")
+    made = {"clocks_fmu": clock_fmu3(tmp_path).read_bytes()}
+    path = ssp(tmp_path, system("top", "", root, line("one.fired", "two.go")), **made)
+    options = ["haptics.rate=100", "duration=1"]
+    found = simulate(path, tmp_path / "out", options).results.haptics
+    assert found["two.go_count"][-1] == found["one.fired_count"][-1] > 0
+
+
+MATRIX = """name="array"><ssv:Float64 value="1 2 3 4 5 6 7 8 9"/><ssc:Dimension size="3"/>
+<ssc:Dimension size="3"/>"""
+SIZE = 'name="size"><ssv:UInt64 value="3"/>'
+LARGE = 'name="in_Int64"><ssv:Int64 value="9007199254740991"/>'
+TEXT = 'name="text"><ssv:String><ssv:Value value="two words"/></ssv:String>'
+
+
+def typed(folder, bound: str, how: str = "") -> str:
+    made = {"types_fmu": c_fmu3(folder).read_bytes()}
+    one = component("a", "types", bindings(bound)).replace("source=", f"{how} source=", bool(how))
+    two = component("p", "Plain")
+    return ssp(folder, system("top", "", one + two, line("p.y", "p.u")), **made)
+
+
+def test_values_of_fmi_3_and_arrays_start_as_given(tmp_path):
+    path = typed(tmp_path, binding(parameters(SIZE, MATRIX, LARGE, TEXT)))
+    ended = simulate(path, tmp_path / "out", ["haptics.rate=50"])
+    found, (first, _) = ended.results.haptics, open_scene.load(path, ["haptics.rate=50"]).fmu
+    assert found["a.sum"][-1] == sum(i * i for i in range(1, 10))
+    assert found["a.out_Int64"][-1] == 2**53 - 1
+    assert first.start["text"] == "two words"
+
+
+def test_an_array_is_mapped_whole(tmp_path):
+    given = parameters(SIZE, MATRIX.replace('name="array"', 'name="m"'))
+    path = typed(tmp_path, binding(given, mapping(("m", "array", ""), ("size", "size", ""))))
+    ended = simulate(path, tmp_path / "out", ["haptics.rate=50"])
+    assert ended.results.haptics["a.sum"][-1] == sum(i * i for i in range(1, 10))
+
+
+@pytest.mark.parametrize(
+    ("given", "how", "message"),
+    [
+        (MATRIX.replace(" 9", ""), "", r"parameter array: 8 values for 9 entries"),
+        ('name="sum"><ssv:Float64 value="1 2"/>', "", "parameter sum: "),
+        (MATRIX.replace("3", "300000000"), "", "at most 1000000 entries"),
+        (LARGE.replace("Int64 v", "Int32 v"), "", "is no SSP 1.0 or 2.0"),
+        (SIZE, 'implementation="ScheduledExecution"', "a is a Component for ScheduledExecution"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(tmp_path, given, how, message):
+    with pytest.raises(InputFault, match=message):
+        open_scene.load(typed(tmp_path, binding(parameters(given)), how), ["haptics.rate=50"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('size="2"', 'size="3"', r"box\.m\.x and box\.x are connected, and have 2 and 3 entries"),
+        (' source="resources/Moves.fmu"', "", r"box\.m is a Component without source"),
+        ('kind="output"', 'kind="unspecified"', r"box\.x is unspecified"),
+        ('size="2"', 'size="1000001"', "at most 1000000 entries"),
+    ],
+)
+def test_structures_that_cannot_run_are_refused(tmp_path, old, new, message):
+    root = boxed(('size="2"',), WHOLE, ACROSS)
+    assert old in root
+    with pytest.raises(InputFault, match=message):
+        open_scene.load(moved(tmp_path, root.replace(old, new)), ["haptics.rate=50"])
+
+
+def test_a_binary_is_not_connected(tmp_path):
+    path = ssp(
+        tmp_path,
+        system("top", "", component("a", "types") + component("p", "Plain"), line("p.y", "a.blob")),
+        types_fmu=c_fmu3(tmp_path).read_bytes(),
+    )
+    with pytest.raises(InputFault, match=r"a\.blob, which is a Binary, set at the start only"):
+        open_scene.load(path, ["haptics.rate=50"])
+
+
+def test_a_scene_with_fmi_3_is_written_as_2_0_and_comes_back(tmp_path):
+    """Arrays are connectors of their own; whole numbers of 64 bits are parameters."""
+    hl.build("five-bar", out=tmp_path, as_one=True, fmi=3)
+    c_fmu3(tmp_path)
+    text = fmu_table("a", "five_bar") + fmu_table("b", "five_bar")
+    text += fmu_table("c", "types", "start = { in_Int64 = 1099511627776 }\n")
+    wire = wire_table("a.hand.F", "b.virtual_mechanism.F_drift", "factor = 0.5\n")
+    ours = scene(tmp_path, text + wire)
+    theirs = hl.export(ours, out=tmp_path / "made.ssp")
+    with zipfile.ZipFile(theirs) as archive:
+        root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+    assert root.get("version") == "2.0"
+    found = {
+        connector.get("name"): [d.get("size") for d in connector.iterfind("{*}Dimension")]
+        for connector in root.iterfind(".//{*}Component[@name='b']/{*}Connectors/{*}Connector")
+    }
+    assert found["virtual_mechanism.q"] == ["4"]
+    lines = [line.attrib for line in root.iterfind(".//{*}Connection")]
+    assert [line["startConnector"] for line in lines] == ["hand.F"] * 3
+    assert [line["endIndices"] for line in lines] == ["1", "2", "3"]
+    tables = []
+    for path in (ours, theirs):
+        run = simulate(str(path), tmp_path / "out")
+        tables.append(run.results.haptics)
+        assert run.results.haptics["c.out_Int64"][-1] == 2**40
+    assert tables[0].keys() == tables[1].keys()
+    assert all((tables[0][name] == tables[1][name]).all() for name in tables[0])
+    moved = tables[0]["b.virtual_mechanism.x"] - tables[0]["a.virtual_mechanism.x"]
+    assert abs(moved).max() > 1e-6
