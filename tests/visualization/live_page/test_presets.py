@@ -52,12 +52,13 @@ def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str,
     assert calm["messages"] == [{"type": "rate", "value": 64}]
     options = []
     for preset in (buzz, mend):
-        rate, *holds = preset["messages"]
-        assert rate["type"] == "rate"
+        rate, gain, *holds = preset["messages"]
+        assert (rate["type"], gain["name"]) == ("rate", "controller.B_pc")
         found = {f'holds."{each["connection"]}"': each["hold"] for each in holds}
+        assert {*found.values()} == {"foh" if preset is buzz else "passive"}
+        damping = [20.0 * gain["factor"]] * 2 + [0.02 * gain["factor"]]
+        found |= {"controller.teleoperation.damping": damping}
         options.append({"graphics.rate": rate["value"], **found})
-    assert set([*options[0].values()][1:]) == {"foh"}
-    assert set([*options[1].values()][1:]) == {"passive"}
     hand = {"stiffness": [100.0, 100.0, 0.0], "target": [[0.0, 0.0245, 0.0148, -0.785]]}
     peaks = []
     for chosen in options:
@@ -69,18 +70,25 @@ def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str,
     assert peaks[0] > 10 * peaks[1]
 
 
-@pytest.mark.parametrize("name", ["closed-loop", "enclosure", "two-users", "serial", "obstacles"])
+@pytest.mark.parametrize(
+    "name", ["closed-loop", "closed-loop-direct", "enclosure", "two-users", "serial"]
+)
 def test_buzz_is_a_vibration_that_is_seen(name: str) -> None:
     """In the mouse's hand, as the lifted map has it: it grows, at a few Hz."""
     found, parameters = begun(name)
     chosen = javascript("presets.js", "answer = presets(given);", found)[1]
     assert chosen["name"] == "Buzz"
+    settings = Settings(rate=32.0)
     for message in chosen["messages"]:
-        assert message["type"] == "gain"
-        gain = message["name"]
-        parameters[gain] = [message["factor"] * value for value in parameters[gain]]
+        match message:
+            case {"type": "gain", "name": gain, "factor": factor}:
+                parameters[gain] = [factor * value for value in parameters[gain]]
+            case {"type": "hold", "connection": connection, "hold": hold}:
+                settings.holds[connection] = hold
+            case {"type": "rate", "value": rate}:
+                settings.rate = rate
     scene = viewed(name, {"packaging": "python"})
-    case = next(judged(scene, Settings(rate=32.0), parameters))
+    case = next(judged(scene, settings, parameters))
     assert case.growth > 1.0
     assert 5.0 < case.hertz < 30.0
 
