@@ -115,6 +115,9 @@ class Session:
         changed, waiting = False, self._waiting
         self._waiting = []
         for message in messages.newest([*waiting, *self._link.received()]):
+            if self._again:  # what comes behind a reset is for the run that begins
+                self._waiting.append(message)
+                continue
             if isinstance(message, messages.Time):
                 self._time(message.do)
                 continue
