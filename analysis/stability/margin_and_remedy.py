@@ -89,9 +89,8 @@ def improvements(
     stable = worst.free or worst.verdict != "unstable" or worst.drifts
     with search.place() as (place, _):
         margin = search.margin(place)
-        softer = search.softer(place, margin)
-        candidates = () if stable else [*search.candidates(place, margin, softer)]
-    return margin, search.remedies(candidates, softer, poses)
+        candidates = () if stable else [*search.candidates(place, margin)]
+    return margin, search.remedies(candidates, poses)
 
 
 class _Search:
@@ -105,6 +104,7 @@ class _Search:
     ) -> None:
         self._scene, self._given, self._pose = scene, given, pose
         self._hands, self._bounds = hands, bounds
+        self._softer: tuple[str, ...] = ()
         self._read = open_scene.load(scene, given)
         self._haptic = exact(self._read.haptics.rate)
 
@@ -168,23 +168,17 @@ class _Search:
         except (InputFault, FmuFault):
             return float("inf")
 
-    def softer(self, place: RestingScene, margin: Margin) -> tuple[str, ...]:
-        """The options of gains below their limit; none where no gains are stable."""
-        if not margin.stiffness:
-            return ()
-        scale = min(1.0, margin.stiffness) / SAFE
-        gains = place.gains
-        return tuple(overrides.written(gains.options(dict.fromkeys(gains.laws, scale))))
-
-    def candidates(
-        self, place: RestingScene, margin: Margin, gain: tuple[str, ...]
-    ) -> Iterator[tuple[str, ...]]:
+    def candidates(self, place: RestingScene, margin: Margin) -> Iterator[tuple[str, ...]]:
         """Single changes of the scene, and the last resort, softer gains and rate together."""
         read, gains = self._read, place.gains
         for hold in HOLDS:
             if read.graphics is not None and hold != read.hold and not read.holds:
                 yield (f"hold={hold}",)
-        if gain:
+        gain: tuple[str, ...] = ()
+        if margin.stiffness:
+            scale = min(1.0, margin.stiffness) / SAFE
+            gain = tuple(overrides.written(gains.options(dict.fromkeys(gains.laws, scale))))
+            self._softer = gain
             yield gain
         table, _, _ = LAWS["drift"]
         for factor in DAMPINGS:
@@ -207,14 +201,11 @@ class _Search:
                 yield (_rate("haptics", factor * self._haptic), *gain)
 
     def remedies(
-        self,
-        candidates: Sequence[tuple[str, ...]],
-        softer: tuple[str, ...],
-        poses: Sequence[Pose],
+        self, candidates: Sequence[tuple[str, ...]], poses: Sequence[Pose]
     ) -> tuple[Remedy, ...]:
         """The candidate that is judged best in the worst pose and holds in all poses, or the best
         of TRIED of them where none does; and softer gains with which all decays."""
-        growth = {change: self._growth(change) for change in candidates}
+        growth, softer = {change: self._growth(change) for change in candidates}, self._softer
         judged: dict[tuple[str, ...], Remedy] = {}
         for change in sorted(growth, key=lambda change: growth[change])[:TRIED]:
             if growth[change] >= 0.0 and judged:
@@ -225,11 +216,7 @@ class _Search:
         if growth.get(softer, 0.0) < 0.0 and softer not in judged:
             judged[softer] = self._in_all(softer, poses)
         every = sorted(judged.values(), key=lambda remedy: remedy.growth)
-        return tuple(
-            remedy
-            for remedy in every
-            if remedy is every[0] or (remedy.options == softer and remedy.growth < 0.0)
-        )
+        return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
 
     def _in_all(self, change: tuple[str, ...], poses: Sequence[Pose]) -> Remedy:
         quick = self._quick(change)
