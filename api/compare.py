@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import named_runs
 from hapticlink.orchestrator.results.tables import Results
@@ -39,13 +40,18 @@ class Comparison:
 
     @property
     def note(self) -> str:
-        """A sentence where the runs are of different scenes or mechanisms, or recorded the same
-        rows, "" where neither."""
+        """Lines on which runs failed, and where the runs are of different scenes or mechanisms, or
+        recorded the same rows; "" where there is none of it."""
+        failed = [f"{n} {summary.ending(run)}" for n, run in self.runs.items() if run.record.fault]
+        said = []
+        if failed:
+            said.append(f"{len(failed)} of {len(self.runs)} runs failed: {', '.join(failed)}")
         first, *others = self.runs.values()
         if other_scenes := settings.other_scenes([first, *others]):
-            return f"warning: {other_scenes}"
-        same = all(run.has_rows_of(first) for run in others)
-        return "the runs recorded the same numbers in every row" if same else ""
+            said.append(f"warning: {other_scenes}")
+        elif all(run.has_rows_of(first) for run in others):
+            said.append("the runs recorded the same numbers in every row")
+        return "\n".join(said)
 
     def values(self) -> dict[str, dict[str, dict[str, str]]]:
         """The values of each run by its name, by title and by label."""
@@ -63,9 +69,8 @@ class Comparison:
         return overlay.figures(self.runs)
 
     def __str__(self) -> str:
-        return "\n".join(
-            [*([self.note] if self.note else []), *text.lines(list(self.runs), self.tables)]
-        )
+        note = [self.note] if self.note else []
+        return "\n".join([*note, *text.lines(list(self.runs), self.tables)])
 
     def __repr__(self) -> str:
         return f"comparison of {', '.join(self.runs)}"

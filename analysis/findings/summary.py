@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.deadlines import finding
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.tracking import of_block
-from hapticlink.analysis.findings.user_port import allowed, pushed_by_others
+from hapticlink.analysis.findings.user_port import allowance, allowed, pushed_by_others
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
@@ -137,12 +137,12 @@ def _energy(port: PortEnergy) -> str:
     """A line on the energy at the user's port, beside the work of the hands."""
     hands = [1e3 * work for name, work in port.works.items() if name.endswith("hand")]
     put_in = f"the hand put in {short(sum(hands))} mJ, " if hands else ""
-    most = allowed(port.hand_work)
-    limit = f"{'over the limit of' if port.peak > most else 'limit'} {short(1e3 * most)} mJ"
+    is_over = port.peak > allowed(port.hand_work)
     return (
         f"energy at the user's port: {put_in}the rendering generated at most "
-        f"{short(1e3 * port.peak)} mJ, at {port.time_of_peak:.3g} s ({limit}), "
-        f"{short(1e3 * port.generated)} mJ at the end"
+        f"{short(1e3 * port.peak)} mJ, at {port.time_of_peak:.3g} s, and "
+        f"{short(1e3 * port.generated)} mJ until the end. A passive one generates none; this is "
+        f"{'over' if is_over else 'within'} the tolerated {allowance(port.hand_work)}"
     )
 
 

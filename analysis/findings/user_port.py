@@ -51,6 +51,7 @@ from hapticlink.orchestrator.base.signal_names import (
     block_of_user,
     signal_of_user,
 )
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.run_record import BlockEnergy, PortEnergy
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
@@ -106,6 +107,14 @@ def user_port(results: Results) -> UserPort | None:
 def allowed(hand_work: float) -> float:
     """The energy (J) that a rendering may generate where the hand works so much (J)."""
     return max(NOTICEABLE_J, SHARE * hand_work)
+
+
+def allowance(hand_work: float) -> str:
+    """What is `allowed`, in words."""
+    most = f"{short(1e3 * allowed(hand_work))} mJ"
+    if SHARE * hand_work < NOTICEABLE_J:
+        return f"{most}, the least that a hand notices"
+    return f"{most}, a quarter of the {short(1e3 * hand_work)} mJ that the hand gave and took back"
 
 
 def hand_work(results: Results) -> float:

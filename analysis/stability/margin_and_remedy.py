@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 from hapticlink.analysis.stability.bisection import largest
@@ -24,7 +25,7 @@ from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.base.signal_names import CONTROLLER
-from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.base.ticks import exact, written
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -78,9 +79,9 @@ def improvements(
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
     worst: Case,
-) -> tuple[Margin, Remedy | None]:
-    """The margin in the `worst` pose, and what ends its instability in all `poses`; None where it
-    is stable."""
+) -> tuple[Margin, tuple[Remedy, ...]]:
+    """The margin in the `worst` pose, and what ends its instability in all `poses`, as `remedies`;
+    nothing where it is stable."""
     pose = next(pose for pose in poses if pose.name == worst.pose)
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
@@ -89,7 +90,7 @@ def improvements(
     with search.place() as (place, _):
         margin = search.margin(place)
         candidates = () if stable else [*search.candidates(place, margin)]
-    return margin, search.remedy(candidates, poses) if candidates else None
+    return margin, search.remedies(candidates, poses)
 
 
 class _Search:
@@ -103,6 +104,7 @@ class _Search:
     ) -> None:
         self._scene, self._given, self._pose = scene, given, pose
         self._hands, self._bounds = hands, bounds
+        self._softer: tuple[str, ...] = ()
         self._read = open_scene.load(scene, given)
         self._haptic = exact(self._read.haptics.rate)
 
@@ -146,7 +148,7 @@ class _Search:
         return float(self._haptic / frames) if frames else float("inf")
 
     def _framed(self, n: int) -> str:
-        return f'graphics.rate="{self._haptic / n}"'
+        return _rate("graphics", self._haptic / n)
 
     def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
         """Whether all hands are stable with gains scaled, and all that the controller reads some
@@ -167,7 +169,7 @@ class _Search:
             return float("inf")
 
     def candidates(self, place: RestingScene, margin: Margin) -> Iterator[tuple[str, ...]]:
-        """Single changes of the scene, and the last resort, gains and rate together."""
+        """Single changes of the scene, and the last resort, softer gains and rate together."""
         read, gains = self._read, place.gains
         for hold in HOLDS:
             if read.graphics is not None and hold != read.hold and not read.holds:
@@ -176,6 +178,7 @@ class _Search:
         if margin.stiffness:
             scale = min(1.0, margin.stiffness) / SAFE
             gain = tuple(overrides.written(gains.options(dict.fromkeys(gains.laws, scale))))
+            self._softer = gain
             yield gain
         table, _, _ = LAWS["drift"]
         for factor in DAMPINGS:
@@ -184,35 +187,47 @@ class _Search:
                     yield tuple(overrides.written({key: value}))
         if read.graphics is not None:
             assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
-            rate = float(exact(read.graphics.rate))
+            rate = exact(read.graphics.rate)
             if margin.rate is not None and margin.rate > rate:
-                rate = min(margin.rate, float(self._haptic))
+                rate = self._haptic / max(1, round(self._haptic / margin.rate))
             for factor in (1, *FASTER):
-                if rate < factor * rate <= float(self._haptic) or factor == 1:
-                    yield (f"graphics.rate={factor * rate:g}", *(gain if factor == 1 else ()))
+                if rate < factor * rate <= self._haptic or factor == 1:
+                    yield (_rate("graphics", factor * rate), *(gain if factor == 1 else ()))
             if read.mechanism_at == "graphics":
                 yield ("mechanism_at=haptics",)
         for factor in FASTER:
-            yield (f"haptics.rate={factor * float(self._haptic):g}",)
+            yield (_rate("haptics", factor * self._haptic),)
             if gain:
-                yield (f"haptics.rate={factor * float(self._haptic):g}", *gain)
+                yield (_rate("haptics", factor * self._haptic), *gain)
 
-    def remedy(self, candidates: Sequence[tuple[str, ...]], poses: Sequence[Pose]) -> Remedy | None:
-        """The candidate that is judged best in the worst pose and holds in all poses; the best of
-        TRIED of them where none does."""
-        growth = {change: self._growth(change) for change in candidates}
-        best: Remedy | None = None
+    def remedies(
+        self, candidates: Sequence[tuple[str, ...]], poses: Sequence[Pose]
+    ) -> tuple[Remedy, ...]:
+        """The candidate that is judged best in the worst pose and holds in all poses, or the best
+        of TRIED of them where none does; and softer gains with which all decays."""
+        growth, softer = {change: self._growth(change) for change in candidates}, self._softer
+        judged: dict[tuple[str, ...], Remedy] = {}
         for change in sorted(growth, key=lambda change: growth[change])[:TRIED]:
-            if growth[change] >= 0.0 and best:
+            if growth[change] >= 0.0 and judged:
                 break
-            quick = self._quick(change)
-            cases, without = in_poses(self._scene, quick, poses, self._hands, self._bounds)
-            worst = float("inf") if without else _worst(cases)
-            if best is None or worst < best.growth:
-                best = Remedy(change, worst, worst < -DECAY)
-            if best.stable:
+            judged[change] = self._in_all(change, poses)
+            if judged[change].stable:
                 break
-        return best
+        if growth.get(softer, 0.0) < 0.0 and softer not in judged:
+            judged[softer] = self._in_all(softer, poses)
+        every = sorted(judged.values(), key=lambda remedy: remedy.growth)
+        return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
+
+    def _in_all(self, change: tuple[str, ...], poses: Sequence[Pose]) -> Remedy:
+        quick = self._quick(change)
+        cases, without = in_poses(self._scene, quick, poses, self._hands, self._bounds)
+        worst = float("inf") if without else _worst(cases)
+        return Remedy(change, worst, worst < -DECAY)
+
+
+def _rate(clock: str, rate: Fraction) -> str:
+    """The option that sets a rate."""
+    return f"{clock}.rate={written(rate)}"
 
 
 def _worst(cases: Sequence[Case]) -> float:

@@ -54,6 +54,7 @@ from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.ticks import exact, written
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -141,7 +142,7 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     if count > LARGEST:
         raise InputFault(
             f"user's port: {count} forces in a hyperperiod, at most {LARGEST}: take a higher "
-            f"graphics rate, such as --set graphics.rate={float(read.haptics.rate) / 16:g}"
+            f"graphics rate, such as --set graphics.rate={written(exact(read.haptics.rate) / 16)}"
         )
     with in_own_hand(scene, given) as (place, _):
         found = of(read.title, place.period({}), hand, mechanism, place.T)

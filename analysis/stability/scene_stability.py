@@ -189,7 +189,7 @@ def _judged(
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         step("margins", len(visited) + 1, len(visited) + 2)
         judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
-        margin, remedy = improvements(scene, given, judged, held, bounds, worst)
+        margin, remedies = improvements(scene, given, judged, held, bounds, worst)
         with linearisable(scene, given) as (read, system, removed):
             frozen = (*removed, *frozen_nonlinearities.kept(system))
     return Stability(
@@ -201,7 +201,7 @@ def _judged(
         without=without,
         worst=worst,
         margin=margin,
-        remedy=remedy,
+        remedies=remedies,
         frozen=frozen,
         rounded=rounded,
     )

@@ -29,8 +29,9 @@ class Stability:
     """By pose without equilibrium, the reason."""
     worst: Case
     margin: Margin
-    remedy: Remedy | None
-    """What makes all hands stable; None where they are, or where nothing that was tried does."""
+    remedies: tuple[Remedy, ...]
+    """What makes all hands stable, or improves most: the best of all that was tried, and softer
+    gains where these suffice; none where all are stable, or nothing that was tried helps."""
     frozen: tuple[str, ...]
     """Lines of text on what is removed or stays as at rest."""
     rounded: str = ""
@@ -80,7 +81,7 @@ class Stability:
             "growth_rate": self.growth,
             "worst": self.worst.record(),
             "margin": asdict(self.margin),
-            "remedy": asdict(self.remedy) if self.remedy else None,
+            "remedies": [asdict(remedy) for remedy in self.remedies],
             "damping_needed_in_free_air": self.damping,
             "drift": asdict(self.bounds),
             "poses": [asdict(pose) for pose in self.poses],
@@ -143,15 +144,15 @@ class Stability:
                 f"{worst.hand:28s} {worst.pose:24s} {worst.growth:11.3g} {worst.hertz:7.3g}  {what}"
             )
         yield f"margin at {self.worst.pose}: {', '.join(self._margins())}"
-        if self.remedy:
-            options = " ".join(f"--set '{option}'" for option in self.remedy.options)
-            how = f"decays at {'' if self.remedy.stable else 'only '}{-self.remedy.growth:.2g} 1/s"
-            if math.isinf(self.remedy.growth):
+        for remedy in self.remedies:
+            options = " ".join(f"--set '{option}'" for option in remedy.options)
+            how = f"decays at {'' if remedy.stable else 'only '}{-remedy.growth:.2g} 1/s"
+            if math.isinf(remedy.growth):
                 how = "nothing grows by more than a drift"
-            elif not self.remedy.stable and self.remedy.growth >= 0.0:
-                how = f"improves most, to {self.remedy.growth:.2g} 1/s, which is not enough"
-            yield f"remedy: {options}: {how}"
-        elif self.verdict == "unstable":
+            elif not remedy.stable and remedy.growth >= 0.0:
+                how = f"improves most, to {remedy.growth:.2g} 1/s, which is not enough"
+            yield f"{'remedy' if remedy is self.remedies[0] else 'or'}: {options}: {how}"
+        if not self.remedies and self.verdict == "unstable":
             yield "remedy: no single change of hold, rate, gain or damping that was tried"
         if self.worst.participation and self.verdict != "stable":
             parts = ", ".join(f"{name} {share:.2f}" for name, share in self.worst.participation)

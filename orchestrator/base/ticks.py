@@ -29,6 +29,12 @@ def exact(number: int | float | str) -> Fraction:
     return Fraction(text)
 
 
+def written(number: Fraction) -> str:
+    """A number as `exact` reads it: decimal where six digits hold it, a fraction otherwise."""
+    decimal = f"{float(number):g}"
+    return decimal if exact(decimal) == number else str(number)
+
+
 @dataclass(frozen=True)
 class Clock:
     """The communication points of a rate, in ticks: each starts a step and ends the one before.

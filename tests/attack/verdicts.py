@@ -114,9 +114,9 @@ def judged(seed: int, poses: int = 3) -> dict[str, Any]:
     slow = 0.0 < case.growth < 2.0 / SECONDS  # less than e^2 in a run: hidden by what decays
     decided = found.in_hands not in ("drifts", "marginal") and not slow
     row["right"] = row["run"] == says if decided else "not decided"
-    if found.remedy:
-        row["remedy"] = asdict(found.remedy)
-        pairs = dict(option.split("=", 1) for option in found.remedy.options)
+    if found.remedies:
+        row["remedy"] = asdict(found.remedies[0])
+        pairs = dict(option.split("=", 1) for option in found.remedies[0].options)
         remedied = options | {key: _value(value) for key, value in pairs.items()}
         row["run_remedied"] = run_case(name, remedied, found, case)
     return row

@@ -2,6 +2,7 @@
 // ideal source. `power` lists the connections, whether a hand pushes there (`hand`), and whether what is put in there
 // counts (`counts`: what a controller passes on was not put in by it).
 const WINDOW = 1; // s, over which the light judges
+const LIGHTS = ["green", "amber", "red"];
 
 export class Energies {
   constructor({ power, port, noticeable }) {
@@ -13,16 +14,18 @@ export class Energies {
   }
 
   // Gives a frame its `energy` (J): generated at the user's port, which is what the mechanism has stored beyond the work
-  // of the hands, and by connection, both since the start; where it has new sums, the `light`, and the state "energy"
-  // while the port generates: both judge the last second.
+  // of the hands, and by connection, both since the start; where it has new sums, the `light`, the worst
+  // of a second lest it flickers, and the state "energy" while the port generates: both judge the last second.
   add(frame) {
     if (frame.booked) {
       this.sum(frame);
       const port = this.energy[this.port];
-      this.past.push({ t: frame.t, generated: this.generated, put_in: this.put_in, port });
+      const now = { t: frame.t, generated: this.generated, put_in: this.put_in, port };
+      this.past.push(now);
       while (frame.t - this.past[0].t > WINDOW) this.past.shift();
       const [before] = this.past;
-      frame.light = light(this.generated - before.generated, this.put_in - before.put_in, this.noticeable);
+      now.level = LIGHTS.indexOf(light(this.generated - before.generated, this.put_in - before.put_in, this.noticeable));
+      frame.light = LIGHTS[Math.max(...this.past.map((each) => each.level))];
       this.generates = port - Math.min(...this.past.map((each) => each.port)) > this.noticeable && port > this.noticeable;
     }
     frame.energy = this.energy;

@@ -15,10 +15,12 @@ import { started } from "./worker_run.js";
 
 const $ = (id) => document.getElementById(id);
 let untouched = true; // nobody has pulled yet
-const stage = new Stage($("scene"), $("legend"), (at, user) => {
-  untouched = false;
-  $("door").hidden = true;
-  ending.hide();
+const stage = new Stage($("scene"), $("legend"), (at, user, begins) => {
+  if (begins) {
+    untouched = false;
+    $("door").hidden = true;
+    ending.hide();
+  }
   run.send({ type: "hand", at, user });
 });
 const ending = new Ending($("ended"), () => act("reset"));

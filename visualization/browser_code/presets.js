@@ -1,7 +1,10 @@
 // Settings of a scene that show something, each with what it changes; and all settings as at the start.
 import { changes } from "./changes.js";
 
-const CALM_RATE = 64, BUZZ_RATE = 18, STIFF = 5; // Hz, and the factor of the coupling's damping
+// Hz, and the factor of the coupling's damping with which extrapolated motion grows by half the rate in the mouse's hand.
+const CALM_RATE = 64, BUZZ_RATE = 16, MORE = 1.1;
+// Factors on a virtual coupling: a sampled spring generates energy that no damping takes out, on any mechanism.
+const BUZZ = { K_pc: 10, B_pc: 0 };
 
 // The messages that set all controls as they were at the `start`.
 export const restored = (controls, start) => changes(start, controls).map(({ message }) => message);
@@ -10,9 +13,9 @@ export const restored = (controls, start) => changes(start, controls).map(({ mes
 export function presets({ rate, holds, gains }) {
   const passive = holds.filter(({ choices }) => choices.includes("passive"));
   const poses = holds.filter(({ connection, choices }) => /\.[xv] -> /.test(connection) && choices.includes("foh"));
-  const damping = gains.filter(({ name }) => name.endsWith(".B_pc"));
   const held = (some, hold) => some.map(({ connection }) => ({ type: "hold", connection, hold }));
   if (rate && poses.length) {
+    const more = gains.filter(({ name }) => name.endsWith(".B_pc")).map(({ name }) => ({ type: "gain", name, factor: MORE }));
     const slow = { type: "rate", value: Math.min(BUZZ_RATE, rate.max) }, fast = { type: "rate", value: Math.min(CALM_RATE, rate.max) };
     // A page in one file has no passive hold of the forces; zero-order holds shake less than first-order ones.
     const [mended, mending] = passive.length
@@ -20,14 +23,15 @@ export function presets({ rate, holds, gains }) {
       : ["pose and velocity held (zoh)", held(poses, "zoh")];
     return [
       { name: "Calm", about: `mechanism at ${fast.value} Hz`, messages: [fast] },
-      { name: "Buzz", about: `mechanism at ${slow.value} Hz, its pose and velocity extrapolated (foh): pull far and fast`, messages: [slow, ...held(poses, "foh")] },
-      { name: "Mend it", about: `still ${slow.value} Hz, but ${mended}`, messages: [slow, ...mending] },
+      { name: "Buzz", about: `mechanism at ${slow.value} Hz, its pose and velocity extrapolated (foh), coupling damping times ${MORE}: pull`, messages: [slow, ...more, ...held(poses, "foh")] },
+      { name: "Mend it", about: `the same, but ${mended}`, messages: [slow, ...more, ...mending] },
     ];
   }
-  if (!damping.length) return [];
-  const stiffer = damping.map(({ name }) => ({ type: "gain", name, factor: STIFF }));
+  const coupling = gains.map(({ name }) => ({ type: "gain", name, factor: BUZZ[name.split(".").at(-1)] }));
+  const undamped = coupling.filter(({ factor }) => factor !== undefined);
+  if (!undamped.length) return [];
   return [
-    { name: "Calm", about: "everything as the scene has it", messages: [] },
-    { name: "Buzz", about: `coupling damping times ${STIFF}: more than its rate allows; Calm ends it`, messages: stiffer },
+    { name: "As given", about: "everything as the scene has it", messages: [] },
+    { name: "Buzz", about: `virtual coupling ${BUZZ.K_pc} times as stiff, without damping: pull, and the handle vibrates`, messages: undamped },
   ];
 }

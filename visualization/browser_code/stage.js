@@ -1,5 +1,5 @@
 // The mechanism on its canvas, and where `pull` is given the pointers that pull the handles: each
-// that of the user whose handle is nearest when it is pressed.
+// that of the user whose handle is nearest when it is pressed; whether it begins to pull.
 import { fitted, themed } from "./canvas.js";
 import { Legend } from "./legend.js";
 import { paint, place, zigzag } from "./painter.js";
@@ -21,9 +21,11 @@ export class Stage {
       return this.toWorld(event.clientX - box.left, event.clientY - box.top);
     };
     const sendTarget = (pulling) => {
+      clearTimeout(pulling.later);
+      const begins = !pulling.sent;
       pulling.sent = performance.now();
       pulling.later = null;
-      pull(pulling.target, pulling.user);
+      pull(pulling.target, pulling.user, begins);
     };
     const release = ({ pointerId }) => {
       if (pointerId === this.panning) this.panning = null;
@@ -73,13 +75,12 @@ export class Stage {
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(end, release);
   }
 
+  // A run that begins anew is pulled on by what is still pressed.
   begin(marks, shapes) {
     this.marks = marks;
     this.shapes = shapes;
     this.limits = this.frame = null;
-    for (const { later } of this.pulls.values()) clearTimeout(later);
-    this.pulls.clear();
-    this.canvas.classList.remove("held");
+    this.pulls.forEach(this.sendTarget);
   }
 
   refit() { this.limits = null; }

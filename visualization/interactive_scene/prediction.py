@@ -18,6 +18,7 @@ from hapticlink.analysis.stability.state_vector import size
 from hapticlink.components.specs.hand import SpringHand
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.live_changes import held_by
@@ -47,28 +48,32 @@ def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[
 
 
 def verdicts(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[dict[str, str]]:
-    """As `predicted`, of the first hands so far, and then of all."""
+    """As `predicted`, of the first hands so far, which are not called stable before all are judged,
+    and then of all."""
     cases: list[Case] = []
     try:
         for case in judged(scene, settings, parameters):
             cases.append(case)
             if len(cases) == SO_FAR:
-                yield _verdict(cases, ", so far")
+                yield _verdict(cases, so_far=True)
     except Fault as fault:
-        short = str(fault).partition(";")[0].partition("\n")[0]
-        yield {"verdict": "", "said": f"not computed: {short}", "why": str(fault)}
+        first = str(fault).partition(";")[0].partition("\n")[0]
+        yield {"verdict": "", "said": f"not computed: {first}", "why": str(fault)}
     else:
         yield _verdict(cases)
 
 
-def _verdict(cases: Sequence[Case], so_far: str = "") -> dict[str, str]:
+def _verdict(cases: Sequence[Case], so_far: bool = False) -> dict[str, str]:
     worst = max(cases, key=lambda case: case.severity)
     verdict = "marginal" if worst.drifts else worst.verdict
+    said = f"{_summary(worst)}{', so far' if so_far else ''}"
+    if so_far and verdict != "unstable":  # what only the worst of all hands tells
+        verdict = ""
     lines = (
         f"{case.hand}: {case.verdict}, growth rate {case.growth:.4g} 1/s, {case.hertz:.3g} Hz"
         for case in cases
     )
-    return {"verdict": verdict, "said": _summary(worst) + so_far, "why": "\n".join(lines)}
+    return {"verdict": verdict, "said": said, "why": "\n".join(lines)}
 
 
 def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[Case]:
@@ -145,9 +150,9 @@ def _with_parameters(fmu: Fmu, parameters: Parameters) -> Fmu:
 
 
 def _summary(worst: Case) -> str:
-    rate = f"{abs(worst.growth):.2g} 1/s"
+    rate = f"{short(abs(worst.growth))} 1/s"
     if worst.verdict == "stable":
         return f"stable in all hands, decays {rate}"
     if worst.verdict == "marginal":
         return f"marginal in {worst.hand}"
-    return f"{worst.kind} of {worst.hertz:.2g} Hz, grows {rate}, in {worst.hand}"
+    return f"{worst.kind} of {short(worst.hertz)} Hz, grows {rate}, in {worst.hand}"

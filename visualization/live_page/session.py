@@ -70,6 +70,7 @@ class Session:
         self._shown = 0.0
         self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
         self.recordings: list[Path] = []
+        self._waiting: list[messages.Message] = []
         self._before = ExitStack()
 
     def run(self) -> None:
@@ -111,8 +112,12 @@ class Session:
         if self._controls is None:
             self._start(live)
         assert self._controls
-        changed = False
-        for message in messages.newest(self._link.received()):
+        changed, waiting = False, self._waiting
+        self._waiting = []
+        for message in messages.newest([*waiting, *self._link.received()]):
+            if self._again:  # what comes behind a reset is for the run that begins
+                self._waiting.append(message)
+                continue
             if isinstance(message, messages.Time):
                 self._time(message.do)
                 continue
@@ -175,13 +180,16 @@ class Session:
         self._live.stop()
 
     def _wait(self, result: Any) -> None:
-        """Say how a run has ended by itself, and wait for a reset or recording."""
+        """Say how a run has ended by itself, and wait for a reset or recording. What is changed
+        meanwhile waits for the run that begins then."""
         reason = result.run["end"]["reason"]
         self._tell(ended=str(result.fault or f"the run has ended: {reason}"), recording=None)
         while True:
             interrupt.check()
             self._require_server()
-            for message in self._link.received():
+            received = self._link.received()
+            self._waiting += [m for m in received if not isinstance(m, messages.Time)]
+            for message in received:
                 if isinstance(message, messages.Time) and message.do in ("reset", "record"):
                     self._state["recording"] = "new" if message.do == "record" else None
                     return

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hapticlink.analysis.findings import summary
-from hapticlink.analysis.findings.user_port import UserPort, user_port
+from hapticlink.analysis.findings.user_port import UserPort, allowance, user_port
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
@@ -52,6 +52,11 @@ SCENES = [
     ("two-users", ("graphics.rate=20", "sensing=encoders", "controllers.left.topology=false")),
     ("serial", ("controller.damping=[1.0,1.0,0.01]",)),
 ]
+
+
+def test_what_is_tolerated_is_said_in_words() -> None:
+    assert allowance(0.11) == "27.5 mJ, a quarter of the 110 mJ that the hand gave and took back"
+    assert allowance(0.003) == "1 mJ, the least that a hand notices"
 
 
 @pytest.mark.parametrize(("scene", "options"), SCENES)

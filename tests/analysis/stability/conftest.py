@@ -11,6 +11,4 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin
 @pytest.fixture
 def no_margins(monkeypatch: pytest.MonkeyPatch) -> None:
     """Verdicts come without margins and remedies, which are most of their time."""
-    monkeypatch.setattr(
-        scene_stability, "improvements", lambda *_: (Margin(None, None, None), None)
-    )
+    monkeypatch.setattr(scene_stability, "improvements", lambda *_: (Margin(None, None, None), ()))

@@ -4,6 +4,7 @@ and against FMUs that are loaded in place of what is substituted."""
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -12,17 +13,19 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.analysis.stability.hand_cases import InHands
+from hapticlink.analysis.stability.hand_cases import InHands, in_poses
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
 from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod
+from hapticlink.analysis.stability.margin_and_remedy import SAFE, improvements
 from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.poses import evenly_spaced, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.components.specs.hand import ArmHand, SpringHand
+from hapticlink.orchestrator.scene import overrides
 from tests.analysis.stability.own_hand import linearised
 
 POINT = (0.044493, 0.014823, -0.788148)
@@ -111,16 +114,16 @@ def test_modes_are_told_apart(growth: float, hertz: float, said: str) -> None:
 
 def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     """A wall of K on b = 5 N.s/m is passive up to K T/2 < b (Colgate, Schenkel 1997): 5120 N/m at
-    512 Hz; four times as stiff it shakes, and the remedy is stable in all hands when it is judged
-    anew."""
+    512 Hz; four times as stiff it shakes, and the remedy, as it is printed, is stable in all hands
+    when it is judged anew."""
     beyond = {"fmu.wall.start.stiffness": 20000.0}
     found = hl.stability("virtual-wall", beyond, poses=1)
     assert found.verdict == "unstable"
     assert found.worst.kind == "vibration"
-    assert found.remedy is not None
-    assert found.remedy.stable
-    options = dict(option.split("=", 1) for option in found.remedy.options)
-    again = hl.stability("virtual-wall", beyond | options, poses=1)
+    assert found.remedies[0].stable
+    line = next(line for line in found.lines() if line.startswith("remedy: "))
+    pasted = shlex.split(line.removeprefix("remedy: ").rpartition(": ")[0])[1::2]
+    again = hl.stability("virtual-wall", [*overrides.written(beyond), *pasted], poses=1)
     hands = len({c.hand for c in again.cases if not c.free})
     edge = [replace(c, verdict="stable" if c.free else "marginal") for c in again.cases]
     assert f"marginal in {hands} hands and" in replace(again, cases=tuple(edge)).finding
@@ -178,3 +181,21 @@ def test_a_hand_beside_a_pose_leaves_it_where_it_pulls_away() -> None:
     elsewhere = replace(pose, point=(pose.point[0] + 0.02, *pose.point[1:]))
     assert elsewhere.leaves("closed-loop", (), HANDS["light touch"])
     assert pose.leaves("closed-loop", (), None)
+
+
+def test_softer_gains_stand_beside_another_remedy() -> None:
+    """In a firm grip of the mechanism at 18 Hz a change of damping ends what softer gains end, too,
+    which are below the limit of the margin."""
+    scene, given = "closed-loop-direct", ("graphics.rate=18",)
+    linkage = hl.scene(scene).linkage
+    poses = evenly_spaced(simulated(scene, (*given, "duration=0.1")), linkage, 1)
+    hands = {"firm grip": HANDS["firm grip"]}
+    (case,), _ = in_poses(scene, given, poses, hands, DRIFT)
+    assert case.verdict == "unstable"
+    margin, remedies = improvements(scene, given, poses, hands, DRIFT, case)
+    assert margin.stiffness
+    softer = f"{100 * margin.stiffness / SAFE:.4g}"
+    found = [r for r in remedies if f"teleoperation.stiffness=[{softer}" in r.options[0]]
+    assert len(found) == 1
+    assert len(remedies) == 2
+    assert found[0].growth < 0.0

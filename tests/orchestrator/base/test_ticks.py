@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.ticks import (
     Clock,
     Timeline,
@@ -17,6 +18,7 @@ from hapticlink.orchestrator.base.ticks import (
     listed,
     periodic,
     variable,
+    written,
 )
 
 rates = st.fractions(min_value=Fraction(1, 10), max_value=5000, max_denominator=1001)
@@ -29,6 +31,18 @@ def test_report_rates_meet_on_1_over_7680_s():
 def test_a_rate_is_the_rational_that_was_written():
     assert exact(29.97) == Fraction(2997, 100)
     assert exact("30000/1001") == Fraction(30000, 1001)
+
+
+@pytest.mark.parametrize(
+    ("rate", "text"),
+    [(Fraction(512, 3), "512/3"), (Fraction(256, 5), "51.2"), (Fraction(1024), "1024"),
+     (Fraction(30000, 1001), "30000/1001")],
+)  # fmt: skip
+def test_a_rate_that_is_printed_sets_the_same_rate(rate: Fraction, text: str) -> None:
+    assert written(rate) == text
+    read = open_scene.load("closed-loop", ["haptics.rate=2048", f"graphics.rate={text}"])
+    assert read.graphics
+    assert exact(read.graphics.rate) == rate
 
 
 @given(rates, rates)

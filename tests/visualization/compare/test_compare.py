@@ -85,6 +85,18 @@ def test_other_scenes_are_told(root: Path, capsys: pytest.CaptureFixture[str]) -
     assert "operational point from that of the first run" not in said
 
 
+def test_runs_that_failed_are_said_first() -> None:
+    """A spring of 1e7 N/m on 1 kg, sampled at 20 Hz, throws it off."""
+    springs = ([1e7, 0.0, 0.0], [2e7, 0.0, 0.0], [10.0, 0.0, 0.0])
+    runs = {
+        f"spring {i}": hl.run("sampled-spring", {"hand.stiffness": spring})
+        for i, spring in enumerate(springs)
+    }
+    first = str(hl.compare(runs)).partition("\n")[0]
+    assert first.startswith("2 of 3 runs failed: spring 0 diverged at ")
+    assert "spring 2" not in first
+
+
 def test_runs_that_are_equal_in_every_row_are_said_to_be(root: Path, tmp_path: Path) -> None:
     said = "the runs recorded the same numbers in every row"
     again, other = tmp_path / "again", tmp_path / "other"

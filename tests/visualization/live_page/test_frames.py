@@ -44,6 +44,26 @@ def test_the_energy_at_the_users_port_is_that_of_the_results() -> None:
     assert port == pytest.approx(made.run["user_port"]["generated"], rel=1e-9)
 
 
+def test_the_light_is_the_worst_of_a_second() -> None:
+    """A hold generates 0 and 0.5 mJ by turns, of 1 mJ that are noticeable: amber from the first
+    time until a second after the last one."""
+    times = [i / 60 for i in range(180)]
+    frames = [{"t": t, "stored": 0.0, "states": [], "booked": [[5e-4 * (t < 1 and i % 2), 0.0]]}
+              for i, t in enumerate(times)]  # fmt: skip
+    seen = javascript(
+        "energies.js",
+        """const power = [{ name: "held", hand: false, counts: false }];
+        const energies = new Energies({ power, port: "port", noticeable: 1e-3 });
+        for (const frame of given) energies.add(frame);
+        answer = given.map((frame) => frame.light);""",
+        frames,
+    )
+    changes = [i for i in range(1, len(seen)) if seen[i] != seen[i - 1]]
+    assert [seen[i] for i in changes] == ["amber", "green"]
+    assert changes[0] == 1
+    assert times[changes[1]] > 1.9
+
+
 def test_the_light_compares_what_was_generated_with_what_was_put_in() -> None:
     cases = [(0.0, 0.0, "green"), (-1.0, 0.5, "green"), (5e-5, 0.0, "green"), (5e-4, 0.0, "amber"),
              (0.2, 1.0, "amber"), (1.1, 1.0, "red"), (0.1, -1.0, "red")]  # fmt: skip

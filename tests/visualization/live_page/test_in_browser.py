@@ -52,6 +52,19 @@ def test_the_page_says_what_to_do_until_somebody_does_it(served: Served, browser
     page.page.close()
 
 
+def test_a_run_that_begins_anew_is_pulled_on(served: Served, browser: Any) -> None:
+    page = Page(browser, served.url)
+    page.pull(*(0.02 * np.array(CONSTRAINED)))
+    page.until("view.frame?.t > 0.8 && Math.hypot(...view.frame.F_hand.slice(0, 2)) > 1")
+    page.page.keyboard.press("r")
+    page.until("view.frame?.t < 0.6")
+    page.until("view.frame?.t > 0.3 && Math.hypot(...view.frame.F_hand.slice(0, 2)) > 1")
+    page.page.mouse.up()
+    page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.1")
+    assert page.faults == []
+    page.page.close()
+
+
 def test_arrow_keys_pull_and_let_go(served: Served, browser: Any) -> None:
     page = Page(browser, served.url)
     page.page.keyboard.down("ArrowUp")

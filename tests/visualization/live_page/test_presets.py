@@ -8,9 +8,11 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.offered_controls import Settings, target
+from hapticlink.visualization.interactive_scene.prediction import judged
 from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.live_page.controls import Controls
+from hapticlink.visualization.live_page.frames import Frames
 from tests.visualization.browser_code.chromium import Page, chromium
 from tests.visualization.browser_code.javascript import javascript
 from tests.visualization.browser_code.served_page import Served
@@ -22,17 +24,25 @@ def direct(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         yield page
 
 
+def begun(name: str) -> tuple[dict[str, Any], dict[str, list[float]]]:
+    """The controls of a scene at its start, and the parameters with which its mice hold there."""
+    found: list[Any] = []
+
+    def turn(live: hl.RealTime) -> None:
+        its = Controls(live, Settings())
+        handles = Frames(live).handles(live)
+        held = {target(user): [*place] for user, place in handles.items()}
+        found.extend((its.described(), its.parameters() | held))
+        live.stop()
+
+    hl.RealTime(viewed(name, {"packaging": "python"})).run(turn, tables=False)
+    return found[0], found[1]
+
+
 @pytest.fixture(scope="module")
 def controls() -> dict[str, Any]:
     """Those of the scene whose mechanism runs at the graphics rate."""
-    found: list[dict[str, Any]] = []
-
-    def turn(live: hl.RealTime) -> None:
-        found.append(Controls(live, Settings()).described())
-        live.stop()
-
-    hl.RealTime(viewed("closed-loop-direct", {"packaging": "python"})).run(turn, tables=False)
-    return found[0]
+    return begun("closed-loop-direct")[0]
 
 
 def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str, Any]) -> None:
@@ -42,12 +52,13 @@ def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str,
     assert calm["messages"] == [{"type": "rate", "value": 64}]
     options = []
     for preset in (buzz, mend):
-        rate, *holds = preset["messages"]
-        assert rate["type"] == "rate"
+        rate, gain, *holds = preset["messages"]
+        assert (rate["type"], gain["name"]) == ("rate", "controller.B_pc")
         found = {f'holds."{each["connection"]}"': each["hold"] for each in holds}
+        assert {*found.values()} == {"foh" if preset is buzz else "passive"}
+        damping = [20.0 * gain["factor"]] * 2 + [0.02 * gain["factor"]]
+        found |= {"controller.teleoperation.damping": damping}
         options.append({"graphics.rate": rate["value"], **found})
-    assert set([*options[0].values()][1:]) == {"foh"}
-    assert set([*options[1].values()][1:]) == {"passive"}
     hand = {"stiffness": [100.0, 100.0, 0.0], "target": [[0.0, 0.0245, 0.0148, -0.785]]}
     peaks = []
     for chosen in options:
@@ -57,6 +68,29 @@ def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str,
         assert port
         peaks.append(port.peak)
     assert peaks[0] > 10 * peaks[1]
+
+
+@pytest.mark.parametrize(
+    "name", ["closed-loop", "closed-loop-direct", "enclosure", "two-users", "serial"]
+)
+def test_buzz_is_a_vibration_that_is_seen(name: str) -> None:
+    """In the mouse's hand, as the lifted map has it: it grows, at a few Hz."""
+    found, parameters = begun(name)
+    chosen = javascript("presets.js", "answer = presets(given);", found)[1]
+    assert chosen["name"] == "Buzz"
+    settings = Settings(rate=32.0)
+    for message in chosen["messages"]:
+        match message:
+            case {"type": "gain", "name": gain, "factor": factor}:
+                parameters[gain] = [factor * value for value in parameters[gain]]
+            case {"type": "hold", "connection": connection, "hold": hold}:
+                settings.holds[connection] = hold
+            case {"type": "rate", "value": rate}:
+                settings.rate = rate
+    scene = viewed(name, {"packaging": "python"})
+    case = next(judged(scene, settings, parameters))
+    assert case.growth > 1.0
+    assert 5.0 < case.hertz < 30.0
 
 
 def test_restored_is_what_differs_from_the_start(controls: dict[str, Any]) -> None:
@@ -88,10 +122,11 @@ def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: 
         assert "red" in page.get("document.getElementById('light').className")
         box, stage = (page.page.locator(x).bounding_box() for x in ("#ended", "#stage"))
         assert box["y"] + box["height"] <= stage["y"]  # nothing covers it
-        page.page.mouse.up()
-        page.until("!view.state.ended && view.frame?.t < 5")
-        page.run_for(0.2)
+        page.until("!view.state.ended && view.frame?.t > 0.1")  # pulled on by what is still pressed
+        page.page.mouse.move(400, 400, steps=2)
+        page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) > 0.5")
         assert page.page.inner_text("#ended") == said
+        page.page.mouse.up()
         page.page.click("#restore")
         page.until(
             "document.querySelector('[data-control=rate]').parentNode.innerText.includes('30')"
