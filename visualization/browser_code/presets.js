@@ -32,6 +32,6 @@ export function presets({ rate, holds, gains }) {
   if (!undamped.length) return [];
   return [
     { name: "As given", about: "everything as the scene has it", messages: [] },
-    { name: "Buzz", about: `virtual coupling ${BUZZ.K_pc} times as stiff, without damping: pull, and the handle vibrates`, messages: undamped },
+    { name: "Buzz", about: `virtual coupling ${BUZZ.K_pc} times as stiff, without damping: pull, and most mechanisms vibrate`, messages: undamped },
   ];
 }
