@@ -89,8 +89,9 @@ def improvements(
     stable = worst.free or worst.verdict != "unstable" or worst.drifts
     with search.place() as (place, _):
         margin = search.margin(place)
-        candidates = () if stable else [*search.candidates(place, margin)]
-    return margin, search.remedies(candidates, poses)
+        softer = search.softer(place, margin)
+        candidates = () if stable else [*search.candidates(place, margin, softer)]
+    return margin, search.remedies(candidates, softer, poses)
 
 
 class _Search:
@@ -104,7 +105,6 @@ class _Search:
     ) -> None:
         self._scene, self._given, self._pose = scene, given, pose
         self._hands, self._bounds = hands, bounds
-        self._softer: tuple[str, ...] = ()
         self._read = open_scene.load(scene, given)
         self._haptic = exact(self._read.haptics.rate)
 
@@ -168,18 +168,24 @@ class _Search:
         except (InputFault, FmuFault):
             return float("inf")
 
-    def candidates(self, place: RestingScene, margin: Margin) -> Iterator[tuple[str, ...]]:
+    def softer(self, place: RestingScene, margin: Margin) -> tuple[str, ...]:
+        """Gains below the limit; nothing where no gains are stable."""
+        if not margin.stiffness:
+            return ()
+        scale = min(1.0, margin.stiffness) / SAFE
+        gains = place.gains
+        return tuple(overrides.written(gains.options(dict.fromkeys(gains.laws, scale))))
+
+    def candidates(
+        self, place: RestingScene, margin: Margin, softer: tuple[str, ...]
+    ) -> Iterator[tuple[str, ...]]:
         """Single changes of the scene, and the last resort, softer gains and rate together."""
         read, gains = self._read, place.gains
         for hold in HOLDS:
             if read.graphics is not None and hold != read.hold and not read.holds:
                 yield (f"hold={hold}",)
-        gain: tuple[str, ...] = ()
-        if margin.stiffness:
-            scale = min(1.0, margin.stiffness) / SAFE
-            gain = tuple(overrides.written(gains.options(dict.fromkeys(gains.laws, scale))))
-            self._softer = gain
-            yield gain
+        if softer:
+            yield softer
         table, _, _ = LAWS["drift"]
         for factor in DAMPINGS:
             for key, value in gains.options({"drift": factor**2}).items():
@@ -192,20 +198,20 @@ class _Search:
                 rate = self._haptic / max(1, round(self._haptic / margin.rate))
             for factor in (1, *FASTER):
                 if rate < factor * rate <= self._haptic or factor == 1:
-                    yield (_rate("graphics", factor * rate), *(gain if factor == 1 else ()))
+                    yield (_rate("graphics", factor * rate), *(softer if factor == 1 else ()))
             if read.mechanism_at == "graphics":
                 yield ("mechanism_at=haptics",)
         for factor in FASTER:
             yield (_rate("haptics", factor * self._haptic),)
-            if gain:
-                yield (_rate("haptics", factor * self._haptic), *gain)
+            if softer:
+                yield (_rate("haptics", factor * self._haptic), *softer)
 
     def remedies(
-        self, candidates: Sequence[tuple[str, ...]], poses: Sequence[Pose]
+        self, candidates: Sequence[tuple[str, ...]], softer: tuple[str, ...], poses: Sequence[Pose]
     ) -> tuple[Remedy, ...]:
         """The candidate that is judged best in the worst pose and holds in all poses, or the best
         of TRIED of them where none does; and softer gains with which all decays."""
-        growth, softer = {change: self._growth(change) for change in candidates}, self._softer
+        growth = {change: self._growth(change) for change in candidates}
         judged: dict[tuple[str, ...], Remedy] = {}
         for change in sorted(growth, key=lambda change: growth[change])[:TRIED]:
             if growth[change] >= 0.0 and judged:
