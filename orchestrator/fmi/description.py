@@ -191,11 +191,12 @@ def _variables(
     """What ModelVariables, UnitDefinitions and ModelStructure say, as in `Description`."""
     require_countable(model)
     relative, bounded = differences(tree), annotation.block(tree) is not None
-    scalars = tuple(
+    numbered = [
         s
         for v in model.modelVariables
         for s in numbers(v, version, v.name in relative, bounded=bounded, resized=resized)
-    )
+    ]
+    scalars = annotation.with_units(tree, numbered)
     strings = tuple(text(v) for v in model.modelVariables if v.type in WRITTEN and not v.shape)
     require_unique(s.name for s in (*scalars, *strings))
     dependencies = {
