@@ -57,7 +57,7 @@ class Description:
     """By output: the variables that it depends on directly. An output that is not here may depend
     on every input."""
     strings: tuple[Scalar, ...] = ()
-    """Variables that are text or binary: they are set at the start, never connected."""
+    """Variables that are text or binary; of a system, those that are not connected."""
     derivatives: Mapping[str, str] = field(default_factory=dict)
     """By output: the output that is its derivative with respect to time."""
     kinds: Mapping[str, Kind] = field(default_factory=dict)
