@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.fmus.native import PLATFORMS
+from hapticlink.fmus.native.compiler import PLATFORMS, PLATFORMS_3
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
@@ -52,12 +52,15 @@ def build(
 
     `all_platforms` compiles native FMUs for Linux, Windows and macOS instead of this machine only.
     `as_one` builds one native FMU that holds all blocks with their rates and holds, by the name of
-    the scene's file; without: a block that it leaves out, whose outputs become its inputs; fmi: 2
-    or 3, the version of the standard.
+    the scene's file; without: a block that it leaves out, whose outputs become its inputs.
+    `fmi`, 2 or 3, is the version of the standard of one FMU and of native ones; Python FMUs are of
+    FMI 2.0.
 
     Raises InputFault if the scene is invalid, has nothing to build, cannot become one FMU, or `out`
     cannot be written to; Fault if the compiler fails.
     """
+    if fmi not in (2, 3):
+        raise InputFault(f"--fmi: {fmi!r} is not 2 or 3")
     read = open_scene.load(scene, options)
     if as_one:
         from hapticlink.programs.build import build_program  # loads casadi
@@ -75,18 +78,17 @@ def build(
         return {path.stem: path}
     if without:
         raise InputFault("--without leaves a block out of one FMU: add --as-one")
-    if fmi != 2:
-        raise InputFault("FMUs of single blocks are of FMI 2.0; --fmi is for one FMU: add --as-one")
-    if all_platforms and read.packaging != "native":
-        raise InputFault("--all-platforms compiles: add --set packaging=native")
+    for option, given in (("--all-platforms", all_platforms), ("--fmi 3", fmi == 3)):
+        if given and read.packaging != "native":
+            raise InputFault(f"{option} compiles: add --set packaging=native")
     planned = blocks(read)
     if not planned.built:
         raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
     folder = folders.ensure(out)
     starts = _starts(read)
     with temporary_folders.room() as room:
-        platforms = PLATFORMS if all_platforms else ()
-        files = fmu_files(read, planned, timeline(read, planned), room, platforms, starts)
+        platforms = {2: PLATFORMS, 3: PLATFORMS_3}[fmi] if all_platforms else ()
+        files = fmu_files(read, planned, timeline(read, planned), room, platforms, starts, fmi)
         for name, path in files.items():
             with atomic_file(folder / f"{name}.fmu") as unfinished:
                 shutil.copyfile(path, unfinished)

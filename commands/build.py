@@ -23,7 +23,9 @@ Without = Annotated[
     Parameter(help="With --as-one: a block to leave out, whose outputs become inputs."),
 ]
 
-Fmi = Annotated[int, Parameter(help="With --as-one: the version of the standard, 2 or 3.")]
+Fmi = Annotated[
+    int, Parameter(help="Of native FMUs and --as-one: the version of the standard, 2 or 3.")
+]
 
 
 def build(
@@ -42,6 +44,7 @@ def build(
     For example:
 
         hapticlink build closed-loop --set packaging=native --all-platforms
+        hapticlink build closed-loop --set packaging=native --fmi 3
         hapticlink build closed-loop --as-one --without hand
         hapticlink build closed-loop --as-one --fmi 3
     """

@@ -46,6 +46,7 @@ def build_block(
     experiment: Mapping[str, float] = MappingProxyType({}),
     packaging: Packaging = "python",
     platforms: Sequence[str] = (),
+    fmi: int = 2,
     starts: Starts = MappingProxyType({}),
     engine: str | None = None,
     poll: Callable[[], object] = lambda: None,
@@ -54,9 +55,9 @@ def build_block(
 
     settings: the block's own, by name; starts: start values that replace those of its parameters.
     experiment: stop_time and step_size (s) of the default experiment. platforms: those of a native
-    FMU, by default this machine's. engine: the physics engine by which it is made. poll: called
-    while another process builds it. Raises FmuError if the settings give no FMU, CompilerError if
-    it cannot be compiled.
+    FMU, by default this machine's; fmi: its version of the standard. engine: the physics engine by
+    which it is made. poll: called while another process builds it. Raises FmuError if the settings
+    give no FMU, CompilerError if it cannot be compiled.
     """
 
     def make(folder: Path) -> Path:
@@ -69,7 +70,7 @@ def build_block(
                 return build_engine(block, settings, folder, **experiment)
             if packaging == "python":
                 return build(block, folder, **experiment)
-        return build_native(block, folder, platforms=platforms, **experiment)
+        return build_native(block, folder, platforms=platforms, fmi=fmi, **experiment)
 
     material: dict[str, Any] = {
         "block": name,
@@ -84,5 +85,6 @@ def build_block(
         from hapticlink.fmus.native.compiler import compiler_version, host_platform
 
         material["compiler"] = compiler_version()
-        material["platforms"] = list(platforms) or [host_platform()]
+        material["platforms"] = list(platforms) or [host_platform(fmi)]
+        material["fmi"] = fmi
     return cache.cached(material, make, build_folder, poll)

@@ -53,9 +53,11 @@ def build_native(
     platforms: Sequence[str] = (),
     stop_time: float = 1.0,
     step_size: float = 1 / 512,
+    fmi: int = 2,
 ) -> Path:
-    """As `build`, with the component compiled for each of `platforms` (names of
-    `hapticlink.fmus.native.PLATFORMS`), by default for this machine. The FMU needs no Python.
+    """As `build`, with the component compiled for each of `platforms` (as the version `fmi` of the
+    standard calls them: `hapticlink.fmus.native.compiler.TARGETS`), by default for this machine.
+    The FMU needs no Python.
 
     Raises FmuError if ziglang is not installed or a platform is unknown, CompilerError if the
     source does not compile.
@@ -69,6 +71,7 @@ def build_native(
         folder,
         stop_time=stop_time,
         step_size=step_size,
-        platforms=tuple(platforms) or (host_platform(),),
+        platforms=tuple(platforms) or (host_platform(fmi),),
+        fmi=fmi,
     )
     return write_fmu(files, folder, component.name)

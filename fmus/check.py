@@ -6,17 +6,22 @@ after loading again, reset, in a second instance, or from a saved state, have to
 
 from __future__ import annotations
 
+import math
 import shutil
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
 
 from hapticlink.fmus.write_fmu import findings as findings_of
 
@@ -24,12 +29,66 @@ STEPS = 4
 Trace = list[bytes]
 
 
+class Slave3(FMU3Slave):
+    """An instance of FMI 3.0 with the calls of FMI 2.0 that are made here. Its variables are
+    Float64, and an entry of an array has the value reference of the array plus its index."""
+
+    def __init__(self, sizes: Mapping[int, int], **about: Any) -> None:
+        super().__init__(**about)
+        self._sizes = sizes
+        self._first = {first + i: first for first, size in sizes.items() for i in range(size)}
+        self._start = 0.0
+
+    def setupExperiment(self, startTime: float = 0.0) -> None:
+        self._start = startTime
+
+    def enterInitializationMode(self) -> None:
+        super().enterInitializationMode(startTime=self._start)
+
+    def getReal(self, references: Sequence[int]) -> list[float]:
+        arrays = {self._first.get(r, r): list[float]() for r in references}
+        for first, values in arrays.items():
+            values += self.getFloat64([first], self._sizes.get(first, 1))
+        return [arrays[self._first.get(r, r)][r - self._first.get(r, r)] for r in references]
+
+    def setReal(self, references: Sequence[int], values: Sequence[float]) -> None:
+        firsts = sorted({self._first[r] for r in references})
+        entries = [first + i for first in firsts for i in range(self._sizes[first])]
+        given = dict(zip(entries, self.getReal(entries), strict=True))
+        given |= dict(zip(references, values, strict=True))
+        self.setFloat64(firsts, [given[r] for r in entries])
+
+    serializeFMUstate = FMU3Slave.serializeFMUState
+    deSerializeFMUstate = FMU3Slave.deserializeFMUState
+
+
+def _entries(variable: Any) -> Iterator[Any]:
+    """The scalars of a variable, as FMI 2.0 has them."""
+    places = [*np.ndindex(*variable.shape or ())]
+    starts = (variable.start or "").split() or [None] * len(places)
+    for i, (place, start) in enumerate(zip(places, starts, strict=True)):
+        scalar = copy(variable)
+        scalar.name += f"[{','.join(str(k + 1) for k in place)}]" if place else ""
+        scalar.valueReference, scalar.start, scalar.type = (
+            variable.valueReference + i,
+            start,
+            "Real",
+        )
+        yield scalar
+
+
 class Session:
     """An FMU that is extracted to `folder`, by default a new temporary one, and its instances, all
-    of which `close` frees."""
+    of which `close` frees. `description` has scalars, also of FMI 3.0."""
 
     def __init__(self, path: Path | str, folder: Path | None = None) -> None:
         self.description = fmpy.read_model_description(str(path), validate=False)
+        self.make: Callable[..., Any] = FMU2Slave
+        if self.description.fmiVersion == "3.0":
+            own = [v for v in self.description.modelVariables if v.causality != "independent"]
+            sizes = {v.valueReference: math.prod(v.shape or ()) for v in own}
+            self.make = partial(Slave3, sizes)
+            self.description.modelVariables = [entry for v in own for entry in _entries(v)]
         variables = self.description.modelVariables
         self.reals = [v.valueReference for v in variables if v.type == "Real"]
         self.inputs = [v for v in variables if v.causality == "input" and v.type == "Real"]
@@ -41,22 +100,25 @@ class Session:
 
     def instance(self, name: str = "instance") -> FMU2Slave:
         """A new instance, before initialisation; its log is collected in `messages`."""
-        slave = FMU2Slave(
+        slave = self.make(
             guid=self.description.guid,
             unzipDirectory=self.folder,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName=name,
         )
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
-        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
-        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
-        slave.instantiate(callbacks=callbacks, loggingOn=True)
+        if self.make is FMU2Slave:
+            callbacks = fmi2.fmi2CallbackFunctions()
+            callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
+            callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+            callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+            slave.instantiate(callbacks=callbacks, loggingOn=True)
+        else:
+            slave.instantiate(logMessage=self._log, loggingOn=True)
         self._instances.append(slave)
         return slave
 
-    def _log(self, _: object, __: bytes, status: int, ___: bytes, message: bytes) -> None:
-        self.messages.append(message.decode())
+    def _log(self, *about: Any) -> None:
+        self.messages.append(about[-1].decode())
 
     def free(self, slave: FMU2Slave) -> None:
         self._instances.remove(slave)

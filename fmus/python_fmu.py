@@ -22,10 +22,11 @@ from pathlib import Path
 import casadi as ca
 
 from hapticlink.components.component import Component, Variable
+from hapticlink.fmus import model_description
+from hapticlink.fmus.described import described
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.fmu_functions import one_pass
-from hapticlink.fmus.model_description import model_description
 from hapticlink.fmus.reproducible_zip import digest
 from hapticlink.fmus.straight_line import program
 
@@ -86,14 +87,8 @@ def packed(
     """As `entries`, with the files that hold the functions, and what the slave needs to know of
     them. engine: the text of a module whose functions replace these."""
 
-    def describe(guid: str) -> bytes:
-        return model_description(component, guid, stop_time=stop_time, step_size=step_size)
-
-    files = {
-        "documentation/index.html": documentation(component),
-        "model.png": icon(component.timing),
-        **functions,
-    }
+    described_as = described(component, stop_time=stop_time, step_size=step_size)
+    files = {"documentation/index.html": documentation(component), **functions}
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
     for path in sorted((PYTHONFMU / "resources" / "binaries").rglob("*.*")):
@@ -108,24 +103,18 @@ def packed(
         "engine": engine,
         "module": module_text.encode(),
         "about": json.dumps(about).encode(),
-        "xml": describe(""),
+        **model_description.files(described_as, ""),
     }
     whole = digest(content)
     module, guid = f"hapticlink_{whole[:16]}", f"{{{uuid.UUID(whole[:32])}}}"
     files |= {
-        "modelDescription.xml": describe(guid),
+        **model_description.files(described_as, guid),
         "resources/component.json": json.dumps(about | {"digest": whole, "guid": guid}).encode(),
         f"resources/{module}.py": module_text.replace("{}", module).encode(),
         f"resources/{module}_slave.py": slave,
         "resources/slavemodule.txt": f"{module}\n".encode(),
     }
     return files | ({f"resources/{module}_engine.py": engine} if engine else {})
-
-
-def icon(timing: str) -> bytes:
-    """model.png: a smooth wave for a continuous block, a sampled and held one for a sampled
-    block."""
-    return (Path(__file__).parent / "icons" / f"{timing}.png").read_bytes()
 
 
 def check_functions(component: Component) -> None:

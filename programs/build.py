@@ -7,15 +7,14 @@ import shutil
 import tempfile
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 from hapticlink.components.component import Component
-from hapticlink.fmus import cache
+from hapticlink.fmus import cache, model_description
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.blocks import component
+from hapticlink.fmus.described import CAPABILITIES
 from hapticlink.fmus.errors import CompilerError, FmuError
-from hapticlink.fmus.model_description import CAPABILITIES
 from hapticlink.fmus.native.compiler import (
     FLAGS,
     PLATFORMS,
@@ -24,6 +23,7 @@ from hapticlink.fmus.native.compiler import (
     compiler_version,
     host_platform,
 )
+from hapticlink.fmus.native.fmi3_interface import fmi3_sources
 from hapticlink.fmus.reproducible_zip import digest
 from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -33,10 +33,10 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
-from hapticlink.programs import description, description_fmi3
+from hapticlink.programs.description import described, documentation
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolve_scene import Resolved, resolved
-from hapticlink.programs.sources import fmi3_sources, identifiers, sources
+from hapticlink.programs.sources import identifiers, sources
 
 OPTIONS = ("-DEXPORT=",)
 """The functions of the loop are not exported."""
@@ -65,8 +65,6 @@ def build_program(
     Raises InputFault if the scene is invalid or cannot become a program, with what stands in the
     way; Fault if the compiler fails.
     """
-    if fmi not in (2, 3):
-        raise InputFault(f"--fmi: {fmi!r} is not 2 or 3")
     identifier = _identifier(name)
     with temporary_folders.room() as room:
         try:
@@ -117,15 +115,13 @@ def program_files(
     if fmi == 3:
         texts |= fmi3_sources(variables)
     compiled = sorted(name for name in texts if name.endswith(".c") and "/" not in name)
-    described = description_fmi3.described if fmi == 3 else description.described
-    about = partial(
-        described, scene, identifier, variables,
-        capable=capable, step_size=step_size, files=compiled, pictures=pictures(),
-    )  # fmt: skip
+    about = described(scene, identifier, variables, capable=capable, step_size=step_size)
     content = {f"sources/{name}": text.encode() for name, text in texts.items()} | resources
-    guid = f"{{{uuid.UUID(digest({**content, **about(guid='')})[:32])}}}"
+    content |= documentation(scene, variables, pictures())
+    whole = digest(content | model_description.files(about, "", fmi, compiled))
+    guid = f"{{{uuid.UUID(whole[:32])}}}"
     content["sources/scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["sources/scene.h"]
-    return content | about(guid=guid)
+    return content | model_description.files(about, guid, fmi, compiled)
 
 
 def components(program: Resolved) -> dict[str, Component]:

@@ -5,17 +5,14 @@ Value references count [inputs | parameters | outputs | energies | step errors] 
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import groupby
-from typing import Literal
+from dataclasses import dataclass, replace
 
 from hapticlink.components.base_units import BASES
-from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component, Variable
+from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component
 from hapticlink.fmus.errors import FmuError
-from hapticlink.fmus.model_description import feed_through, scalars
+from hapticlink.fmus.scalar_variables import ScalarVariable, scalar_variables
 from hapticlink.fmus.units import base_unit
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import Unit
@@ -23,37 +20,19 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.system.system import System
 from hapticlink.programs.resolve_scene import Resolved
 
-Kind = Literal["INPUT", "OUTSIDE", "PARAMETER", "OUTPUT", "ENERGY", "STEP_ERROR"]
-
 
 @dataclass(frozen=True)
-class Port:
-    """A scalar variable of the program."""
+class Port(ScalarVariable):
+    """A scalar variable of the program. kind: INPUT, PARAMETER and OUTPUT are a block's; OUTSIDE is
+    an output of the block that is left out, and thus an input; ENERGY and STEP_ERROR are
+    measured."""
 
-    kind: Kind
-    """INPUT, PARAMETER and OUTPUT are a block's; OUTSIDE is an output of the block that is left
-    out, and thus an input."""
-    name: str
-    unit: str
-    description: str
     member: int = 0
     """Index of its block among the members, of an energy that of its meter."""
     reference: int = 0
     """Its value reference in that block."""
     place: int = -1
     """Its index in the signal vector."""
-    start: float | None = None
-    fixed: bool = False
-    """A parameter that is set before the run only."""
-    max: float | None = None
-    sampled: bool = False
-    """Of an output: changes at the steps of its block only."""
-    derivative_of: str | None = None
-    """The output of the program of which it is the time derivative."""
-    depends: tuple[str, ...] = field(default=())
-    """The inputs of the program that an output depends on at a communication point."""
-    shape: tuple[int, ...] = ()
-    """That of the vector or matrix of which it is an entry."""
     type: str = "Real"
     """What it is in its block: Real, Integer or Boolean; here all are numbers."""
     defined: Unit | None = None
@@ -61,40 +40,20 @@ class Port:
     is_set: bool = True
     """Whether its start value is set, which an FMU of others may have by itself."""
 
-
-@dataclass(frozen=True)
-class Array:
-    """A variable of FMI 3.0, whose entries are scalars of the program, row by row."""
-
-    name: str
-    shape: tuple[int, ...]
-    reference: int
-    """That of the first entry among the scalars."""
-    entries: tuple[Port, ...]
-
-
-def arrays(ports: Sequence[Port]) -> Iterator[Array]:
-    """The scalars as variables of FMI 3.0: vectors and matrices whole, but for those of which not
-    all entries are there."""
-    reference = 0
-    for (_, name), group in groupby(ports, key=lambda p: (p.kind, p.name.partition("[")[0])):
-        entries = tuple(group)
-        shape = entries[0].shape
-        if shape and math.prod(shape) == len(entries):
-            yield Array(name, shape, reference, entries)
-        else:
-            for i, port in enumerate(entries, reference):
-                yield Array(port.name, (), i, (port,))
-        reference += len(entries)
+    @property
+    def causality(self) -> str:
+        others = {"OUTSIDE": "input", "ENERGY": "local", "STEP_ERROR": "local"}
+        return others.get(self.kind, self.kind.lower())
 
 
 def ports(resolved: Resolved, components: Mapping[str, Component]) -> list[Port]:
     """The variables, in the order of their value references. components: of the members that are
     blocks of this project."""
+    own = {fmu: [*_of_block(resolved, fmu, c)] for fmu, c in components.items()}
     every = [
-        *_inputs(resolved, components),
-        *_parameters(resolved, components),
-        *_outputs(resolved, components),
+        *_inputs(resolved, own),
+        *_parameters(resolved, own),
+        *_outputs(resolved, own),
         *_energies(resolved),
         *_step_errors(resolved),
     ]
@@ -111,7 +70,23 @@ def fed(system: System, fmu: str) -> set[str]:
     return {s.name for c in system.connections if c.target == fmu for s in c.inputs}
 
 
-def _inputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
+def _of_block(resolved: Resolved, fmu: str, component: Component) -> Iterator[Port]:
+    """All variables of a block of this project that no connection sets; step sizes are those of
+    the scene."""
+    set_by_others = {
+        f"{fmu}.{name}" for name in (*fed(resolved.system, fmu), STEP_SIZE, FRAME_SIZE)
+    }
+    for reference, v in enumerate(scalar_variables(component)):
+        of = v.derivative_of and f"{fmu}.{v.derivative_of}"
+        depends = () if v.sampled else (f"{fmu}.{name}" for name in v.depends)
+        free = tuple(name for name in depends if name not in set_by_others)
+        named = {"name": f"{fmu}.{v.name}", "derivative_of": of, "depends": free}
+        if named["name"] not in set_by_others:
+            member = resolved.members.index(fmu)
+            yield Port(**vars(v) | named, member=member, reference=reference)
+
+
+def _inputs(resolved: Resolved, own: Mapping[str, Sequence[Port]]) -> Iterator[Port]:
     if resolved.outside:
         span = resolved.simulation.signals.fmu(resolved.outside)
         outputs = resolved.system.fmu[resolved.outside].description.outputs
@@ -130,62 +105,35 @@ def _inputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator
                     defined=defined,
                 )  # fmt: skip
     for member, fmu in enumerate(resolved.members):
-        taken = fed(resolved.system, fmu)
         if fmu in resolved.foreign:
             yield from _settable(resolved, fmu, member, "input")
-            continue
-        component = components[fmu]
-        for reference, (v, name, unit, start) in enumerate(scalars(component.inputs)):
-            if name not in taken:
-                yield Port(
-                    "INPUT", f"{fmu}.{name}", unit, v.description, member, reference, start=start,
-                    shape=v.shape,
-                )  # fmt: skip
+        else:
+            yield from (port for port in own[fmu] if port.kind == "INPUT")
 
 
-def _parameters(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
-    """Parameters that no connection sets; step sizes are those of the scene."""
+def _parameters(resolved: Resolved, own: Mapping[str, Sequence[Port]]) -> Iterator[Port]:
     for member, fmu in enumerate(resolved.members):
         if fmu in resolved.foreign:
             yield from _settable(resolved, fmu, member, "parameter")
             continue
-        component = components[fmu]
-        taken = fed(resolved.system, fmu) | {STEP_SIZE, FRAME_SIZE}
-        first = len(component.start_inputs)
-        given = dict((s.name, float(v)) for s, v in resolved.system.fmu[fmu].starts)
-        for reference, (v, name, unit, start) in enumerate(scalars(component.parameters), first):
-            if name in taken:
-                continue
-            yield Port(
-                "PARAMETER", f"{fmu}.{name}", unit, v.description, member, reference,
-                start=given.get(name, start), fixed=v.variability == "fixed", shape=v.shape,
-            )  # fmt: skip
+        given = {f"{fmu}.{s.name}": float(v) for s, v in resolved.system.fmu[fmu].starts}
+        for port in (port for port in own[fmu] if port.kind == "PARAMETER"):
+            yield replace(port, start=given.get(port.name, port.start))
 
 
-def _outputs(resolved: Resolved, components: Mapping[str, Component]) -> Iterator[Port]:
+def _outputs(resolved: Resolved, own: Mapping[str, Sequence[Port]]) -> Iterator[Port]:
     """The outputs that the scene records, all by default."""
     signals, chosen = resolved.simulation.signals, resolved.recorded
     for member, fmu in enumerate(resolved.members):
         if fmu in resolved.foreign:
             yield from _foreign_outputs(resolved, fmu, member)
             continue
-        component = components[fmu]
-        places = {s.name: s.reference for s in resolved.system.fmu[fmu].description.outputs}
-        taken, through = fed(resolved.system, fmu), feed_through(component)
-        inputs = [name for _, name, _, _ in scalars(component.inputs)]
-        first = len(component.start_inputs) + len(component.start_parameters)
-        sampled, bases = component.timing == "sampled", _bases(component)
-        for i, (v, name, unit, _) in enumerate(scalars(component.outputs)):
-            if name not in places or f"{fmu}.{name}" not in chosen:
-                continue
-            depends = () if sampled else tuple(inputs[k] for k in through[i])
-            of = bases.get(name)
-            yield Port(
-                "OUTPUT", f"{fmu}.{name}", unit, v.description, member, first + i,
-                signals.scalar(fmu, name), max=v.max, sampled=sampled,
-                derivative_of=f"{fmu}.{of}" if of and f"{fmu}.{of}" in chosen else None,
-                depends=tuple(f"{fmu}.{u}" for u in depends if u not in taken), shape=v.shape,
-            )  # fmt: skip
+        there = {f"{fmu}.{s.name}" for s in resolved.system.fmu[fmu].description.outputs}
+        for port in own[fmu]:
+            if port.kind == "OUTPUT" and port.name in there & chosen:
+                place = signals.scalar(fmu, port.name.removeprefix(f"{fmu}."))
+                of = port.derivative_of if port.derivative_of in chosen else None
+                yield replace(port, place=place, derivative_of=of)
 
 
 def _settable(resolved: Resolved, fmu: str, member: int, causality: str) -> Iterator[Port]:
@@ -233,16 +181,6 @@ def _unit(description: Description, scalar: Scalar) -> tuple[str, Unit | None]:
     except FmuError:
         powers = None
     return unit.name, None if unit == Unit(unit.name, powers) and powers else unit
-
-
-def _bases(component: Component) -> dict[str, str]:
-    """By name of an output, that of which it is the time derivative."""
-    outputs: dict[str, Variable] = {v.name: v for v in component.outputs}
-    by_output: dict[str, str] = {}
-    for v in component.outputs:
-        if v.derivative_of:
-            by_output |= dict(zip(v.names, outputs[v.derivative_of].names, strict=True))
-    return by_output
 
 
 def _energies(resolved: Resolved) -> Iterator[Port]:

@@ -15,14 +15,14 @@ import numpy as np
 
 from hapticlink.components.component import Component
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
-from hapticlink.fmus.native.native_fmu import COMMON, FMI3, WRAPPER
+from hapticlink.fmus.native.native_fmu import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.run.compiled import build as loop
 from hapticlink.programs.memory_regions import Regions
-from hapticlink.programs.ports import Port, arrays
+from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
 from hapticlink.programs.typed_data import TypedData
 
@@ -30,7 +30,6 @@ HERE = Path(__file__).parent
 OWN = ("program.h", "program.c", "changes.h", "platform.c", "latencies.c")
 REPLACED = ("platform.c", "process_state.c", "python_errors.c")
 """Files of the loop in whose place a program has its own platform.c."""
-HEADERS_3 = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")
 FUNCTIONS = {
     "fmi2GetReal": "GET_REAL",
     "fmi2SetReal": "SET_REAL",
@@ -66,28 +65,6 @@ def sources(
             files |= own
     files["scene.h"] = _scene(resolved, ports, ids, guids)
     return files
-
-
-def fmi3_sources(ports: Sequence[Port]) -> dict[str, str]:
-    """What the interface of FMI 3.0 adds: its C file, with the sizes of the variables by value
-    reference, 0 where none begins, time the last, and the functions that it does not have."""
-    files = {name: (HEADERS / name).read_text(errors="replace") for name in HEADERS_3}
-    files[FMI3.name] = FMI3.read_text()
-    sizes = [n for a in arrays(ports) for n in (len(a.entries), *[0] * (len(a.entries) - 1))]
-    listed = ", ".join(map(str, sizes))
-    rest = [f"#define N_SCALARS {len(sizes)}", f"static const unsigned sizes[] = {{{listed}, 1}};"]
-    types = re.findall(r"typedef (fmi3\w+) (\w+)TYPE\s*\((.*?)\);", files[HEADERS_3[1]], re.S)
-    for returned, name, parameters in types:
-        if re.search(rf"\b{name}\b", files[FMI3.name]):
-            continue
-        result = "lacks(instance, __func__)"
-        if returned == "fmi3Instance":
-            own = "{.environment = instanceEnvironment, .log = logMessage}"
-            result = f"lacks(&(Instance){own}, __func__), NULL"
-        elif "nValueReferences" in parameters:
-            result = f"nValueReferences ? {result} : fmi3OK"
-        rest.append(f"{returned} {name}({parameters}) {{ return {result}; }}")
-    return files | {"fmi3_rest.h": "\n".join(rest) + "\n"}
 
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:

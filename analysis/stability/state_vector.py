@@ -210,7 +210,8 @@ def _entries(fmu: Fmu) -> Iterator[tuple[int, str, bool]]:
     """Index, from the end, and name of each number of an FMU that is no parameter, and whether it
     is an output."""
     assert fmu.description.states is not None
-    scalars = sorted(fmu.description.scalars, key=lambda s: s.reference)
+    scalars = [s for s in fmu.description.scalars if s.causality != "independent"]
+    scalars.sort(key=lambda s: s.reference)  # entries of an array follow each other already
     for i, scalar in enumerate(scalars):
         if scalar.causality in ("input", "output"):
             place = i - len(scalars) - len(fmu.description.states)

@@ -2,8 +2,8 @@
  * and messages it has.
  *
  * An array is the scalars of FMI 2.0 from its value reference on, row by row; time follows the last.
- * fmi3_rest.h, generated, has the sizes of the variables, and those functions of the standard that need
- * event mode, clocks, other types or another kind of FMU: they fail. */
+ * fmi3_rest.h, generated, has the sizes of the variables, all scalars in order, and those functions of the
+ * standard that need event mode, clocks, other types or another kind of FMU: they fail. */
 #include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -158,10 +158,10 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], 
                           size_t count) {
     fmi2Component c = program(instance, __func__);
     if (!fits(instance, vr, n, value, count)) return fmi3Error;
-    for (size_t v = 0; v < n; v++)
-        for (unsigned k = vr[v]; k < vr[v] + sizes[vr[v]]; k++, value++)
-            if (k == N_SCALARS ? fmi2GetRealStatus(c, fmi2LastSuccessfulTime, value) : fmi2GetReal(c, &k, 1, value))
-                return fmi3Error;
+    for (size_t v = 0; v < n; value += sizes[vr[v++]])
+        if (vr[v] == N_SCALARS ? fmi2GetRealStatus(c, fmi2LastSuccessfulTime, value)
+                               : fmi2GetReal(c, scalars + vr[v], sizes[vr[v]], value))
+            return fmi3Error;
     return fmi3OK;
 }
 
@@ -180,7 +180,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], 
 
 /* --- stepping -------------------------------------------------------------------------------- */
 
-/* An FMU that ends the simulation within a step, which is a discarded one in FMI 2.0, asks to terminate. */
+/* An FMU that ends the simulation within a step, which is a discarded one in FMI 2.0, asks to terminate;
+ * a step that is discarded otherwise may be taken again, shorter. */
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 start, fmi3Float64 size, fmi3Boolean no_way_back,
                       fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
     fmi2Component c = program(instance, __func__);
@@ -188,8 +189,10 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 start, fmi3Float64 size
     if (!event || !terminate || !early || !reached) return refuse(instance, "%s got a null pointer", __func__);
     const fmi2Status status = fmi2DoStep(c, start, size, no_way_back);
     fmi2GetRealStatus(c, fmi2LastSuccessfulTime, reached);
+    fmi2Boolean ended = 0;
+    fmi2GetBooleanStatus(c, fmi2Terminated, &ended);
     *event = false;
-    *terminate = status == fmi2Discard;
+    *terminate = status == fmi2Discard && ended;
     *early = *terminate && ((Instance *)instance)->early && *reached < start + size;
     return *terminate ? fmi3OK : (fmi3Status)status;
 }

@@ -10,9 +10,10 @@ from itertools import chain
 from pathlib import Path
 
 from hapticlink.components.component import Component
+from hapticlink.fmus import model_description
+from hapticlink.fmus.described import described
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.fmu_functions import GRAPHS
-from hapticlink.fmus.model_description import model_description, with_sources
 from hapticlink.fmus.native.compiler import (
     FLAGS,
     FMI2_HEADERS,
@@ -22,16 +23,15 @@ from hapticlink.fmus.native.compiler import (
     compiler_version,
     entry,
 )
+from hapticlink.fmus.native.fmi3_interface import fmi3_sources
 from hapticlink.fmus.native.linking import WINDOWS
 from hapticlink.fmus.native.source import component_source
-from hapticlink.fmus.python_fmu import check_functions, icon
+from hapticlink.fmus.python_fmu import check_functions
 from hapticlink.fmus.reproducible_zip import digest
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
 COMMON = Path(__file__).parent / "fmi2_common.h"
 """What it includes."""
-FMI3 = Path(__file__).parent / "fmi3.c"
-"""An interface of FMI 3.0 over that of FMI 2.0."""
 
 
 def entries(
@@ -41,6 +41,7 @@ def entries(
     stop_time: float,
     step_size: float,
     platforms: Sequence[str],
+    fmi: int = 2,
 ) -> dict[str, bytes]:
     """All files of the FMU, with a binary for each of `platforms`, compiled in `folder`, and in
     sources/ the C files from which `cc *.c` makes one for any other.
@@ -52,41 +53,37 @@ def entries(
     with GRAPHS:
         check_functions(component)
         header, pieces = component_source(component)
-        xml = model_description(
-            component, "", stop_time=stop_time, step_size=step_size, needs_tool=False
-        )
-        files = {
-            "documentation/index.html": documentation(component),
-            "model.png": icon(component.timing),
-        }
+        about = described(component, stop_time=stop_time, step_size=step_size, needs_tool=False)
+        files = {"documentation/index.html": documentation(component)}
+    own = {path.name: path.read_bytes() for path in (WRAPPER, COMMON)}
+    if fmi == 3:
+        own |= {name: text.encode() for name, text in fmi3_sources(about.variables).items()}
     made_by = [compiler_version(), *FLAGS, TARGETS]
     content = {
         **files,
+        **own,
         "component.h": header.encode(),
-        "fmi2.c": WRAPPER.read_bytes(),
-        COMMON.name: COMMON.read_bytes(),
         WINDOWS.name: WINDOWS.read_bytes(),
         "compiler": json.dumps(made_by).encode(),
-        "xml": xml,
+        **model_description.files(about, "", fmi),
     }
     guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
-    xml = xml.replace(b'guid=""', f'guid="{guid}"'.encode(), 1)
+    own["component.h"] = f'#define GUID "{guid}"\n'.encode() + content["component.h"]
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
-        head = f'#define GUID "{guid}"\n'.encode()
-        (room / "component.h").write_bytes(head + content["component.h"])
-        main = room / "fmi2.c"
-        main.write_bytes(content["fmi2.c"])
-        (room / COMMON.name).write_bytes(content[COMMON.name])
-        sources: Iterable[Path] = chain([main], _written(pieces, room))
+        for file, text in own.items():
+            (room / file).write_bytes(text)
+        interface = [room / file for file in own if file.endswith(".c")]
+        sources: Iterable[Path] = chain(interface, _written(pieces, room))
         for platform in platforms:
-            library = compile_library(sources if pieces else main, room / "library", platform)
-            sources = [main, *sorted(room.glob("piece*.c"))]
+            library = compile_library(sources, room / "library", platform)
+            sources = [*interface, *sorted(room.glob("piece*.c"))]
             files[entry(platform, component.name)] = library.read_bytes()
-        files["modelDescription.xml"] = with_sources(xml, (path.name for path in sources))
-        for path in (*sources, room / "component.h", room / COMMON.name):
-            files[f"sources/{path.name}"] = path.read_bytes()
-    return files | {f"sources/{name}": (HEADERS / name).read_bytes() for name in FMI2_HEADERS}
+        own |= {path.name: path.read_bytes() for path in sources}
+    own |= {file: (HEADERS / file).read_bytes() for file in FMI2_HEADERS}
+    listed = [file for file in own if file.endswith(".c")]
+    files |= {f"sources/{file}": text for file, text in own.items()}
+    return files | model_description.files(about, guid, fmi, listed)
 
 
 def _written(pieces: Iterable[str], folder: Path) -> Iterator[Path]:

@@ -4,6 +4,7 @@
       <Block timing="sampled" substeps="1">
         <Port name="F" displacement="x" sign="-1.0"/>
         <Port name="P" kind="projector"/>
+      <Port name="x" units="m m rad"/>
         <Spring set_position="x_S" position="x_D" stiffness="K" damping="B" set_velocity="v_S"/>
         <States names="q[1] q[2]"/>
       </Block>
@@ -11,13 +12,16 @@
 
 The attributes of ports and springs are those of the records in `components.ports`. States declares
 the layout of the serialised FMU state: it ends with doubles in the machine's byte order, the values
-of all variables by value reference, and then these states. An FMU without this annotation declares
-none of it, whatever its ports are called; any FMU may carry it.
+of all variables by value reference, and then these states. FMI 3.0 has one unit for an array:
+`units` are those of its entries; there the Block stands in an Annotation of type hapticlink. An FMU
+without this annotation declares none of it, whatever its ports are called; any FMU may carry it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 from xml.etree.ElementTree import Element
 
@@ -54,7 +58,21 @@ class Annotation(NamedTuple):
 
 def block(tree: Element) -> Element | None:
     """The annotation's Block in a modelDescription.xml, None where there is none."""
-    return tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
+    two = tree.find("./VendorAnnotations/Tool[@name='hapticlink']/Block")
+    three = tree.find("./Annotations/Annotation[@type='hapticlink']/Block")
+    return three if two is None else two
+
+
+def with_units(tree: Element, scalars: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """The scalars with the units that the annotation gives to the entries of arrays. Raises
+    ValueError where there are not as many."""
+    declared = () if (about := block(tree)) is None else about.iterfind("Port[@units]")
+    units = {port.get("name", ""): port.get("units", "").split() for port in declared}
+    entries = Counter(s.port for s in scalars)
+    for name, given in units.items():
+        if len(given) != entries[name]:
+            raise ValueError(f"{name} has {entries[name]} entries, and {len(given)} units")
+    return tuple(replace(s, unit=units[s.port][s.entry]) if s.port in units else s for s in scalars)
 
 
 def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> Annotation:
@@ -77,6 +95,8 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
             states = tuple(_attributes(element, "names")["names"].split())
         elif element.tag == "Spring":
             springs.append(ports.spring(element))
+        elif "units" in element.attrib:
+            _attributes(element, "name units")
         elif "kind" in element.attrib:
             kinds[name] = ports.kind(element)
         else:

@@ -57,7 +57,7 @@ class Description:
     """By output: the variables that it depends on directly. An output that is not here may depend
     on every input."""
     strings: tuple[Scalar, ...] = ()
-    """Variables that are text or binary: they are set at the start, never connected."""
+    """Variables that are text or binary; of a system, those that are not connected."""
     derivatives: Mapping[str, str] = field(default_factory=dict)
     """By output: the output that is its derivative with respect to time."""
     kinds: Mapping[str, Kind] = field(default_factory=dict)
@@ -191,11 +191,12 @@ def _variables(
     """What ModelVariables, UnitDefinitions and ModelStructure say, as in `Description`."""
     require_countable(model)
     relative, bounded = differences(tree), annotation.block(tree) is not None
-    scalars = tuple(
+    numbered = [
         s
         for v in model.modelVariables
         for s in numbers(v, version, v.name in relative, bounded=bounded, resized=resized)
-    )
+    ]
+    scalars = annotation.with_units(tree, numbered)
     strings = tuple(text(v) for v in model.modelVariables if v.type in WRITTEN and not v.shape)
     require_unique(s.name for s in (*scalars, *strings))
     dependencies = {

@@ -85,7 +85,7 @@ class InProcessWithEvents(InProcess3):
         try:
             return super()._instantiate()
         except Exception:  # FMPy raises bare Exception, which comes again where this was not it
-            if self._clocks:
+            if self._clocks or self.texts:
                 raise
         self.in_c = True
         slave = super()._instantiate()

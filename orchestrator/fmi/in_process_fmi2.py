@@ -42,7 +42,7 @@ from hapticlink.orchestrator.fmi.status import (
 )
 from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
-from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
+from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 
 
 class InProcess(WithStates):
@@ -58,6 +58,8 @@ class InProcess(WithStates):
         self._setters = 0
         """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
         self.holds_python = False
+        self.texts = any(s.type in WRITTEN for s in self.description.scalars)
+        self.in_c = not self.texts
         self._key = messages.opened()
 
     def _load(self) -> None:

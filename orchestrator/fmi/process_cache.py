@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 
-from fmpy import extract, platform
+from fmpy import extract, platform, platform_tuple
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.description import Description, describe
@@ -103,7 +103,8 @@ def _extracted(path: Path, folder: str, own: bool) -> str:
 def _is_needed(entry: str) -> bool:
     """Whether a run needs an entry of an FMU of this project: no binary of another platform, which
     is a third of a Python FMU."""
-    return entry.startswith(("modelDescription.xml", "resources/", f"binaries/{platform}/"))
+    here = f"binaries/{platform}/", f"binaries/{platform_tuple}/"
+    return entry.startswith(("modelDescription.xml", "resources/", *here))
 
 
 def leave(folder: str) -> bool:

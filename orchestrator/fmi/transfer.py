@@ -12,7 +12,8 @@ import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.start_values import WIDE
-from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
+from hapticlink.orchestrator.fmi.texts import TextTransfer
+from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 
 _IN_C: dict[str, type[np.generic]] = {
     "Real": np.float64, "Integer": np.int32,
@@ -122,11 +123,15 @@ def transfers(
 ) -> list[Transfer]:
     """One transfer per FMI type. `scalars` are sorted by type, those of a type side by side at
     their `places` in `values`, by default from the first on."""
-    several = []
+    several: list[Any] = []
     for type_ in TYPES:
         chosen = [i for i, s in enumerate(scalars) if s.type == type_]
         if chosen:
             first, last = (i if places is None else places[i] for i in (chosen[0], chosen[-1]))
             of_type = [scalars[i] for i in chosen]
-            several.append(Transfer(slave, fmi, verb, of_type, values[first : last + 1], exact))
+            own = values[first : last + 1]
+            if type_ in WRITTEN:
+                several.append(TextTransfer(slave, fmi, verb, of_type, own))
+            else:
+                several.append(Transfer(slave, fmi, verb, of_type, own, exact))
     return several

@@ -17,12 +17,12 @@ from hapticlink.orchestrator.fmi.units import SAME, Linear
 TYPES = (
     "Real", "Integer",
     "Float64", "Float32", "Int64", "Int32", "Int16", "Int8", "UInt64", "UInt32", "UInt16", "UInt8",
-    "Boolean", "Clock",
+    "Boolean", "Clock", "String", "Binary",
 )  # fmt: skip
-"""The FMI types that are numbers, by the name in their get and set functions: FMI 2.0's two,
-FMI 3.0's ten, Boolean of both, and Clock, whose number is how often it has been active."""
+"""The FMI types, by the name in their get and set functions: FMI 2.0's two, FMI 3.0's ten, Boolean
+of both, Clock, whose number is how often it has been active, and those that are no numbers."""
 WRITTEN = ("String", "Binary")
-"""The FMI types that are no numbers."""
+"""The FMI types that are no numbers: signals have the number of the text (`texts`)."""
 _CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
 _DERIVATIVE = re.compile(r"der\((.+)\)")
 _ENTRY = re.compile(r"\[[\d, ]+\]$")
@@ -107,7 +107,11 @@ def numbers(
     bounded: the run has to end if its `max` is exceeded. resized: structural parameters have been
     changed; start values are NaN if their number does not match the new size."""
     kind = _CALLED.get((fmi, variable.type), variable.type)
-    if kind not in TYPES or (kind == "Clock" and variable.intervalVariability != "triggered"):
+    if (
+        kind not in TYPES
+        or kind in WRITTEN
+        or (kind == "Clock" and variable.intervalVariability != "triggered")
+    ):
         return
     check(variable)
     names = _names(variable)

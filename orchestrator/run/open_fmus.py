@@ -7,10 +7,12 @@ from contextlib import ExitStack
 from functools import partial
 
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
+from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.network.remote_fmu import Remote
 from hapticlink.orchestrator.run.python_modules import bundled, clashes
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -18,7 +20,8 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 
 def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
-    """The FMUs that run in a process of their own, here or elsewhere, by name, with the reason."""
+    """The FMUs that run in a process of their own, here or elsewhere, by name, with the reason.
+    Raises InputFault for one of which a text is connected."""
     fmus = tuple(fmus)
     asked = {u.name: "asked for" for u in fmus if u.isolate}
     asked |= {u.name: f"served from {u.served.address}" for u in fmus if u.served}
@@ -29,7 +32,13 @@ def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
         and NEEDS_TOOL in u.description.flags
         and not bundled(u.description.path)  # whose tool is Python, which is there
     }
-    return asked | tools | clashes(u for u in fmus if u.name not in tools)
+    alone = asked | tools | clashes(u for u in fmus if u.name not in tools)
+    for u in (u for u in fmus if u.name in alone):
+        if text := next((s.name for s in u.description.scalars if s.type in WRITTEN), None):
+            what = f"{u.name}.{text} is a text, which is passed on within one process"
+            why = f"{u.name} runs in another ({alone[u.name]})"
+            raise InputFault(f"{what}; {why}: pass it on as an array of UInt8")
+    return alone
 
 
 def opened(

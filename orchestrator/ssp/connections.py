@@ -18,7 +18,7 @@ from typing import Any
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
-from hapticlink.orchestrator.fmi.variables import WRITTEN, entry_of
+from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp.tree import Connector, Line, Node, Part, Place, dotted, indices
 
 TAKES = ("input", "parameter", "structuralParameter")
@@ -116,15 +116,12 @@ class Wires:
 
     def _is_source(self, node: Node, inside: Place) -> bool:
         place, _ = node
-        variable = self.variables.get(node)
-        if variable and variable.type not in WRITTEN:
+        if variable := self.variables.get(node):
             return variable.causality not in TAKES
         if place in self._systems and (connector := self._connector(node)):
             # Seen from inside, a system's own input is a source.
             return (connector.kind in TAKES) == (place == inside)
         why = "does not exist, or is a clock that is not triggered"
-        if variable:
-            why = f"is a {variable.type}, set at the start only"
         raise InputFault(f"{self.path}: a connection names {dotted(*node)}, which {why}")
 
     def _follow(self, sink: Node, fed: Mapping[Node, tuple[Node, Line]]) -> None:

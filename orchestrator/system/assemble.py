@@ -24,7 +24,7 @@ from hapticlink.orchestrator.system import (
     timed_events,
 )
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
-from hapticlink.orchestrator.system.connections import connect, whole
+from hapticlink.orchestrator.system.connections import connect, whole, with_texts
 from hapticlink.orchestrator.system.recorded import recorded
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
@@ -56,6 +56,7 @@ def from_scene(
     fmus = tuple(with_sizes(u, timeline) for u in alone)
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
+    fmus = tuple(with_texts(u, connections) for u in fmus)
     rules = rules_of(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, timeline, rules)
     problems += checks.unfit(scene, fmus, assigned, refused, rules.springs)

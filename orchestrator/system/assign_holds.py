@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
@@ -116,7 +117,7 @@ def _between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
 
 def _has_rows(c: Connection) -> bool:
     """Whether there is nothing between its samples that a hold could make."""
-    return c.kind == "table" or c.outputs[0].type == "Clock"
+    return c.kind == "table" or c.outputs[0].type in ("Clock", *WRITTEN)
 
 
 def misfit(
@@ -133,7 +134,8 @@ def misfit(
         return f"coupling = 'iterated' interpolates here; take one of {able}"
     if _has_rows(c) and not HOLDS[hold].gives_samples:
         able = ", ".join(HOLDS.names(lambda kind: kind.gives_samples))
-        what = "table, whose rows" if c.kind == "table" else "clock, whose counts"
+        counts = "clock, whose counts" if c.outputs[0].type == "Clock" else "text, which can"
+        what = "table, whose rows" if c.kind == "table" else counts
         return f"{c.source_port} is a {what} have no values in between; take {able}"
     if needs == "derivative" and not beside(c, fmus, hold):
         return (

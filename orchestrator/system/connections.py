@@ -10,8 +10,8 @@ from hapticlink.orchestrator.fmi.units import SAME, Linear, conversion
 from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem, reported
-from hapticlink.orchestrator.system.fmu_tables import no_number, outputs, settable
-from hapticlink.orchestrator.system.system import Connection
+from hapticlink.orchestrator.system.fmu_tables import outputs, settable
+from hapticlink.orchestrator.system.system import Connection, Fmu
 
 
 def connect(
@@ -46,6 +46,21 @@ def connect(
         yield path, Connection(source, output, target, entry, scalars, inputs)
 
 
+def with_texts(fmu: Fmu, connections: Iterable[Connection]) -> Fmu:
+    """The FMU with those Strings and Binaries among its scalars that are connected: each is read or
+    set at every communication point, by Python."""
+    taken = [s for c in connections if c.source == fmu.name for s in c.outputs]
+    given = [s for c in connections if c.target == fmu.name for s in c.inputs]
+    texts = dict.fromkeys(s.name for s in (*taken, *given) if s.type in WRITTEN)
+    if not texts:
+        return fmu
+    scalars, strings = list(fmu.description.scalars), list[Scalar]()
+    for s in fmu.description.strings:
+        (scalars if s.name in texts else strings).append(s)
+    about = replace(fmu.description, scalars=tuple(scalars), strings=tuple(strings))
+    return replace(fmu, description=about)
+
+
 def whole(
     asked: Iterable[tuple[Path, Connection]],
     rows: Iterable[Wire],
@@ -73,8 +88,10 @@ def _converted(
 ) -> tuple[Scalar, ...]:
     """The inputs with the conversion of the wire: units, then its factor and offset. Raises
     ValueError for different sizes, texts, and units that cannot be converted."""
-    if inputs[0].type in WRITTEN:
-        raise ValueError(no_number(inputs[0]))
+    text = next((s for s in (*outputs, *inputs) if s.type in WRITTEN), None)
+    if text and {(s.type, s.causality) for s in inputs} != {(outputs[0].type, "input")}:
+        what = f"a {text.type} output is connected to a {text.type} input only"
+        raise ValueError(f"{text.name} is a {text.type}: {what}")
     if len(outputs) != len(inputs):
         sizes = f"{wire.from_} has {len(outputs)} numbers, {wire.to} takes {len(inputs)}"
         raise ValueError(f"{sizes}; connect their entries one by one")

@@ -30,11 +30,13 @@ def fmu_files(
     room: Path,
     platforms: Sequence[str] = (),
     starts: Mapping[str, Starts] | None = None,
+    fmi: int = 2,
 ) -> dict[str, Path]:
     """The FMU file of each block by its name, from the cache, or built in `room` where the cache is
     off.
 
-    platforms: those of native FMUs, by default this machine's. starts: for FMUs that other tools
+    platforms: those of native FMUs, by default this machine's; fmi: their version of the
+    standard. starts: for FMUs that other tools
     run, by block, values that replace the start values of its parameters; these also have the
     scene's step sizes and default experiment, which a run sets itself: it needs one FMU for all
     rates. Raises InputFault where no FMU can be built from
@@ -63,6 +65,7 @@ def fmu_files(
                 experiment=experiment,
                 packaging=scene.packaging,
                 platforms=platforms,
+                fmi=fmi,
                 starts=given,
                 engine=block.engine,
                 poll=interrupt.check,

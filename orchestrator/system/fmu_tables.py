@@ -103,10 +103,9 @@ def _entries(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
 
 def outputs(description: Description, name: str) -> tuple[Scalar, ...]:
     """The scalars of the output `name`. Raises ValueError where there is no such output."""
-    entries = description.port(name, "output")
+    texts = (s for s in description.strings if s.name == name and s.causality == "output")
+    entries = description.port(name, "output") or tuple(texts)
     if not entries:
-        if written := [s for s in description.strings if s.name == name]:
-            raise ValueError(no_number(written[0]))
         others = [s for s in description.scalars if name in (s.name, s.port)]
         if others:
             raise ValueError(f"{name} is no output, its causality is {others[0].causality}")
@@ -114,14 +113,6 @@ def outputs(description: Description, name: str) -> tuple[Scalar, ...]:
             unknown("output", name, dict.fromkeys(s.port for s in description.outputs))
         )
     return entries
-
-
-def no_number(scalar: Scalar) -> str:
-    """Why a String or a Binary is not connected."""
-    return (
-        f"{scalar.name} is a {scalar.type}: signals, holds and results are numbers; give it by "
-        "start, or pass its bytes on as an array of UInt8"
-    )
 
 
 def settable(description: Description, name: str, start: bool = False) -> tuple[Scalar, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from hapticlink.orchestrator.base.errors import near
+from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.scene.records import Record
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import Connection, Fmu
@@ -16,15 +17,17 @@ def recorded(
     connections: Iterable[Connection],
     problems: list[Problem],
 ) -> tuple[str, ...] | None:
-    """The outputs that are written, `fmu.output`, in the order of the FMUs; None for all. Adds a
-    problem for each name that is none of an FMU, a port or an output."""
-    if record.signals == "all":
-        return None
+    """The outputs that are written, `fmu.output`, in the order of the FMUs; None for all. Texts are
+    not. Adds a problem for each name that is none of an FMU, a port or an output."""
     called = {
         f"{fmu.name}.{s.name}": {fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}"}
         for fmu in fmus
         for s in fmu.description.outputs
+        if s.type not in WRITTEN
     }
+    if record.signals == "all":
+        every = sum(len(fmu.description.outputs) for fmu in fmus)
+        return None if len(called) == every else tuple(called)
     if record.signals == "none":
         chosen: set[str] = set()
     elif record.signals == "connected":

@@ -25,6 +25,13 @@ def native_fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {c.name: build_native(c, folder) for c in sample_components.EVERY}
 
 
+@pytest.fixture(scope="session")
+def native_fmus_3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Of FMI 3.0."""
+    folder = tmp_path_factory.mktemp("native3")
+    return {c.name: build_native(c, folder, fmi=3) for c in sample_components.EVERY}
+
+
 @pytest.fixture
 def opened(fmus: dict[str, Path]) -> Iterator[Callable[[str], Session]]:
     """name -> Session; closed at the end of the test."""

@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.components.component import INERTIA, MOBILITY, WRENCH
+from hapticlink.fmus.described import described as of_component
 from hapticlink.fmus.errors import InvalidUnit
-from hapticlink.fmus.model_description import feed_through, initial_dependencies, model_description
+from hapticlink.fmus.model_description import files
+from hapticlink.fmus.scalar_variables import feed_through, initial_dependencies
 from hapticlink.fmus.units import BASES, base_unit
 from tests.fmus import sample_components
 
@@ -122,9 +124,8 @@ def test_capabilities_and_experiment(fmus):
 
 
 def test_timing_and_substeps_for_our_own_tools():
-    text = model_description(
-        sample_components.spring(substeps=3), "{x}", stop_time=1.0, step_size=0.1
-    )
+    about = of_component(sample_components.spring(substeps=3), stop_time=1.0, step_size=0.1)
+    text = files(about, "{x}")["modelDescription.xml"]
     from xml.etree import ElementTree as ET
 
     block = ET.parse(io.BytesIO(text)).find("VendorAnnotations/Tool[@name='hapticlink']/Block")

@@ -63,18 +63,24 @@ ERROR = 3
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory) -> dict[str, tuple[Path, Path]]:
-    """Each block of the report's experiment as a Python and as a native FMU."""
+def both(tmp_path_factory) -> dict[str, tuple[Path, ...]]:
+    """Each block of the report's experiment as a Python and as a native FMU, and those of its scene
+    as native ones of FMI 3.0 too."""
     scene = open_scene.load("closed-loop", OPTIONS)
     folder = tmp_path_factory.mktemp("both")
     made = {b.name: component(b.block, b.settings) for b in blocks.blocks(scene).built}
+    three = {n: (build_native(c, folder / n / "native3", fmi=3),) for n, c in made.items()}
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
     made["passive"] = controller(Controller(passivity=True), 0.04)
     made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
     # Several are named virtual_mechanism.
     return {
-        n: (build(c, folder / n / "python"), build_native(c, folder / n / "native"))
+        n: (
+            build(c, folder / n / "python"),
+            build_native(c, folder / n / "native"),
+            *three.get(n, ()),
+        )
         for n, c in made.items()
     }
 
@@ -174,9 +180,10 @@ def driven(path: Path) -> np.ndarray:
     [*NAMES, "discrete_equivalent", "arm", "driven", "rubbing", "splined", "swung", "passive"],
 )
 def test_every_block_gives_the_bits_of_its_python_fmu(both, name):
-    by_python, by_c = map(driven, both[name])
-    assert np.isfinite(by_c).all()
-    np.testing.assert_array_equal(by_c, by_python)
+    by_python, *by_c = map(driven, both[name])
+    assert np.isfinite(by_python).all()
+    for found in by_c:
+        np.testing.assert_array_equal(found, by_python)
 
 
 def test_deflections_are_part_of_a_saved_state(both):
@@ -254,8 +261,9 @@ def by_cc(room: Path) -> None:
 
 
 @pytest.mark.skipif(not (shutil.which("cmake") and shutil.which("make")), reason="no cmake or make")
-def test_fmpy_rebuilds_a_block(both, tmp_path):
-    path = both["controller"][1]
+@pytest.mark.parametrize("which", [1, 2])
+def test_fmpy_rebuilds_a_block(both, tmp_path, which):
+    path = both["controller"][which]
     (tmp_path / "build").mkdir()
     again = rebuilt(
         path, tmp_path / "own", lambda room: build_platform_binary(room, tmp_path / "build")
@@ -303,7 +311,8 @@ def test_rows_of_a_table_are_data(both):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_contract_of_the_blocks(both, name):
-    assert check_fmu(both[name][1]) == []
+    for path in both[name][1:]:
+        assert check_fmu(path) == []
 
 
 def test_the_same_component_gives_the_same_bytes(native_fmus, tmp_path):
@@ -341,20 +350,22 @@ def sections(elf: bytes) -> dict[str, tuple[int, bytes]]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads an ELF file")
+@pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", ["virtual_mechanism", "controller"])
-def test_nothing_is_exported_but_fmi2_and_nothing_is_shared(both, name):
+def test_nothing_is_exported_but_fmi_and_nothing_is_shared(both, name, fmi):
     """Every defined symbol is a function of FMI; no byte of the library can be written by one
     instance and read by another."""
-    with zipfile.ZipFile(both[name][1]) as archive:
-        found = sections(archive.read(f"binaries/linux64/{name}.so"))
+    with zipfile.ZipFile(both[name][fmi - 1]) as archive:
+        (library,) = (n for n in archive.namelist() if n.endswith(".so"))
+        found = sections(archive.read(library))
     symbols, texts = found[".dynsym"][1], found[".dynstr"][1]
     exported = set()
     for at in range(24, len(symbols), 24):
         text, _, _, section = struct.unpack_from("<IBBH", symbols, at)
         if section:
             exported.add(texts[text : texts.index(b"\0", text)].decode())
-    assert {"fmi2Instantiate", "fmi2DoStep", "fmi2GetFMUstate"} <= exported
-    assert [n for n in exported if not n.startswith("fmi2")] == []
+    assert {f"fmi{fmi}DoStep", f"fmi{fmi}Reset"} <= exported
+    assert [n for n in exported if not n.startswith(("fmi2", f"fmi{fmi}"))] == []
     assert found.get(".data", (0, b""))[0] == found.get(".bss", (0, b""))[0] == 0
 
 

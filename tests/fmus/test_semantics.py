@@ -6,6 +6,7 @@ import math
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -19,10 +20,10 @@ from hapticlink.fmus.reproducible_zip import write
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
 
-BUILD = {"python": build, "native": build_native}
+BUILD = {"python": build, "native": build_native, "native3": partial(build_native, fmi=3)}
 DISCARD, ERROR, FATAL = 2, 3, 4
 # pythonfmu has no other answer to an exception.
-REFUSED = {"python": FATAL, "native": ERROR}
+REFUSED = {"python": FATAL, "native": ERROR, "native3": ERROR}
 OUT_OF_STEP = {"python": DISCARD, "native": ERROR}
 
 
@@ -33,7 +34,8 @@ def packaging(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def files(request: pytest.FixtureRequest, packaging: str) -> dict:
-    return request.getfixturevalue({"python": "fmus", "native": "native_fmus"}[packaging])
+    made = {"python": "fmus", "native": "native_fmus", "native3": "native_fmus_3"}
+    return request.getfixturevalue(made[packaging])
 
 
 @pytest.fixture
@@ -232,6 +234,7 @@ STEP, TERMINATE = ("fmi2DoStep", 0.0, 0.1, 1), ("fmi2Terminate",)
 START = (SETUP, ENTER, EXIT)
 
 
+@pytest.mark.parametrize("packaging", ["python", "native"], indirect=True)
 @pytest.mark.parametrize(
     ("before", "call", "mode"),
     [
@@ -277,7 +280,7 @@ def test_nothing_is_set_after_the_end_and_reset_begins_again(opened):
 def test_times_that_are_not_finite_are_refused(opened, value):
     fmu = Named(opened("spring"))
     with pytest.raises(FMICallException):
-        fmu.slave.setupExperiment(startTime=value)
+        fmu.start(value)
     fmu.start()
     before = fmu.get("x[1]", "x[2]", "time")
     for time, size in ((value, 0.1), (0.0, value), (1e308, 1e308)):

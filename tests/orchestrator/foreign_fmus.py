@@ -209,7 +209,7 @@ NUMBERS = (
 def c_fmu3(folder: Path) -> Path:
     """The FMU of types_fmu3.c: input in_<type> and output out_<type> of every number type of FMI
     3.0, parameters mode and text, a matrix whose size is a structural parameter, the weighted sum
-    of its entries, and a binary input."""
+    of its entries, and a binary input with its echo."""
     rows = []
     for k, kind in enumerate(NUMBERS):
         how = "continuous" if kind.startswith("Float") else "discrete"
@@ -234,8 +234,9 @@ def c_fmu3(folder: Path) -> Path:
 <Dimension valueReference="24"/><Dimension valueReference="24"/></Float64>
 <Float64 name="sum" valueReference="26" causality="output" variability="continuous"/>
 <Binary name="blob" valueReference="27" causality="input" variability="discrete"><Start value=""/>
-</Binary></ModelVariables>
-<ModelStructure>{outputs}<Output valueReference="26"/></ModelStructure>
+</Binary>
+<Binary name="echo" valueReference="28" causality="output" variability="discrete"/></ModelVariables>
+<ModelStructure>{outputs}<Output valueReference="26"/><Output valueReference="28"/></ModelStructure>
 </fmiModelDescription>
 """
     return _packed(folder, "types_fmu3.c", "types", platform_tuple, description)

@@ -12,7 +12,7 @@
     X(0, Float64, double) X(1, Float32, float) X(2, Int64, int64_t) X(3, Int32, int32_t) \
     X(4, Int16, int16_t) X(5, Int8, int8_t) X(6, UInt64, uint64_t) X(7, UInt32, uint32_t) \
     X(8, UInt16, uint16_t) X(9, UInt8, uint8_t) X(10, Boolean, bool)
-enum { KINDS = 11, MODE = 22, SIZE = 24, ARRAY = 25, SUM = 26, BLOB = 27, LARGEST = 9 };
+enum { KINDS = 11, MODE = 22, SIZE = 24, ARRAY = 25, SUM = 26, BLOB = 27, ECHO = 28, LARGEST = 9 };
 
 typedef struct {
 #define PAIR(k, name, type) type name[2];
@@ -22,6 +22,8 @@ typedef struct {
     bool configuring;
     uint64_t size;
     double array[LARGEST];
+    unsigned char blob[24];
+    size_t blob_size;
 } Model;
 
 static void say(const char *what) {
@@ -77,10 +79,17 @@ int fmi3SetString(Model *m, const unsigned *vr, size_t n, const char *const *val
 int fmi3SetBinary(Model *m, const unsigned *vr, size_t n, const size_t *sizes,
                   const unsigned char *const *value, size_t count) {
     char text[64] = "blob ";
-    if (vr[0] != BLOB) return 3;
+    if (vr[0] != BLOB || sizes[0] > sizeof m->blob) return 3;
+    memcpy(m->blob, value[0], m->blob_size = sizes[0]);
     for (size_t i = 0; i < sizes[0] && i < 24; i++) sprintf(text + 5 + 2 * i, "%02x", value[0][i]);
     say(text);
     return 0;
+}
+int fmi3GetBinary(Model *m, const unsigned *vr, size_t n, size_t *sizes, const unsigned char **value,
+                  size_t count) {
+    *value = m->blob;
+    *sizes = m->blob_size;
+    return vr[0] == ECHO ? 0 : 3;
 }
 int fmi3EnterConfigurationMode(Model *m) { m->configuring = true; return 0; }
 int fmi3ExitConfigurationMode(Model *m) { m->configuring = false; return 0; }

@@ -299,7 +299,7 @@ def test_the_command_makes_it(tmp_path: Path) -> None:
         ["The", "mechanism"],
     ]
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
-    with pytest.raises(InputFault, match="--fmi is for one FMU: add --as-one"):
+    with pytest.raises(InputFault, match="--fmi 3 compiles: add --set packaging=native"):
         hl.build("pendulum", out=tmp_path, fmi=3)
     with pytest.raises(InputFault, match="--fmi: 4 is not 2 or 3"):
         hl.build("pendulum", out=tmp_path, as_one=True, fmi=4)

@@ -237,7 +237,7 @@ class Machine:
             case Get(fmu) | Set(fmu) | Step(fmu) if fmu in simulation.isolated:
                 return "the FMU runs in a process of its own"
             case Get(fmu) | Set(fmu) | Step(fmu) if not simulation.instances[fmu].in_c:
-                return "the FMU has event mode"
+                return "the FMU has event mode, or its texts are connected"
         return "Python repeats steps, whose operations are in C"
 
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
@@ -265,7 +265,7 @@ class Machine:
         instance = simulation.instances[name]
         if not isinstance(setter, Setter) or not isinstance(instance, InProcess):
             return None
-        if any(transfer.exact for transfer in setter.transfers):
+        if instance.texts or any(transfer.exact for transfer in setter.transfers):
             return None
         return self._index(
             "setter",

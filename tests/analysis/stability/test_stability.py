@@ -287,8 +287,12 @@ def test_what_has_no_map_is_refused() -> None:
         own_hand("virtual-wall", {"delays": {"wall.F": {"min": 0.001, "loss": 0.5}}})
 
 
-@pytest.mark.parametrize("options", [{"packaging": "native"}, {"isolate": True}])
-def test_every_kind_of_fmu_has_the_same_map(options: dict[str, Any]) -> None:
+@pytest.mark.parametrize("options", [{"packaging": "native"}, {"isolate": True}, {"fmi": 3}])
+def test_every_kind_of_fmu_has_the_same_map(tmp_path: Path, options: dict[str, Any]) -> None:
+    if fmi := options.get("fmi"):
+        made = hl.build("virtual-wall", {"packaging": "native"}, out=tmp_path, fmi=fmi)
+        mechanism = {"replaces": "virtual_mechanism", "path": str(made["virtual_mechanism"])}
+        options = {"fmu.+": mechanism}
     found = own_hand("virtual-wall", options)
     assert found.radius == pytest.approx(own_hand("virtual-wall").radius, rel=1e-9)
 

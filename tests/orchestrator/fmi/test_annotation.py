@@ -1,6 +1,7 @@
 """Declarations of ports in the annotation: read back as written; malformed ones are refused."""
 
 import re
+from functools import partial
 
 import casadi as ca
 import pytest
@@ -46,7 +47,7 @@ def fmu(tmp_path_factory):
     return build(declaring(), tmp_path_factory.mktemp("declaring"))
 
 
-@pytest.mark.parametrize("make", [build, build_native])
+@pytest.mark.parametrize("make", [build, build_native, partial(build_native, fmi=3)])
 def test_what_a_component_declares_comes_back(tmp_path, make):
     found = describe(make(declaring(), tmp_path))
     assert found.timing == "sampled"
@@ -83,6 +84,7 @@ def test_a_derivative_of_nothing_is_refused_at_build(tmp_path):
         ('set_position="far"', 'set_position="x"', "there is no input 'x'"),
         ('stiffness="K"', 'stiffness="far"', "there is no parameter 'far'"),
         ('position="x"', 'position="P"', "P has 4 entries, and 2 are needed"),
+        (' displacement="x"', ' units="m"', "F has 2 entries, and 1 units"),
         ("<Spring", "<Sprung", "no element 'Sprung'; did you mean 'Spring'"),
     ],
 )

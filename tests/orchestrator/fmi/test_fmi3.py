@@ -1,9 +1,11 @@
 """FMI 3.0 from a compiled FMU: every number type, and what is called after a fault."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.base.errors import SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.fmi.description import describe
 from tests.orchestrator.foreign_fmus import (
     ISOLATED,
@@ -15,6 +17,7 @@ from tests.orchestrator.foreign_fmus import (
     python_fmu,
     ran,
     run,
+    slave,
     wire_table,
 )
 
@@ -164,18 +167,60 @@ def test_what_fits_no_array_or_binary_is_refused(tmp_path, starts, message):
 
 
 @pytest.mark.parametrize(
-    ("source", "target"), [("one.out_UInt8", "two.text"), ("one.out_UInt8", "two.blob")]
+    ("source", "target", "kind"),
+    [
+        ("one.out_UInt8", "two.text", "text is a String"),
+        ("one.out_UInt8", "two.blob", "blob is a Binary"),
+        ("one.echo", "two.in_UInt8", "echo is a Binary"),
+        ("one.echo", "two.text", "echo is a Binary"),
+    ],
 )
-def test_a_text_is_not_connected(tmp_path, source, target):
+def test_a_text_is_connected_to_one_of_its_type(tmp_path, source, target, kind):
     c_fmu3(tmp_path)
-    name = target.partition(".")[2]
-    with pytest.raises(SceneFault, match=rf"{name} is a (String|Binary): signals, holds and"):
+    with pytest.raises(SceneFault, match=f"{kind}: .* output is connected to a .* input only"):
         run(tmp_path, ONE + fmu_table("two", "types") + wire_table(source, target))
 
 
-def test_a_text_is_no_source(tmp_path):
-    parameter = 'valueReference="23" causality="parameter" variability="fixed"'
-    output = 'valueReference="23" causality="output" variability="discrete"'
-    edited(c_fmu3(tmp_path), lambda text: text.replace(parameter, output))
-    with pytest.raises(SceneFault, match="text is a String: signals, holds and results are num"):
-        run(tmp_path, ONE + fmu_table("two", "types") + wire_table("one.text", "two.in_Int8"))
+def test_bytes_are_passed_on(tmp_path, monkeypatch):
+    """Zeros among them too."""
+    c_fmu3(tmp_path)
+    log = tmp_path / "log"
+    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
+    two = fmu_table("two", "types") + wire_table("one.echo", "two.blob")
+    found = ran(tmp_path, f'{ONE}start.blob = "00ff10"\n{two}')
+    first, *others = [line for line in log.read_text().splitlines() if line.startswith("blob")]
+    assert first == "blob 00ff10"
+    assert set(others) == {"blob 00ff10"}
+    assert "one.echo" not in found.haptics.columns
+
+
+TEXTS = fmu_table("gives", "Gives", "rate = 50\n") + fmu_table("takes", "Takes")
+
+
+def speaking(folder: Path) -> str:
+    """A scene of an FMU that gives longer and longer texts to one at twice its rate."""
+    body = """values["word"] += "ä"
+        values["steps"] = len(values["word"])"""
+    slave(folder, "Gives", ("output", {"word": "öö", "steps": 0}), body=body)
+    counts = "values['length'] = len(values['heard'])"
+    slave(folder, "Takes", ("input", {"heard": ""}), ("output", {"length": 0}), body=counts)
+    return TEXTS + wire_table("gives.word", "takes.heard")
+
+
+def test_a_text_is_held_between_rates(tmp_path):
+    found = ran(tmp_path, speaking(tmp_path), "haptics.rate=100", "duration=0.1")
+    np.testing.assert_array_equal(found.haptics["takes.length"], [0, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6])
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ('hold = "foh"\n', "word is a text, which can have no values in between; take zoh"),
+        (ISOLATED, "word is a text, which is passed on within one process"),
+    ],
+)
+def test_a_text_has_no_slope_and_leaves_no_process(tmp_path, more, said):
+    scene = speaking(tmp_path)
+    scene = scene.replace("rate = 50\n", "rate = 50\n" + more * (more == ISOLATED))
+    with pytest.raises(InputFault, match=said):
+        run(tmp_path, scene + more * (more != ISOLATED))

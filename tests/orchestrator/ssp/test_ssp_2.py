@@ -152,14 +152,16 @@ def test_structures_that_cannot_run_are_refused(tmp_path, old, new, message):
         open_scene.load(moved(tmp_path, root.replace(old, new)), ["haptics.rate=50"])
 
 
-def test_a_binary_is_not_connected(tmp_path):
-    path = ssp(
-        tmp_path,
-        system("top", "", component("a", "types") + component("p", "Plain"), line("p.y", "a.blob")),
-        types_fmu=c_fmu3(tmp_path).read_bytes(),
-    )
-    with pytest.raises(InputFault, match=r"a\.blob, which is a Binary, set at the start only"):
-        open_scene.load(path, ["haptics.rate=50"])
+def test_bytes_are_passed_on_by_a_line(tmp_path, monkeypatch):
+    """The start value of one FMU reaches the other."""
+    c_fmu3(tmp_path)
+    log = tmp_path / "log"
+    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
+    two = fmu_table("a", "types", 'start.blob = "00ff"\n') + fmu_table("b", "types")
+    path = hl.export(scene(tmp_path, two + wire_table("a.echo", "b.blob")), out=tmp_path / "x.ssp")
+    log.write_text("")
+    assert simulate(str(path), tmp_path / "out").outcome.fault is None
+    assert log.read_text().splitlines()[:2] == ["blob 00ff"] * 2
 
 
 def test_a_scene_with_fmi_3_is_written_as_2_0_and_comes_back(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.commands.options import Changes
 from hapticlink.orchestrator.base.errors import SceneFault
+from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.scene import overrides
 from tests.orchestrator.foreign_fmus import entries, slave
 from tests.orchestrator.results.records import tables_of
@@ -36,6 +37,22 @@ def own_files(tmp_path_factory):
 @pytest.fixture(scope="module")
 def own_run(tmp_path_factory):
     return hl.run("closed-loop", SHORT, out=tmp_path_factory.mktemp("run"), figures=False)
+
+
+def test_native_fmus_of_fmi3_in_the_place_of_all_blocks_change_no_byte(tmp_path, own_run):
+    """Arrays have the units of their entries, and meters, holds and clocks are those of the run."""
+    native = {**SHORT, "packaging": "native"}
+    files = hl.build("closed-loop", native, out=tmp_path / "fmus", fmi=3)
+    assert files.keys() == own_run.run["fmus"].keys()
+    swaps = [f'fmu.+={{replaces="{name}", path="{file}"}}' for name, file in files.items()]
+    swapped = hl.run(
+        "closed-loop", [*overrides.written(SHORT), *swaps], out=tmp_path, figures=False
+    )
+    assert swapped.run["energies"] == own_run.run["energies"]
+    assert tables_of(own_run.folder) == tables_of(tmp_path)
+    info = describe(files["virtual_mechanism"])
+    assert [s.unit for s in info.port("x", "output")] == ["m", "m", "rad"]
+    assert (info.fmi, info.block) == ("3", "virtual_mechanism")
 
 
 @pytest.mark.parametrize("block", ["hand", "controller", "haptic_device", "virtual_environment"])
