@@ -4,7 +4,8 @@ A connector of a system passes its value on, so an input of an FMU is fed by a c
 y_0 -> y_1 -> ... -> y_k, each with y_i = a_i C_i(y_{i-1}) + b_i, where C_i converts the units
 (SSP 1.0, section 5.4.2). The chain is one linear function of y_0. A connector without a unit has
 that of the connectors inside its system. A connection of arrays (SSP 2.0) is one of each pair of
-their entries, row by row.
+their entries, row by row. An entry of a signal dictionary is what an input of a reference to it
+writes, and all outputs of that name read, in its unit.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -67,16 +69,31 @@ class Wires:
             for s in sorted(d.scalars, key=lambda s: s.indices):
                 self._arrays.setdefault((place, s.port), []).append(s.name.removeprefix(s.port))
         fed: dict[Node, tuple[Node, Line]] = {}
-        for system in self._systems.values():
-            for line in (entry for whole in system.lines for entry in self._entries(whole)):
-                source, sink = self._directed(system, line)
-                if sink in fed:
-                    names = f"{dotted(*fed[sink][0])} and by {dotted(*source)}"
-                    raise InputFault(f"{self.path}: {dotted(*sink)} is fed by {names}; keep one")
-                fed[sink] = source, line
+        for source, sink, line in (*self._written(), *self._through_dictionaries()):
+            if sink in fed:
+                names = f"{dotted(*fed[sink][0])} and by {dotted(*source)}"
+                raise InputFault(f"{self.path}: {dotted(*sink)} is fed by {names}; keep one")
+            fed[sink] = source, line
         for sink in fed:
             if sink[0] in self.described:
                 self._follow(sink, fed)
+
+    def _written(self) -> Iterator[tuple[Node, Node, Line]]:
+        """Source and sink of the connections of all systems."""
+        for system in self._systems.values():
+            for line in (entry for whole in system.lines for entry in self._entries(whole)):
+                yield *self._directed(system, line), line
+
+    def _through_dictionaries(self) -> Iterator[tuple[Node, Node, Line]]:
+        """From the inputs of references to a signal dictionary to the outputs of the same name."""
+        references = [part for part in self._systems.values() if part.dictionary is not None]
+        for reader, writer in product(references, repeat=2):
+            for name in reader.connectors if reader.dictionary == writer.dictionary else ():
+                gives = reader.connectors[name].kind not in TAKES
+                if gives and name in writer.connectors and writer.connectors[name].kind in TAKES:
+                    ends = (writer.place, name), (reader.place, name)
+                    for line in self._entries(Line(ends, SAME, True)):
+                        yield *line.ends, line
 
     def _entries(self, line: Line) -> Iterator[Line]:
         """The connection itself, or those of the entries of its arrays."""

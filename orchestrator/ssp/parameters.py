@@ -13,20 +13,18 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from xml.etree.ElementTree import Element, tostring
+from xml.etree.ElementTree import Element
 
 from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.base.terminal_output import printable
-from hapticlink.orchestrator.fmi.archive import read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp.connections import Reach, Wires
 from hapticlink.orchestrator.ssp.names import SSC, SSD, SSM, SSV
 from hapticlink.orchestrator.ssp.tree import (
-    File,
     Part,
     Place,
-    checked,
+    content,
     converts,
     dotted,
     indices,
@@ -44,7 +42,6 @@ READ: dict[str, Callable[[str], Value]] = {
     "Binary": str,
     "Enumeration": str,
 }
-SETS = ("application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping")
 
 
 @dataclass(frozen=True)
@@ -94,34 +91,15 @@ class Parameters:
     def _given(self, part: Part) -> Iterator[Given]:
         for file, binding in part.bindings:
             where = f"parameters of {dotted(part.place)}"
-            set_ = self._content(file, binding, where, "ParameterSet", SSV)
+            set_ = content(file, binding, where, SSV, "ParameterSet")
             given = [
                 *self._values({**file.units, **units(set_, SSV)}, set_, binding.get("prefix", ""))
             ]
             mapping = binding.find(f"{{{SSD}}}ParameterMapping")
             if mapping is not None:
-                entries = self._content(file, mapping, where, "ParameterMapping", SSM)
+                entries = content(file, mapping, where, SSM, "ParameterMapping")
                 given = [*self._mapped(entries, given, part)]
             yield from given
-
-    def _content(self, file: File, element: Element, where: str, kind: str, space: str) -> Element:
-        """The parameter set or mapping inside `element`, or in the file that it names."""
-        if element.get("type", SETS[0]) not in SETS:
-            raise InputFault(f"{self.path}: {where}: type {element.get('type')} is not read")
-        if element.get("sourceBase") == "component":
-            raise InputFault(
-                f"{self.path}: {where}: {element.get('source')} is inside an FMU, where it is "
-                "not read; put it beside the .ssd"
-            )
-        entry, schema = element.get("source"), f"SystemStructure{kind.replace('Set', 'Values')}"
-        if entry:
-            entry = file.resolved(entry)
-            return checked(file.path, entry, read_xml(file.archive, entry), schema)
-        inside = next(element.iter(f"{{{space}}}{kind}"), None)
-        if inside is None:
-            raise InputFault(f"{self.path}: {where}: a {kind} has neither source nor content")
-        inside.attrib.setdefault("version", "1.0")  # OMSimulator writes none in the .ssd
-        return checked(self.path, where, tostring(inside), schema)
 
     def _values(self, known: Mapping[str, Unit], set_: Element, prefix: str) -> Iterator[Given]:
         for parameter in set_.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):

@@ -1,5 +1,5 @@
-"""The elements of a SystemStructure.ssd as records: nested systems, components, connectors and
-connections (SSP 2.0, chapter 5). Unsupported elements are errors."""
+"""The elements of a SystemStructure.ssd as records: nested systems, components, connectors,
+connections and signal dictionaries (SSP 2.0, chapter 5). Unsupported elements are errors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from io import BytesIO
 from itertools import product
 from pathlib import Path
 from urllib.parse import unquote
-from xml.etree.ElementTree import Element, fromstring
+from xml.etree.ElementTree import Element, fromstring, tostring
 
 from lxml import etree
 
@@ -24,7 +24,7 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
 from hapticlink.orchestrator.fmi.variables import MAX_NUMBERS
-from hapticlink.orchestrator.ssp.names import DEFINITION, FMU, PACKAGE, SSC, SSD, STRUCTURE
+from hapticlink.orchestrator.ssp.names import DEFINITION, FMU, PACKAGE, SSB, SSC, SSD, STRUCTURE
 
 Place = tuple[str, ...]
 """The names of the elements from the root system, (), down to this one."""
@@ -75,7 +75,8 @@ class Line:
 class Part:
     """A component, with `source` its FMU's file and entry; or a system, with `parts` and with
     `lines`, the connections between its own connectors and those of its parts. bindings: its
-    parameter bindings, each with the file that it is in."""
+    parameter bindings, each with the file that it is in. A reference to a signal dictionary is a
+    system without parts; dictionary: the place of that."""
 
     place: Place
     connectors: Mapping[str, Connector]
@@ -83,12 +84,21 @@ class Part:
     source: tuple[File, str] | None = None
     parts: tuple[Part, ...] = ()
     lines: tuple[Line, ...] = ()
+    dictionary: Place | None = None
 
     def __iter__(self) -> Iterator[Part]:
         """All parts, each after the parts inside it, and finally this one."""
         for part in self.parts:
             yield from part
         yield self
+
+
+@dataclass(frozen=True)
+class Dictionary:
+    """A signal dictionary: its place, and the unit of each entry."""
+
+    place: Place
+    units: Mapping[str, Unit | None]
 
 
 def dotted(place: Place, *names: str) -> str:
@@ -108,6 +118,34 @@ def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
         what = f"{path}: {entry} is no SSP 1.0 or 2.0 ({schema})"
         raise InputFault(f"{what}: {str(error)[:300]}") from error
     return fromstring(text)
+
+
+CONTENT_TYPES = {
+    "ParameterSet": "application/x-ssp-parameter-set",
+    "ParameterMapping": "application/x-ssp-parameter-mapping",
+    "SignalDictionary": "application/x-ssp-signal-dictionary",
+}
+
+
+def content(file: File, element: Element, where: str, space: str, kind: str) -> Element:
+    """The `kind` of content inside an element, or in the file that it names. Raises InputFault for
+    content of another type, and where there is none."""
+    if element.get("type", CONTENT_TYPES[kind]) != CONTENT_TYPES[kind]:
+        raise InputFault(f"{file.path}: {where}: type {element.get('type')} is not read")
+    if element.get("sourceBase") == "component":
+        raise InputFault(
+            f"{file.path}: {where}: {element.get('source')} is inside an FMU, where it is "
+            "not read; put it beside the .ssd"
+        )
+    entry, schema = element.get("source"), space.rpartition("/")[2]
+    if entry:
+        entry = file.resolved(entry)
+        return checked(file.path, entry, read_xml(file.archive, entry), schema)
+    inside = next(element.iter(f"{{{space}}}{kind}"), None)
+    if inside is None:
+        raise InputFault(f"{file.path}: {where}: a {kind} has neither source nor content")
+    inside.attrib.setdefault("version", "1.0")  # OMSimulator writes none in the .ssd
+    return checked(file.path, where, tostring(inside), schema)
 
 
 @cache
@@ -139,11 +177,14 @@ class Tree:
         root = checked(file.path, file.entry, text, "SystemStructureDescription")
         element = root.find(f"{{{SSD}}}System")
         assert element is not None  # required by the schema
-        return root, self._part(replace(file, units=units(root)), element, place)
+        return root, self._part(replace(file, units=units(root)), element, place, {})
 
-    def _part(self, file: File, element: Element, place: Place) -> Part:
-        """The part of a System or Component element, with all parts inside it. Raises InputFault
-        for elements that are not supported and for names that are not unique."""
+    def _part(
+        self, file: File, element: Element, place: Place, known: Mapping[str, Dictionary]
+    ) -> Part:
+        """The part of an element of a system, with all parts inside it. known: the dictionaries of
+        the systems around it. Raises InputFault for elements that are not supported and for names
+        that are not unique."""
         path, where = file.path, dotted(place)
         connectors = {
             c.get("name", ""): _connector(file, place, c)
@@ -151,6 +192,8 @@ class Tree:
         }
         bound = element.iterfind(f"{{{SSD}}}ParameterBindings/{{{SSD}}}ParameterBinding")
         bindings = tuple((file, binding) for binding in bound)
+        if element.tag == f"{{{SSD}}}SignalDictionaryReference":
+            return _reference(file, element, place, connectors, known)
         if element.tag != f"{{{SSD}}}System":
             source = file, file.resolved(_source_of(path, where, element))
             if element.get("type", FMU) == FMU:
@@ -162,7 +205,8 @@ class Tree:
         if twice := {n for n, count in Counter(names).items() if count > 1}:
             what = f"{where} has two elements named {min(twice)!r}"
             raise InputFault(f"{path}: {what}: name each once")
-        parts = (self._part(file, e, (*place, e.get("name", ""))) for e in inside)
+        known = {**known, **_dictionaries(file, element, place)}
+        parts = (self._part(file, e, (*place, e.get("name", "")), known) for e in inside)
         lines = element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")
         read = tuple(_line(path, place, line) for line in lines)
         return Part(place, connectors, bindings, parts=tuple(parts), lines=read)
@@ -178,6 +222,41 @@ class Tree:
             archive = self.archives.enter_context(opened(path, "SSP", content))
             return self.root(File(path, archive), place)[1]
         return self.root(replace(file, entry=entry), place)[1]
+
+
+def _dictionaries(file: File, system: Element, place: Place) -> dict[str, Dictionary]:
+    """The signal dictionaries that a system defines."""
+    found = {}
+    for element in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
+        name = element.get("name", "")
+        read = content(file, element, dotted(place, name), SSB, "SignalDictionary")
+        own = {**file.units, **units(read, SSB)}
+        entries = {
+            e.get("name", ""): _unit(e, own) for e in read.iterfind(f"{{{SSB}}}DictionaryEntry")
+        }
+        found[name] = Dictionary((*place, name), entries)
+    return found
+
+
+def _reference(
+    file: File,
+    element: Element,
+    place: Place,
+    connectors: Mapping[str, Connector],
+    known: Mapping[str, Dictionary],
+) -> Part:
+    """A reference to a dictionary. Raises InputFault where that or an entry does not exist."""
+    name = element.get("dictionary", "")
+    if name not in known:
+        there = ", ".join(known) or "none"
+        raise InputFault(f"{file.path}: {dotted(place)}: no signal dictionary {name!r}; {there}")
+    entries = known[name].units
+    if missing := connectors.keys() - entries:
+        there = ", ".join(entries) or "none"
+        what = f"{dotted(place, min(missing))} is no entry of {name!r}"
+        raise InputFault(f"{file.path}: {what}; entries: {there}")
+    with_units = {n: replace(c, unit=c.unit or entries[n]) for n, c in connectors.items()}
+    return Part(place, with_units, (), dictionary=known[name].place)
 
 
 def _source_of(path: Path, where: str, element: Element) -> str:
@@ -200,10 +279,16 @@ def _connector(file: File, place: Place, element: Element) -> Connector:
     kind, name = element.get("kind", ""), dotted(place, element.get("name", ""))
     if kind in ("inout", "unspecified"):
         raise InputFault(f"{file.path}: {name} is {kind}; give its kind as input or output")
-    unit = next((e.get("unit") for e in element if e.get("unit")), None)
     sizes = (d.get("size") for d in element.iterfind(f"{{{SSC}}}Dimension"))
-    of = file.units.get(unit, Unit(unit)) if unit else None
-    return Connector(kind, of, tuple(int(size) if size else None for size in sizes))
+    return Connector(
+        kind, _unit(element, file.units), tuple(int(size) if size else None for size in sizes)
+    )
+
+
+def _unit(element: Element, known: Mapping[str, Unit]) -> Unit | None:
+    """The unit of a connector or an entry, which its type has."""
+    unit = next((e.get("unit") for e in element if e.get("unit")), None)
+    return known.get(unit, Unit(unit)) if unit else None
 
 
 def indices(sizes: Sequence[int | None]) -> list[str]:

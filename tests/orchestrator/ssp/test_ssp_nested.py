@@ -180,13 +180,73 @@ def test_files_in_files_end(tmp_path):
         open_scene.load(ssp(tmp_path, system("top", "", again, line("again.y", "again.u"))))
 
 
+def dictionary(entry: str = "way", about: str = "", inside: str | None = None) -> str:
+    """A signal dictionary of one entry in cm, inline or in a file."""
+    space = "http://ssp-standard.org/SSP1/SystemStructureSignalDictionary"
+    if inside is None:
+        inside = (
+            f'<ssb:SignalDictionary xmlns:ssb="{space}" version="1.0" '
+            'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon">'
+            f'<ssb:DictionaryEntry name="{entry}"><ssc:Real unit="cm"/></ssb:DictionaryEntry>'
+            '<ssb:Units><ssc:Unit name="cm"><ssc:BaseUnit m="1" factor="0.01"/></ssc:Unit>'
+            "</ssb:Units></ssb:SignalDictionary>"
+        )
+    defined = f'<ssd:SignalDictionary name="d" {about}>{inside}</ssd:SignalDictionary>'
+    return f"<ssd:SignalDictionaries>{defined}</ssd:SignalDictionaries>"
+
+
+def reference(name: str, kind: str, dictionary: str = "d") -> str:
+    what = f'name="{name}" dictionary="{dictionary}"'
+    ports = connectors(way=kind)
+    return f"<ssd:SignalDictionaryReference {what}>{ports}</ssd:SignalDictionaryReference>"
+
+
+def through_dictionary(defined: str, *more: str) -> str:
+    """A giver in a system in a system, whose output two takers elsewhere read from a dictionary."""
+    giver = component("g", "Gives") + reference("bus", "input")
+    deep = system("deep", "", giver, line("g.y", "bus.way"))
+    both = component("t", "Takes", ON) + component("p", "Plain") + reference("bus", "output")
+    right = system("right", "", both, line("bus.way", "t.u") + line("p.u", "bus.way"))
+    inside = system("left", "", deep, "") + right + "".join(more)
+    end = "</ssd:System>"
+    text = system("top", "", inside, "").removesuffix(end) + defined + end
+    return text.replace("<ssd:Connections></ssd:Connections>", "")
+
+
+@pytest.mark.parametrize("in_file", [False, True])
+def test_an_entry_of_a_signal_dictionary_connects_across_systems(tmp_path, in_file):
+    """In the unit of the entry: 1000 mm are 100 cm, which are 1 m for t; p has no unit."""
+    inline = dictionary()
+    content = inline.partition(">")[2].partition(">")[2].rpartition("</ssd:SignalDictionary>")[0]
+    files = {"d_ssb": content} if in_file else {}
+    defined = dictionary(about='source="resources/d.ssb"', inside="") if in_file else inline
+    found = ended(ssp(tmp_path, through_dictionary(defined), **files), tmp_path)
+    assert found["left_deep_g.y"] == 1000.0
+    assert found["right_t.y"] == pytest.approx(1.0, rel=1e-14)
+    assert found["right_p.y"] == pytest.approx(100.0, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("defined", "more", "message"),
+    [
+        ("", "", r"left\.deep\.bus: no signal dictionary 'd'; none"),
+        (dictionary("other"), "", r"left\.deep\.bus\.way is no entry of 'd'; entries: other"),
+        (dictionary(inside=""), "", "d: a SignalDictionary has neither source nor content"),
+        (dictionary(), reference("bus", "input"), r"right\.bus\.way is fed by .* and by"),
+    ],
+)
+def test_a_dictionary_that_does_not_fit_is_refused(tmp_path, defined, more, message):
+    path = ssp(tmp_path, through_dictionary(defined, more))
+    with pytest.raises(InputFault, match=message):
+        open_scene.load(path, ["haptics.rate=50"])
+
+
 OTHERS = component("p", "Plain") + component("t", "Text")
 TEXT = system("top", "", OTHERS, line("p.y", "t.on"))
 LOOP = system("loop", connectors(a="input", b="output"), component("p", "Plain"), line("a", "b"))
 CIRCLE = system(
     "top", "", LOOP + component("q", "Plain"), line("loop.b", "loop.a") + line("q.u", "loop.b")
 )
-REFERENCE = '<ssd:SignalDictionaryReference name="p" dictionary="d"/>'
 
 
 @pytest.mark.parametrize(
@@ -201,10 +261,9 @@ REFERENCE = '<ssd:SignalDictionaryReference name="p" dictionary="d"/>'
          r"right\.p is a Component for ModelExchange"),
         ('startTime="0.0"', 'startTime="1.0"', "starts at 1.0 s; runs start at 0"),
         ('kind="input"', 'kind="inout"', r"right\.u is inout"),
-        (component("p", "Plain"), REFERENCE, r"right\.p is a SignalDictionaryReference"),
         (connectors(u="input"), connectors(u="input N"),
          r"units of left\.out and right\.u do not fit: m is not"),
-        (CHAIN, TEXT, r"names t\.on, which is a String"),
+        (CHAIN, TEXT, "on is a String: a String output is connected to a String input only"),
         (CHAIN, CIRCLE, r"in a circle without an FMU: loop\.b -> loop\.a"),
     ],
 )  # fmt: skip
@@ -214,4 +273,4 @@ def test_what_cannot_be_wired_is_refused(tmp_path, old, new, message):
     text = (tmp_path / "Text.fmu").read_bytes()
     path = ssp(tmp_path, CHAIN.replace(old, new), TAIL.replace(old, new), Text_fmu=text)
     with pytest.raises(InputFault, match=message):
-        open_scene.load(path, ["haptics.rate=50"])
+        simulate(path, tmp_path / "out", ["haptics.rate=50"])
