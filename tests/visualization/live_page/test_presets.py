@@ -106,6 +106,20 @@ def test_restored_is_what_differs_from_the_start(controls: dict[str, Any]) -> No
     ]
 
 
+def test_restore_brings_back_the_verdict_of_the_start(direct: Served) -> None:
+    """At 30 Hz, whose frames end between haptic ticks unless the rate was changed."""
+    with chromium() as browser:
+        page = Page(browser, direct.url)
+        page.until("view.map?.verdict && !view.map.said.endsWith('so far')")
+        before = page.get("view.map.why")
+        page.page.click("#presets button:has-text('Calm')")
+        page.until("view.map.verdict === 'stable'")
+        page.page.click("#restore")
+        page.until("view.map.verdict === 'unstable' && !view.map.said.endsWith('so far')")
+        assert page.get("view.map.why") == before
+        assert page.faults == []
+
+
 def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: Served) -> None:
     with chromium() as browser:
         page = Page(browser, direct.url)
