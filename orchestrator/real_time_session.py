@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from functools import lru_cache
@@ -162,11 +163,12 @@ class LiveRun:
         held = [self._connections.get(c.name, c) for c in self.system.connections if c.hold]
         return {c.name: choices(self.system, c) for c in held}
 
-    def rate(self, clock: str, rate: float, jitter: float = 0.0, seed: int = 0) -> None:
+    def rate(self, clock: str, rate: float | None, jitter: float = 0.0, seed: int = 0) -> None:
         """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
-        end of its current step on; steps then end on haptic ticks. jitter: each ends up to half
-        this share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed and
-        the step's number. Raises InputFault where an FMU cannot vary its step or has a spring whose
+        end of its current step on; steps then end on haptic ticks, or with None again where they
+        do in the scene, the first at least a haptic tick later. jitter: each ends up to half this
+        share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed and the
+        step's number. Raises InputFault where an FMU cannot vary its step or has a spring whose
         energy `pspm` limits, for a rate that is not between 0 and the haptic one, and for a jitter
         that leaves no haptic tick between two ends."""
         self._require_running()
@@ -175,6 +177,16 @@ class LiveRun:
         if require_name("clock", clock) not in [c.name for c in others]:
             raise InputFault(unknown("clock", clock, [c.name for c in others]))
         require_other_rate(self.system, clock)
+        events, tick = self._loop.events, haptics.longest
+        first, begun = events.previous(clock), events.current(clock)
+        if rate is None and not jitter:
+            own = next(c.starts for c in others if c.name == clock)
+            skip = bisect_left(own, begun + tick) - 2
+            again = Frames(
+                lambda i: own[i + skip] if i > 1 else (first, begun)[i], len(own) - skip, 1
+            )
+            events.change_rate(clock, again)
+            return self._note(f"rate of {clock}: that of the scene")
         rate = require(f"rate of {clock}", rate, Annotated[float, Quantity("Hz", gt=0)])
         jitter = require(f"jitter of {clock}", jitter, Annotated[float, Quantity("1", ge=0)])
         seed = int(require("seed", seed, Seed))
@@ -182,8 +194,6 @@ class LiveRun:
         if period < haptics.longest:
             limits = f"from {SLOWEST:g} Hz up to that of the haptics"
             raise InputFault(f"rate of {clock} = {rate} Hz: give a rate {limits}")
-        events, tick = self._loop.events, haptics.longest
-        first, begun = events.previous(clock), events.current(clock)
         most = float(1 - tick / period)
         if not 0 <= jitter <= most:
             raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")

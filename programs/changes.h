@@ -46,10 +46,25 @@ static int change_hold(Model *m, int choice, int64_t microseconds) {
 
 /* --- rate ------------------------------------------------------------------------------------- */
 
+/* What data of the scene are at its begin. */
+static const void *at_begin(const Model *m, const void *data) {
+    return (const char *)&initial + ((const char *)data - (const char *)&m->now.scene);
+}
+
+/* Communication point `index` of the scene's own steps, which have a pattern. */
+static int64_t own_point(const Model *m, int64_t index) {
+    const Clock *c = m->now.scene.events.clocks + CHANGED_CLOCK, *own = at_begin(m, c);
+    const Pattern *p = patterns + CHANGED_CLOCK;
+    const int64_t *starts = at_begin(m, c->starts), phase = own->n - p->n;
+    const int64_t rounds = index < phase ? 0 : (index - phase) / (p->n - 1);
+    return starts[index - rounds * (p->n - 1)] + rounds * p->ticks;
+}
+
 /* Communication point `index` after the change, at a haptic tick; a tick is numerator/denominator s. */
 static int64_t rated_point(Model *m, int64_t index, int64_t before) {
     Changes *now = &m->now.changes;
     const Loop *l = &m->now.scene.loop;
+    if (now->millihertz == OWN_RATE) return own_point(m, index);
     const int64_t per = now->millihertz * (int64_t)l->numerator, haptic = HAPTIC_TICKS;
     const int64_t ticks = now->begun * per + index * 1000 * (int64_t)l->denominator;
     int64_t point = (ticks + per * haptic - 1) / (per * haptic) * haptic;
@@ -73,7 +88,7 @@ static void change_rate(Model *m, int64_t millihertz, double jitter) {
     int64_t *starts = (int64_t *)c->starts;
     const int64_t before = previous(m, CHANGED_CLOCK), begun = starts[c->at];
     const int begins = m->now.mode == STEP_MODE && begun > 0;
-    now->millihertz = millihertz;
+    now->millihertz = millihertz ? millihertz : OWN_RATE;
     now->jitter = jitter;
     now->begun = begins ? begun : 0;
     now->index = 0;
@@ -84,6 +99,7 @@ static void change_rate(Model *m, int64_t millihertz, double jitter) {
     if (begins) starts[1] = begun;
     else starts[0] = 0;
     c->at = begins;
+    while (begins && !millihertz && own_point(m, now->index + 1) < begun + HAPTIC_TICKS) now->index++;
     fill_window(m, c, 1 + begins);
 }
 

@@ -59,7 +59,8 @@ int PAGE(hold)(Model *m, int choice, double microseconds) {
     return change_hold(m, choice, (int64_t)microseconds);
 }
 
-/* Gives the graphics clock another rate (Hz), and a share of each period by which it varies. */
+/* Gives the graphics clock another rate (Hz), 0 for the scene's own steps again, and a share of each period by which it
+ * varies. */
 void PAGE(rate)(Model *m, double hertz, double jitter) { change_rate(m, (int64_t)rint(1e3 * hertz), jitter); }
 
 /* --- what is shown --------------------------------------------------------------------------- */

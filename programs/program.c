@@ -102,7 +102,7 @@ static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/output
 static const double SHARE = 1e-6;      /* of a step that is whole: fmi/termination.py */
 static const double NEAR = 1e-3;       /* of a tick, by which a time may be before it */
 
-enum { MOST_POINTS = 64 }; /* of the window of a clock whose rate was changed */
+enum { MOST_POINTS = 64, OWN_RATE = -1 }; /* of the window of a clock whose rate was changed; back to the scene's */
 
 typedef struct { /* of the scene while it runs: changes.h */
     int64_t chosen[N_HOLDS + 1], delay[N_HOLDS + 1]; /* 1 + choice, 0: the scene's; ticks, -1: the scene's */

@@ -162,8 +162,8 @@ class ForwardSensitivity:
 
     def _linear(self, operation: Instruction) -> bool:
         """Whether it copies numbers, or is one of a hold without a regime."""
-        if not isinstance(operation, Push | Evaluate | Blend):
-            return isinstance(operation, Set)
+        if not isinstance(operation, Evaluate | Blend):
+            return isinstance(operation, Set | Push)
         hold = self._simulation.system.connection[operation.connection].hold
         return HOLDS[hold or ""].needs not in ("power", "spring")
 

@@ -42,12 +42,13 @@ def without(system: System) -> tuple[System, list[str]]:
         others = (start for start in fmu.starts if start[0].name not in set_anew)
         fmus.append(replace(fmu, starts=(*others, *starts)))
     for c in system.connections:
-        if _has_friction(c):
+        if has_friction(c):
             lines.append(f"{c.name}: the friction of hold {c.hold}, taken out")
     return replace(system, fmus=tuple(fmus)), lines
 
 
-def _has_friction(c: Connection) -> bool:
+def has_friction(c: Connection) -> bool:
+    """Whether its hold has a friction, which is taken out."""
     return c.hold is not None and issubclass(HOLDS[c.hold], Passive)
 
 
@@ -88,7 +89,7 @@ def kept(system: System) -> list[str]:
         if any(s.port.rpartition(".")[2] == "n_constraints" for s in description.outputs):
             lines.append(f"{fmu.name}: number of constrained directions")
     for c in system.connections:
-        if c.hold and HOLDS[c.hold].needs in ("power", "spring") and not _has_friction(c):
+        if c.hold and HOLDS[c.hold].needs in ("power", "spring") and not has_friction(c):
             lines.append(f"{c.name}: the regime of hold {c.hold}")
     return [f"{line}, as at the equilibrium" for line in lines]
 

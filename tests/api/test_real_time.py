@@ -76,7 +76,7 @@ def test_what_no_scene_may_have_is_refused_while_it_runs(value: Any) -> None:
         "hand.wrench": lambda live: live.set("hand.wrench", value),
     }
     if value is None:
-        del asked["delay"]  # None leaves it
+        del asked["delay"], asked["rate"]  # None leaves it, or brings back that of the scene
     turn, refused = trying(*asked.values())
     made = ran("closed-loop", turn, "duration=0.1")
     assert [name in said for name, said in zip(asked, refused, strict=True)] == [True] * len(asked)
@@ -211,6 +211,18 @@ def test_a_rate_is_changed_from_the_end_of_the_step_on() -> None:
     want = [*(k / 32 for k in range(4)), *(k / 64 for k in range(8, 20))]
     assert made.graphics["time"].tolist() == want
     assert made.run["real_time"]["samples"]["graphics"]["late"] == 0
+
+
+def test_a_rate_of_none_brings_back_the_steps_of_the_scene() -> None:
+    """30 Hz, whose periods are no whole haptic ticks; the first is at least one such tick long."""
+    turns = [once(0.1, lambda live: live.rate("graphics", 64.0)),
+             once(0.2, lambda live: live.rate("graphics", None))]  # fmt: skip
+    made = ran("closed-loop", lambda live: [turn(live) for turn in turns], "duration=0.35",
+               "graphics.rate=30")  # fmt: skip
+    time = made.graphics["time"]
+    again = time[time > 0.23]
+    assert np.array_equal(again, np.arange(7, 11) / 30)
+    assert "rate of graphics: that of the scene" in made.run["real_time"]["changes"][1][1]
 
 
 def test_jitter_moves_each_end_by_up_to_half_its_share_of_a_period() -> None:

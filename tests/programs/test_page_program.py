@@ -49,6 +49,7 @@ CHANGES: list[tuple[int, dict[str, Any]]] = [
     (350, {"type": "topology", "on": False}),
     (400, {"type": "rate", "value": 200.0}),
     (420, {"type": "hand", "at": None}),
+    (430, {"type": "rate", "value": 30.0}),
 ]
 """After so many haptic events."""
 EVENTS = 512
@@ -112,7 +113,8 @@ def apply(live: LiveRun, message: dict[str, Any]) -> None:
             live.set("hand.target", (*at, 0.0))
             live.set("hand.stiffness", STIFFNESS)
         case {"type": "rate", "value": rate}:
-            live.rate("graphics", rate)
+            own = live.scene.graphics and live.scene.graphics.rate
+            live.rate("graphics", None if rate == own else rate)
         case {"type": "hold", "hold": hold}:
             live.hold(P_C, hold)
         case {"type": "delay", "value": delay}:

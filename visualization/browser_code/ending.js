@@ -25,7 +25,8 @@ export class Ending {
     this.started = performance.now();
     this.played = this.frames;
     clearTimeout(this.later);
-    this.later = setTimeout(() => { this.played = null; this.again(); }, 1e3 * LAST * SLOWER);
+    this.acted = false;
+    this.later = setTimeout(() => { this.played = null; if (this.acted) this.hide(); this.again(); }, 1e3 * LAST * SLOWER);
   }
 
   // The frame of the slow motion, null where none is shown.
@@ -35,6 +36,9 @@ export class Ending {
     return this.played.findLast((frame) => frame.t <= t) ?? this.played[0];
   }
 
-  // The line stays until somebody acts.
-  hide() { if (!this.played) this.host.replaceChildren(); }
+  // The line stays until somebody acts, and while the last moments are shown.
+  hide() {
+    this.acted = true;
+    if (!this.played) this.host.replaceChildren();
+  }
 }

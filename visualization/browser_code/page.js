@@ -19,7 +19,6 @@ const stage = new Stage($("scene"), $("legend"), (at, user, begins) => {
   if (begins) {
     untouched = false;
     $("door").hidden = true;
-    ending.hide();
   }
   run.send({ type: "hand", at, user });
 });
@@ -193,7 +192,9 @@ $("restore").onclick = restore;
 $("compare").onclick = () => run.compare(!shown.b);
 $("acts").onclick = () => { acts_on_b = !acts_on_b; HANDLERS.controls(shown); };
 $("hear").onchange = () => sound.hear($("hear").value || null);
+document.addEventListener("pointerdown", () => ending.hide(), true);
 document.addEventListener("keydown", (event) => {
+  if (!event.repeat) ending.hide();
   if (event.target.closest("input, select, button, summary")) return;
   if (event.key in PULLS) { event.preventDefault(); stage.pullBy(PULLS[event.key]); return; }
   if (event.key === "+" || event.key === "-") stage.zoom(event.key === "+" ? 0.8 : 1.25);

@@ -46,7 +46,7 @@ export class Program {
     const { changed } = this;
     switch (message.type) {
       case "hand": return this.pull(message.user ?? "", message.at);
-      case "rate": changed.rate = message.value; return this.rate();
+      case "rate": changed.rate = message.value === this.data.controls.rate.value ? null : message.value; return this.rate();
       case "jitter": changed.jitter = message.value; return this.rate();
       case "hold": changed.holds[message.connection] = message.hold; return this.hold(message.connection);
       case "delay": changed.delays[message.connection] = message.value; return this.hold(message.connection);
@@ -72,9 +72,9 @@ export class Program {
   }
 
   rate() {
-    const rate = this.changed.rate ?? this.data.controls.rate.value;
-    if (!rate) throw new Error("the rate varies in this scene: set the rate first");
-    this.c.rate(this.m, rate, this.changed.jitter);
+    const { rate, jitter } = this.changed, own = this.data.controls.rate.value;
+    if (!rate && !own) throw new Error("the rate varies in this scene: set the rate first");
+    this.c.rate(this.m, rate ?? (jitter ? own : 0), jitter);
   }
 
   hold(name) {

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
+from hapticlink.analysis.stability.frozen_nonlinearities import has_friction
 from hapticlink.analysis.stability.hand_cases import Case, InHands
 from hapticlink.analysis.stability.hands import HANDS
 from hapticlink.analysis.stability.lifted_map import hyperperiod
@@ -52,21 +53,21 @@ def verdicts(scene: Scene, settings: Settings, parameters: Parameters) -> Iterat
     and then of all."""
     cases: list[Case] = []
     try:
-        for case in judged(scene, settings, parameters):
+        for case, beside in judged(scene, settings, parameters):
             cases.append(case)
             if len(cases) == SO_FAR:
-                yield _verdict(cases, so_far=True)
+                yield _verdict(cases, beside, so_far=True)
     except Fault as fault:
         first = str(fault).partition(";")[0].partition("\n")[0]
         yield {"verdict": "", "said": f"not computed: {first}", "why": str(fault)}
     else:
-        yield _verdict(cases)
+        yield _verdict(cases, beside)
 
 
-def _verdict(cases: Sequence[Case], so_far: bool = False) -> dict[str, str]:
+def _verdict(cases: Sequence[Case], beside: str, so_far: bool = False) -> dict[str, str]:
     worst = max(cases, key=lambda case: case.severity)
     verdict = "marginal" if worst.drifts else worst.verdict
-    said = f"{_summary(worst)}{', so far' if so_far else ''}"
+    said = f"{_summary(worst)}{beside}{', so far' if so_far else ''}"
     if so_far and verdict != "unstable":  # what only the worst of all hands tells
         verdict = ""
     lines = (
@@ -76,9 +77,9 @@ def _verdict(cases: Sequence[Case], so_far: bool = False) -> dict[str, str]:
     return {"verdict": verdict, "said": said, "why": "\n".join(lines)}
 
 
-def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[Case]:
-    """The cases of the run, a hand each. Raises InputFault where its computation would take long,
-    and as `stability` does."""
+def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[tuple[Case, str]]:
+    """The cases of the run, a hand each, and which friction of holds is taken out of them, in
+    words. Raises InputFault where its computation would take long, and as `stability` does."""
     if settings.jitter:
         raise InputFault("with jitter the system never repeats; set the jitter to 0")
     if scene.hand is None:
@@ -101,10 +102,13 @@ def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator
         )
         hands = {MOUSE: SpringHand(stiffness=STIFFNESS, damping=DAMPING), **HANDS}
         without, _ = frozen_nonlinearities.without(system)
+        calming = {c.hold for c in system.connections if has_friction(c)}
+        beside = "".join(f", without the friction of hold {hold}" for hold in calming)
         with resting_system(changed, without) as place:
             in_hands = InHands(place)
             for name, hand in hands.items():
-                yield from in_hands.cases("the start", {name: hand}, DRIFT)
+                for case in in_hands.cases("the start", {name: hand}, DRIFT):
+                    yield case, beside
 
 
 def _at_rate(scene: Scene, rate: float | None) -> Scene:

@@ -101,10 +101,13 @@ class Controls:
             self._live.set(name, self._value(name))
 
     def _change_rate(self, rate: float | None, jitter: float) -> None:
-        """Change the rate, that of the scene where it is None, with the jitter."""
-        if rate is None and not isinstance(self._rate, int | float):
+        """Change the rate, that of the scene where it is None, with the jitter. At the scene's
+        rate without jitter steps end where the scene has it."""
+        own = self._rate if isinstance(self._rate, int | float) else None
+        rate = None if rate == own else rate
+        if jitter and rate is own is None:
             raise InputFault("the rate varies in this scene: set the rate first")
-        self._live.rate(CLOCK, self._rate if rate is None else rate, jitter)  # type: ignore[arg-type]
+        self._live.rate(CLOCK, own if rate is None and jitter else rate, jitter)
         self._settings.rate, self._settings.jitter = rate, jitter
 
     def _pull(self, user: str, at: tuple[float, float] | None) -> None:

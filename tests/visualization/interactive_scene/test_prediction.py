@@ -69,6 +69,13 @@ def test_what_would_take_long_is_refused(settings: Settings, said: str) -> None:
     assert (found["verdict"], found["said"]) == ("", f"not computed: {said}")
 
 
+def test_a_verdict_says_that_it_is_without_the_friction_of_a_hold() -> None:
+    settings, beside = Settings(rate=64.0), ", without the friction of hold passive"
+    assert beside not in predicted(viewed(SCENE), settings, {})["said"]
+    settings.holds["controller.F_drift -> virtual_mechanism.F_drift"] = "passive"
+    assert predicted(viewed(SCENE), settings, {})["said"].endswith(beside)
+
+
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
 def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
     """Once the new rate is shown, every verdict is on it, and one process computes all."""

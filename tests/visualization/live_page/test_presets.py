@@ -88,7 +88,7 @@ def test_buzz_is_a_vibration_that_is_seen(name: str) -> None:
             case {"type": "rate", "value": rate}:
                 settings.rate = rate
     scene = viewed(name, {"packaging": "python"})
-    case = next(judged(scene, settings, parameters))
+    case, _ = next(judged(scene, settings, parameters))
     assert case.growth > 1.0
     assert 5.0 < case.hertz < 30.0
 
@@ -104,6 +104,37 @@ def test_restored_is_what_differs_from_the_start(controls: dict[str, Any]) -> No
         {"type": "hold", "connection": controls["holds"][0]["connection"], "hold": "zoh"},
         {"type": "gain", "name": controls["gains"][1]["name"], "factor": 1},
     ]
+
+
+def test_restore_brings_back_the_verdict_of_the_start(direct: Served) -> None:
+    """At 30 Hz, whose frames end between haptic ticks unless the rate was changed."""
+    with chromium() as browser:
+        page = Page(browser, direct.url)
+        page.until("view.map?.verdict && !view.map.said.endsWith('so far')")
+        before = page.get("view.map.why")
+        page.page.click("#presets button:has-text('Calm')")
+        page.until("view.map.verdict === 'stable'")
+        page.page.click("#restore")
+        page.until("view.map.verdict === 'unstable' && !view.map.said.endsWith('so far')")
+        assert page.get("view.map.why") == before
+        assert page.faults == []
+
+
+@pytest.mark.parametrize(("press", "left"), [("ending.hide();", [2, 0]), ("", [2, 2])])
+def test_what_a_run_ended_with_goes_at_a_press_and_is_read_meanwhile(
+    press: str, left: list[int]
+) -> None:
+    """While the last moments are shown, and behind them."""
+    statements = """
+      globalThis.document = { createElement: () => ({}) };
+      const host = { line: [], replaceChildren(...line) { this.line = line; } };
+      answer = await new Promise((done) => {
+        const ending = new Ending(host, () => done([meanwhile, host.line.length]));
+        ending.add({ t: 1 });
+        ending.show("the run has diverged");
+    """
+    end = "const meanwhile = host.line.length; });"
+    assert javascript("ending.js", f"{statements}{press}{end}", None) == left
 
 
 def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: Served) -> None:
@@ -131,4 +162,5 @@ def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: 
         page.until(
             "document.querySelector('[data-control=rate]').parentNode.innerText.includes('30')"
         )
+        page.until("!document.getElementById('ended').textContent")
         assert page.faults == []
