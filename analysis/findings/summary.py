@@ -352,6 +352,8 @@ def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:
             yield f"{name} has no ports for {len(lost)} connections: {', '.join(lost)}"
         if unfed := replacement.unfed:
             yield f"{name}: inputs that nothing feeds: {', '.join(unfed)}"
+        if lost and unfed:
+            yield f"{name}: --map 'PORT={unfed[0]}', with a port of {name}, connects such an input"
 
 
 def _start(run: Results) -> Iterator[str]:

@@ -20,7 +20,7 @@ from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.mode_kinds import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
-from hapticlink.analysis.stability.short_hyperperiod import frame_length, whole_frames
+from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
@@ -47,6 +47,10 @@ TRIED = 3
 """Remedies that are judged in all poses."""
 DECAY = 0.05
 """Rate (1/s) at which a scene with a remedy decays at least, lest what is frozen takes it back."""
+
+
+Visited = Callable[[tuple[str, ...]], Sequence[Pose]]
+"""The poses in which a scene with these options is judged."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +83,10 @@ def improvements(
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
     worst: Case,
+    visited: Visited,
 ) -> tuple[Margin, tuple[Remedy, ...]]:
-    """The margin in the `worst` pose, and what ends its instability in all `poses`, as `remedies`;
-    nothing where it is stable."""
+    """The margin in the `worst` pose, and what ends its instability, as `remedies`; nothing where
+    it is stable. visited: gives the poses in which the scene with other options is judged."""
     pose = next(pose for pose in poses if pose.name == worst.pose)
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
@@ -91,7 +96,7 @@ def improvements(
         margin = search.margin(place)
         softer = search.softer(place, margin)
         candidates = () if stable else [*search.candidates(place, margin, softer)]
-    return margin, search.remedies(candidates, softer, poses)
+    return margin, search.remedies(candidates, softer, visited)
 
 
 class _Search:
@@ -207,27 +212,33 @@ class _Search:
                 yield (_rate("haptics", factor * self._haptic), *softer)
 
     def remedies(
-        self, candidates: Sequence[tuple[str, ...]], softer: tuple[str, ...], poses: Sequence[Pose]
+        self, candidates: Sequence[tuple[str, ...]], softer: tuple[str, ...], visited: Visited
     ) -> tuple[Remedy, ...]:
-        """The candidate that is judged best in the worst pose and holds in all poses, or the best
-        of TRIED of them where none does; and softer gains with which all decays."""
+        """The first of those that are best in the worst pose with which the scene is stable, judged
+        as it will be with them, in the poses of its changed run; the best of TRIED where none is.
+        And softer gains with which all decays."""
         growth = {change: self._growth(change) for change in candidates}
         judged: dict[tuple[str, ...], Remedy] = {}
         for change in sorted(growth, key=lambda change: growth[change])[:TRIED]:
             if growth[change] >= 0.0 and judged:
                 break
-            judged[change] = self._in_all(change, poses)
+            judged[change] = self._in_all(change, visited)
             if judged[change].stable:
                 break
         if growth.get(softer, 0.0) < 0.0 and softer not in judged:
-            judged[softer] = self._in_all(softer, poses)
+            judged[softer] = self._in_all(softer, visited)
         every = sorted(judged.values(), key=lambda remedy: remedy.growth)
         return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
 
-    def _in_all(self, change: tuple[str, ...], poses: Sequence[Pose]) -> Remedy:
-        quick = self._quick(change)
-        cases, without = in_poses(self._scene, quick, poses, self._hands, self._bounds)
-        worst = float("inf") if without else _worst(cases)
+    def _in_all(self, change: tuple[str, ...], visited: Visited) -> Remedy:
+        changed = (*self._given, *change)
+        changed, _ = short(open_scene.load(self._scene, changed), changed)
+        try:
+            poses = visited(changed)
+        except (InputFault, FmuFault):  # its run fails
+            return Remedy(change, float("inf"), False)
+        cases, without = in_poses(self._scene, changed, poses, self._hands, self._bounds)
+        worst = _worst(cases) if cases and not without else float("inf")
         return Remedy(change, worst, worst < -DECAY)
 
 

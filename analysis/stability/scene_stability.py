@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +20,7 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import in_poses
 from hapticlink.analysis.stability.hands import FREE, HANDS, OWN, OWN_FREE, UNHELD, holds, own_hand
-from hapticlink.analysis.stability.margin_and_remedy import improvements
+from hapticlink.analysis.stability.margin_and_remedy import Visited, improvements
 from hapticlink.analysis.stability.mode_kinds import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import (
     Pose,
@@ -84,21 +84,21 @@ def stability(
         )
     given, rounded = short(read, given)
     if read.hand is None or replaced(read):
-        poses_at_rest = [_rest(scene, given, read)]
-        return _judged(scene, given, poses_at_rest, {UNHELD: None}, bounds, progress, rounded)
+        return _judged(scene, given, _at_rest(scene), {UNHELD: None}, bounds, progress, rounded)
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
     with interrupt.held():
         (progress or _silent)("the scene's own run", 0, poses + 2)
-        run = simulated(scene, given, {"duration": SPAN, "stop_when": ""})
-        visited = evenly_spaced(run, read.linkage, poses)
-        if presses(read):
-            with suppress(InputFault):
-                visited += settled(scene, given, read.linkage)
-        if grid:
-            visited += grid_poses(run, read, read.linkage, grid)
-        judged = _judged(scene, given, visited, hands_of(read.hand), bounds, progress, rounded)
-    return replace(judged, run_fault=fault_of(run))
+        own = _visited(scene, given, poses, grid)
+
+        def visits(options: tuple[str, ...]) -> list[Pose]:
+            found = own if options == given else _visited(scene, options, poses, grid)
+            if found.fault and not own.fault:
+                raise InputFault(found.fault)
+            return found.poses
+
+        judged = _judged(scene, given, visits, hands_of(read.hand), bounds, progress, rounded)
+    return replace(judged, run_fault=own.fault)
 
 
 def equilibrium_stability(
@@ -124,7 +124,7 @@ def equilibrium_stability(
     if read.hand is not None and not replaced(read):
         hands = {OWN: own_hand(read.hand)}
     given, rounded = short(read, given)
-    return _judged(scene, given, [_rest(scene, given, read)], hands, bounds, progress, rounded)
+    return _judged(scene, given, _at_rest(scene), hands, bounds, progress, rounded)
 
 
 def _require_bounds(bounds: Bounds) -> None:
@@ -148,23 +148,51 @@ def hands_of(hand: Hand) -> dict[str, Hand]:
     return {**HANDS, (OWN_FREE if damped else FREE): own_hand(hand)}
 
 
-def _rest(scene: str | Path | Scene, given: Sequence[str], read: Scene) -> Pose:
-    if read.linkage is None:
-        raise InputFault("no linkage: nothing that comes to rest in a pose")
-    with interrupt.held():
-        return rest(scene, given, read.linkage)
+@dataclass(frozen=True)
+class _Visits:
+    """The poses that a scene's own run visits, and how that failed, "" where it did not."""
+
+    poses: list[Pose]
+    fault: str
+
+
+def _visited(scene: str | Path | Scene, given: Sequence[str], count: int, grid: int) -> _Visits:
+    read = open_scene.load(scene, given)
+    assert read.linkage is not None
+    run = simulated(scene, given, {"duration": SPAN, "stop_when": ""})
+    poses = evenly_spaced(run, read.linkage, count)
+    if presses(read):
+        with suppress(InputFault):
+            poses += settled(scene, given, read.linkage)
+    if grid:
+        poses += grid_poses(run, read, read.linkage, grid)
+    return _Visits(poses, fault_of(run))
+
+
+def _at_rest(scene: str | Path | Scene) -> Visited:
+    """Where the run of a scene with given options comes to rest."""
+
+    def visited(given: tuple[str, ...]) -> list[Pose]:
+        linkage = open_scene.load(scene, given).linkage
+        if linkage is None:
+            raise InputFault("no linkage: nothing that comes to rest in a pose")
+        with interrupt.held():
+            return [rest(scene, given, linkage)]
+
+    return visited
 
 
 def _judged(
     scene: str | Path | Scene,
     given: tuple[str, ...],
-    visited: Sequence[Pose],
+    visits: Visited,
     hands: Hands,
     bounds: Bounds,
     progress: Progress | None,
     rounded: str,
 ) -> Stability:
-    step = progress or _silent
+    """The verdict in the poses of `visits`, which are found again for a remedy."""
+    step, visited = progress or _silent, visits(given)
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(
             scene,
@@ -189,7 +217,7 @@ def _judged(
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         step("margins", len(visited) + 1, len(visited) + 2)
         judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
-        margin, remedies = improvements(scene, given, judged, held, bounds, worst)
+        margin, remedies = improvements(scene, given, judged, held, bounds, worst, visits)
         with linearisable(scene, given) as (read, system, removed):
             frozen = (*removed, *frozen_nonlinearities.kept(system))
     return Stability(

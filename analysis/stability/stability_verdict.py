@@ -129,6 +129,9 @@ class Stability:
             return f"{calm}: {_named(worst)}"
         return f"{calm}; slowest to decay at {-worst.growth:.3g} 1/s, {_where(worst)}"
 
+    def __str__(self) -> str:
+        return "\n".join((f"{self.title}: {self.finding}", *self.lines()))
+
     def lines(self) -> Iterator[str]:
         """The result as text, below the finding."""
         if self.run_fault:
@@ -171,7 +174,8 @@ class Stability:
                 else "unstable with any stiffness"
             )
         if margin.delay is not None:
-            yield f"{1e3 * margin.delay:.3g} ms of further delay"
+            further = f"{1e3 * margin.delay:.3g} ms" if margin.delay else "less than a haptic period"
+            yield f"{further} of further delay"
         if margin.rate is not None:
             yield (
                 f"graphics down to {margin.rate:.3g} Hz"
