@@ -116,9 +116,10 @@ class _Search:
     def place(
         self, change: Sequence[str] = ()
     ) -> AbstractContextManager[tuple[RestingScene, Pose]]:
-        """The scene with a change at rest in the pose, with frames of whole haptic periods."""
+        """The scene at rest in the pose; with a change, in frames of whole haptic periods."""
         held = self._hands.keys() != {UNHELD}
-        return at_pose(self._scene, self._quick(change), self._pose, held)
+        given = self._quick(change) if change else self._given
+        return at_pose(self._scene, given, self._pose, held)
 
     def _quick(self, change: Sequence[str]) -> tuple[str, ...]:
         """The options of the scene with a change, with frames of whole haptic periods."""
