@@ -174,8 +174,8 @@ class Stability:
                 else "unstable with any stiffness"
             )
         if margin.delay is not None:
-            further = f"{1e3 * margin.delay:.3g} ms" if margin.delay else "less than a haptic period"
-            yield f"{further} of further delay"
+            none = "less than a haptic period"
+            yield f"{f'{1e3 * margin.delay:.3g} ms' if margin.delay else none} of further delay"
         if margin.rate is not None:
             yield (
                 f"graphics down to {margin.rate:.3g} Hz"
