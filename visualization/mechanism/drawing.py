@@ -200,8 +200,8 @@ def _limits(axes: Axes) -> Points:
 
 
 def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
-    """The names of bodies, and of joints away from the middle of the mechanism; those of joints at
-    one place are below each other."""
+    """The names of bodies, and of joints, cut ones included, away from the middle of the mechanism;
+    those of joints at one place are below each other."""
     if len(linkage.body) > MAX_NAMED_BODIES:
         return
     corners = {
@@ -212,13 +212,15 @@ def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
     middle = (every.min(axis=0) + every.max(axis=0)) / 2
     for i, (name, found) in enumerate(corners.items()):
         _name(axes, i, name, found, middle)
+    named = [
+        (j.name, j.child, j.at_child) if j.type == "prismatic" else (j.name, j.parent, j.at_parent)
+        for j in linkage.joint if j.type != "free"
+    ]  # fmt: skip
+    named += [(loop.name, loop.bodies[0], loop.at[0]) for loop in linkage.loop if loop.name]
     names: dict[tuple[float, ...], list[str]] = {}
-    for joint in linkage.joint:
-        if joint.type != "free":
-            slides = joint.type == "prismatic"
-            body, at = (joint.child, joint.at_child) if slides else (joint.parent, joint.at_parent)
-            (found,) = _world(frame, body, [at or ORIGIN])
-            names.setdefault(tuple(np.round(found, 6)), []).append(joint.name)
+    for name, body, at in named:
+        (found,) = _world(frame, body, [at or ORIGIN])
+        names.setdefault(tuple(np.round(found, 6)), []).append(name)
     for where, several in names.items():
         right, up = np.array(where) > middle
         offset = (7 if right else -7, 6 if up else -6)

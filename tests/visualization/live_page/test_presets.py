@@ -156,7 +156,7 @@ def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: 
         page.until("!view.state.ended && view.frame?.t > 0.1")  # pulled on by what is still pressed
         page.page.mouse.move(400, 400, steps=2)
         page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) > 0.5")
-        assert page.page.inner_text("#ended") == said
+        assert page.page.inner_text("#ended").startswith("Diverged at ")  # or of the next run
         page.page.mouse.up()
         page.page.click("#restore")
         page.until(

@@ -45,6 +45,17 @@ def test_a_body_of_three_joints_is_a_triangle_of_them() -> None:
     np.testing.assert_allclose(sides(corners), sides(places) * 1e3, rtol=1e-9)
 
 
+def test_a_cut_joint_beneath_the_operational_point_has_its_name_beside_it() -> None:
+    scene = hl.scene("pantograph")
+    assert scene.linkage is not None
+    start = [scene.linkage.start.get(joint.name, 0.0) for joint in scene.linkage.joint]
+    (axes,) = drawing.figure(scene, start).axes
+    (point,) = (line for line in axes.lines if line.get_label() == "operational point")
+    (name,) = (text for text in axes.texts if text.get_text() == "tracer")
+    np.testing.assert_allclose(name.xy, point.get_xydata()[0], atol=1e-6)
+    assert np.abs(name.xyann).min() > 5
+
+
 @pytest.mark.parametrize(
     ("scene", "files"),
     [
