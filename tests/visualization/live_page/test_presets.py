@@ -162,5 +162,7 @@ def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: 
         page.until(
             "document.querySelector('[data-control=rate]').parentNode.innerText.includes('30')"
         )
+        page.until("!view.state.ended")
+        page.page.mouse.click(400, 400)  # the next run may have diverged before it was restored
         page.until("!document.getElementById('ended').textContent")
         assert page.faults == []
