@@ -22,8 +22,7 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
-
-from hapticlink.fmus.write_fmu import findings as findings_of
+from fmpy.validation import validate_fmu
 
 STEPS = 4
 Trace = list[bytes]
@@ -163,7 +162,7 @@ def run(slave: FMU2Slave, session: Session, first: int = 0, count: int = STEPS) 
 
 def check_fmu(path: Path | str) -> list[str]:
     """The findings of all checks of the FMU at `path`; empty if it passes."""
-    findings = [f"validation: {finding}" for finding in findings_of(str(path))]
+    findings = [f"validation: {finding}" for finding in validate_fmu(str(path))]
     if findings:
         return findings
     with session(path) as opened:

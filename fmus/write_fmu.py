@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fmpy import read_model_description
-from fmpy.model_description import ValidationError
 from fmpy.validation import validate_fmu
 
 from hapticlink.fmus.atomic_file import atomic_file
@@ -34,11 +33,11 @@ def write_fmu(files: Mapping[str, bytes], folder: Path | str, name: str) -> Path
 
 
 def findings(path: str) -> list[str]:
-    """The findings of FMPy's validation. Its parser of names takes up to 20 ms for each, 3 s for
-    those of a scene, and is left out if all names are plain."""
+    """The findings of FMPy's validation of a file that `write_fmu` has written. Its parser of names
+    takes up to 20 ms for each, 3 s for those of a scene, and is left out if all names are plain."""
     try:
         description = read_model_description(path, validate=True, validate_model_structure=True)
-    except ValidationError as error:
-        return list(error.problems)
+    except Exception:  # whatever it is, FMPy says it as a finding
+        return validate_fmu(path)
     names = (variable.name for variable in description.modelVariables)
     return [] if all(map(_PLAIN.fullmatch, names)) else validate_fmu(path)

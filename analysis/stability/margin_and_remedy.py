@@ -154,7 +154,7 @@ class _Search:
         return float(self._haptic / frames) if frames else float("inf")
 
     def _framed(self, n: int) -> str:
-        return _rate("graphics", self._haptic / n)
+        return _set_rate("graphics", self._haptic / n)
 
     def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
         """Whether all hands are stable with gains scaled, and all that the controller reads some
@@ -204,13 +204,13 @@ class _Search:
                 rate = self._haptic / max(1, round(self._haptic / margin.rate))
             for factor in (1, *FASTER):
                 if rate < factor * rate <= self._haptic or factor == 1:
-                    yield (_rate("graphics", factor * rate), *(softer if factor == 1 else ()))
+                    yield (_set_rate("graphics", factor * rate), *(softer if factor == 1 else ()))
             if read.mechanism_at == "graphics":
                 yield ("mechanism_at=haptics",)
         for factor in FASTER:
-            yield (_rate("haptics", factor * self._haptic),)
+            yield (_set_rate("haptics", factor * self._haptic),)
             if softer:
-                yield (_rate("haptics", factor * self._haptic), *softer)
+                yield (_set_rate("haptics", factor * self._haptic), *softer)
 
     def remedies(
         self, candidates: Sequence[tuple[str, ...]], softer: tuple[str, ...], visited: Visited
@@ -243,7 +243,7 @@ class _Search:
         return Remedy(change, worst, worst < -DECAY)
 
 
-def _rate(clock: str, rate: Fraction) -> str:
+def _set_rate(clock: str, rate: Fraction) -> str:
     """The option that sets a rate."""
     return f"{clock}.rate={written(rate)}"
 

@@ -174,8 +174,11 @@ class Stability:
                 else "unstable with any stiffness"
             )
         if margin.delay is not None:
-            none = "less than a haptic period"
-            yield f"{f'{1e3 * margin.delay:.3g} ms' if margin.delay else none} of further delay"
+            yield (
+                f"{1e3 * margin.delay:.3g} ms of further delay"
+                if margin.delay
+                else "less than a haptic period of further delay"
+            )
         if margin.rate is not None:
             yield (
                 f"graphics down to {margin.rate:.3g} Hz"

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -86,14 +85,19 @@ class Wires:
 
     def _through_dictionaries(self) -> Iterator[tuple[Node, Node, Line]]:
         """From the inputs of references to a signal dictionary to the outputs of the same name."""
-        references = [part for part in self._systems.values() if part.dictionary is not None]
-        for reader, writer in product(references, repeat=2):
-            for name in reader.connectors if reader.dictionary == writer.dictionary else ():
-                gives = reader.connectors[name].kind not in TAKES
-                if gives and name in writer.connectors and writer.connectors[name].kind in TAKES:
-                    ends = (writer.place, name), (reader.place, name)
-                    for line in self._entries(Line(ends, SAME, True)):
-                        yield *line.ends, line
+        written: dict[tuple[Place | None, str], list[Node]] = {}
+        read: list[tuple[Place | None, str, Node]] = []
+        for part in (p for p in self._systems.values() if p.dictionary is not None):
+            for name, connector in part.connectors.items():
+                node = part.place, name
+                if connector.kind in TAKES:
+                    written.setdefault((part.dictionary, name), []).append(node)
+                else:
+                    read.append((part.dictionary, name, node))
+        for dictionary, name, reader in read:
+            for writer in written.get((dictionary, name), ()):
+                for line in self._entries(Line((writer, reader), SAME, True)):
+                    yield *line.ends, line
 
     def _entries(self, line: Line) -> Iterator[Line]:
         """The connection itself, or those of the entries of its arrays."""
