@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from html import escape
 
 from hapticlink.components.component import Component, Variable
+from hapticlink.fmus.block_drawing import diagram, strips
+from hapticlink.fmus.reference_run import ReferenceRun
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 52em; margin: 2em auto; padding: 0 1em; }
@@ -13,6 +15,11 @@ pre { background: #f4f6f8; padding: .8em; overflow-x: auto; }
 figure { margin: 1em 0; }
 img { max-width: 100%; }
 figcaption { color: #556; }
+svg { width: 100%; font: 13px system-ui, sans-serif; }
+svg .name { font-weight: 600; font-size: 15px; }
+svg .box { fill: #f4f6f8; stroke: #556; }
+svg .arrow, svg .input, svg .output { fill: none; stroke: #556; stroke-width: 1.2; }
+svg .output { stroke: #1763a6; }
 table { border-collapse: collapse; width: 100%; }
 th, td { border-bottom: 1px solid #ccd; padding: .25em .6em; text-align: left; }
 """
@@ -24,15 +31,18 @@ TIMING = {
 }
 
 
-def documentation(component: Component) -> bytes:
-    """One HTML page without external references."""
+def documentation(component: Component, run: ReferenceRun | None = None) -> bytes:
+    """One HTML page without external references, with the block's ports as a drawing, and what it
+    does in `run`."""
     steps = component.substeps
     times = "once" if steps == 1 else f"in {steps} equal substeps"
     body = [
         f"<h1>{escape(component.name)}</h1>",
         f"<p>{escape(component.description)}</p>",
         f"<p>{TIMING[component.timing]} Each communication step is taken {times}.</p>",
+        f"<figure>{diagram(component)}</figure>",
         *_paragraphs(component.documentation),
+        *(_run(run) if run and len(run.times) else []),
         *_table("Inputs", component.inputs),
         *_table("Parameters", component.parameters),
         *_table("Outputs", component.outputs),
@@ -45,6 +55,17 @@ def documentation(component: Component) -> bytes:
         "</body></html>",
     ]
     return "\n".join(page).encode() + b"\n"
+
+
+def _run(run: ReferenceRun) -> list[str]:
+    moved = f"{', '.join(run.moved)} moved by sines, other inputs at their start values"
+    return [
+        "<h2>Reference run</h2>",
+        f"<figure>{strips(run)}<figcaption>The block alone, from its start values, over "
+        f"{run.duration:g} s: {moved if run.moved else 'no input moves it'}. "
+        "Inputs are grey, outputs blue; beside each strip its greatest and its least value."
+        "</figcaption></figure>",
+    ]
 
 
 def _paragraphs(text: str) -> list[str]:

@@ -27,6 +27,7 @@ from hapticlink.fmus.described import described
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.fmu_functions import one_pass
+from hapticlink.fmus.reference_run import reference_run
 from hapticlink.fmus.reproducible_zip import digest
 from hapticlink.fmus.straight_line import program
 
@@ -88,7 +89,8 @@ def packed(
     them. engine: the text of a module whose functions replace these."""
 
     described_as = described(component, stop_time=stop_time, step_size=step_size)
-    files = {"documentation/index.html": documentation(component), **functions}
+    run = None if engine else reference_run(component, step_size)  # whose equations are others
+    files = {"documentation/index.html": documentation(component, run), **functions}
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
     for path in sorted((PYTHONFMU / "resources" / "binaries").rglob("*.*")):

@@ -11,7 +11,12 @@ F_h, so that the hand's wrench would count twice; F_T stays outside Lambda^-1.
 
 is the virtual coupling, the two position channels of the four-channel controller (section 4.2.3);
 its force channels are connections, the hand's wrench to the mechanism and F_env to the device. A
-passivity controller (control/passivity.py) may take damping off u.
+passivity controller may take damping off u. Parts that are off have no term, no input and no
+parameter; without the impedance part the wrenches act on the device as they are,
+
+    u = F_drift + F_env - B_d v - K_d (x - x_ref) + F_T
+
+Only a passivity controller has memory.
 """
 
 from __future__ import annotations
@@ -99,12 +104,7 @@ def _outputs(spec: Controller, law: Topology | None) -> list[Variable]:
 
 
 def controller(spec: Controller, length_scale: float) -> Component:
-    """The parts of `spec` that are on; the others have no term, no input and no parameter.
-
-    Sampled: F_motor, F_drift, F_constraint of t_k from inputs of t_k; without memory but for that
-    of a passivity controller.
-    Without the impedance part the wrenches act on the device as they are,
-    u = F_drift + F_env - B_d v - K_d (x - x_ref) + F_T. length_scale is L (m).
+    """The controller with the parts of `spec` that are on. length_scale is L (m).
 
     Raises ValueError for bias "full" without the impedance part, which carries it.
     """
@@ -137,7 +137,7 @@ def controller(spec: Controller, length_scale: float) -> Component:
         initial=initial,
         step=step,
         output=output,
-        documentation=controller.__doc__ or "",
+        documentation=__doc__ or "",
         springs=[_DRIFT] if spec.teleoperation else [],
     )
 

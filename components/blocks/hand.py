@@ -2,6 +2,15 @@
 
 Sampled: F(t_k) from the handle's x and v at t_k. An arm or spring may be continuous instead, a
 plant with F(t_{k+1}) at the end of its step. F acts with + on the handle.
+
+Constant or over time: F = F(t) - B v; x is no input, and v only where there is damping.
+
+Arm: a mass that a spring and damper pull to a target path; F acts through the spring and damper of
+the grip, with the handle's x and v held over each step. It starts at the handle's x and v with
+F = 0.
+
+Spring: F = K (x_t - x) + B (x_t' - v), without a mass; a target of one row is the tunable parameter
+`target`, with x_t' = 0, which whoever runs the FMU can move.
 """
 
 from __future__ import annotations
@@ -36,13 +45,12 @@ def _hand(
 ) -> Component:
     """The hand with the output F; dynamics: `initial` and `step` of one that has states."""
     states = {"initial": {}, "step": {}} | dynamics
-    text, documentation = f"Hand: {kind}", hand.__doc__ or ""
     return block.component(
         "hand",
-        text,
+        f"Hand: {kind}",
         timing,
         output={"F": F},
-        documentation=documentation,
+        documentation=__doc__ or "",
         signals=signals,
         **states,
     )
@@ -121,14 +129,7 @@ def _spring(spec: SpringHand) -> Component:
 
 
 def hand(spec: Hand) -> Component:
-    """The hand that `spec` describes.
-
-    Constant or profile: F = F(t) - B v; x is no input, and v only where there is damping.
-    Arm: a mass that a spring and damper pull to a target path; F acts through the spring and damper
-    of the grip, with the handle's x and v held over each step. It starts at the handle's x and v
-    with F = 0. Spring: F = K (x_t - x) + B (x_t' - v), without a mass; a target of one row is the
-    tunable parameter `target`, with x_t' = 0, which whoever runs the FMU can move.
-    """
+    """The hand that `spec` describes."""
     if isinstance(spec, ArmHand):
         return _arm(spec)
     return _spring(spec) if isinstance(spec, SpringHand) else _wrench(spec)

@@ -3,7 +3,13 @@
     M_d(x) v' + C_d(x, v) v = J_q' (tau + friction) + F_hand + stops        (4.5)
 
 tau, the torques of least norm for F_motor at the pose measured at t_k, saturated, is held over the
-communication step [t_k, t_k + h). A device without friction has no terms of it.
+communication step [t_k, t_k + h). A device without friction has no terms of it. At t = 0 the handle
+is at rest at x_start and the observed force is zero.
+
+Without encoders x, v and F_hand_observed are the true values. With them x is the pose that belongs
+to the quantised base angles; v and F_hand_observed come from the observer. M and c = C_d v are
+evaluated at the measured pose and velocity, workspace_margin at the true pose. All dimensions are
+assumed, since the report gives only the 0.09 degrees of an encoder count.
 """
 
 from __future__ import annotations
@@ -163,14 +169,7 @@ class _Encoders:
 
 
 def haptic_device(device: Device, encoders: bool = False) -> Component:
-    """The FMU `haptic_device`, with the parameters of `device`.
-
-    Without `encoders`, x, v and F_hand_observed are the true values. With them, x is the pose that
-    belongs to the quantised base angles, v and F_hand_observed come from the observer. M and
-    c = C_d v are evaluated at the measured pose and velocity, workspace_margin at the true pose.
-    All dimensions are assumed, since the report only gives the 0.09 degrees of an encoder count.
-    At t = 0 the handle is at rest at x_start and the observed force is zero.
-    """
+    """The device, sensed by encoders and observer where `encoders` says so."""
     block = Block(
         inputs=_INPUTS,
         parameters=_parameters(device, encoders),
@@ -203,5 +202,5 @@ def haptic_device(device: Device, encoders: bool = False) -> Component:
         initial=initial,
         step=step,
         output=output,
-        documentation=haptic_device.__doc__ or "",
+        documentation=__doc__ or "",
     )

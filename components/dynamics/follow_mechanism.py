@@ -25,7 +25,7 @@ from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.projection import MU, projection
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinate_units
+from hapticlink.components.linkage.parameters import coordinate_units, coordinates
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 
 
@@ -35,7 +35,8 @@ def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     n, rates = len(units), tuple(f"{u}/s" for u in units)
     x_ref = Variable("x_ref", (3,), POSE, description="pose of the mechanism's operational point")
     v_ref = Variable("v_ref", (3,), TWIST, description="its velocity")
-    q_ref = Variable("q_ref", (n,), units, description="the mechanism's coordinates")
+    start = tuple(coordinates(linkage, linkage.start))
+    q_ref = Variable("q_ref", (n,), units, start, "the mechanism's coordinates")
     qd_ref = Variable("qd_ref", (n,), rates, description="the mechanism's joint rates")
     if copy.sync == "operational":
         return [x_ref, v_ref, *([q_ref] if linkage.closed else [])]

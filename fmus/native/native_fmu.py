@@ -27,6 +27,7 @@ from hapticlink.fmus.native.fmi3_interface import fmi3_sources
 from hapticlink.fmus.native.linking import WINDOWS
 from hapticlink.fmus.native.source import component_source
 from hapticlink.fmus.python_fmu import check_functions
+from hapticlink.fmus.reference_run import reference_run
 from hapticlink.fmus.reproducible_zip import digest
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
@@ -54,7 +55,8 @@ def entries(
         check_functions(component)
         header, pieces = component_source(component)
         about = described(component, stop_time=stop_time, step_size=step_size, needs_tool=False)
-        files = {"documentation/index.html": documentation(component)}
+        run = reference_run(component, step_size)
+        files = {"documentation/index.html": documentation(component, run)}
     own = {path.name: path.read_bytes() for path in (WRAPPER, COMMON)}
     if fmi == 3:
         own |= {name: text.encode() for name, text in fmi3_sources(about.variables).items()}
