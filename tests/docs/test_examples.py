@@ -130,7 +130,7 @@ def failures(folder: Path, page: Path, block: Block) -> dict[str, str]:
         if words[0] == "hapticlink":
             (ended,) = hapticlink(folder, shown(command, folder))
             failed |= {command: ended.said} if ended.status else {}
-        elif words[0] in TOOLS:
+        elif words[0] in TOOLS or (words[0] == "python" and (folder / words[1]).exists()):
             failed |= _failed(folder, str(Path(sys.executable).with_name(words[0])), *words[1:])
     return failed
 
@@ -146,7 +146,7 @@ def _failed(folder: Path, *words: str) -> dict[str, str]:
 @pytest.mark.parametrize("page", WITH_EXAMPLES, ids=name)
 def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     failed: dict[str, str] = {}
-    for block in blocks(page, "toml", "python", "sh"):
+    for block in blocks(page, "toml", "python", "c", "sh"):
         if block.title or block.language != "toml":
             failed |= failures(tmp_path, page, block)
     assert failed == {}
