@@ -22,7 +22,7 @@ HEADS = {
     "end": "end",
     "end_time_s": "at (s)",
     METRIC: "largest tracking error (mm)",
-    "port_peak_J": "energy at the port (J)",
+    "port_peak_J": "generated at the port (mJ)",
 }
 """Columns of the terminal."""
 MOST = 16
@@ -61,7 +61,7 @@ def lines(rows: Sequence[Row], keys: Sequence[str]) -> Iterator[str]:
     bad = sum(row["end"] in FAILED for row in rows)
     yield f"{len(rows)} runs over {', '.join(keys)}, {bad} failed"
     shown = {name: head for name, head in HEADS.items() if any(name in row for row in rows)}
-    cells = [[_cell(row.get(name, "")) for name in (*keys, *shown)] for row in rows]
+    cells = [[_cell(name, row.get(name, "")) for name in (*keys, *shown)] for row in rows]
     if len(rows) > MOST:
         order = sorted(range(len(rows)), key=lambda i: rows[i].get(METRIC, math.inf))
         ends = *order[: MOST // 2], *order[-MOST // 2 :]
@@ -71,8 +71,11 @@ def lines(rows: Sequence[Row], keys: Sequence[str]) -> Iterator[str]:
     yield from (f"  {line}" for line in aligned(cells))
 
 
-def _cell(value: Any) -> str:
-    return short(value) if isinstance(value, float) else str(value)
+def _cell(name: str, value: Any) -> str:
+    """Energies in mJ, as in all that is read."""
+    if not isinstance(value, float):
+        return str(value)
+    return short(1e3 * value if name.endswith("_J") else value)
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:

@@ -21,7 +21,8 @@ STEP = 1 / 64
 @pytest.mark.parametrize("component", [spring(), spring(substeps=3), controller()])
 def test_it_is_what_fmpy_finds_from_the_same_inputs(component, tmp_path):
     run = reference_run(component, STEP)
-    assert run.moved and run.duration == 0.5
+    assert run.moved
+    assert run.duration == 0.5
     fmu = build(component, tmp_path)
     # FMPy sets the inputs of t_k before the step from t_k.
     inputs = np.rec.fromarrays([run.times, *run.moved.values()], names=["time", *run.moved])
@@ -50,6 +51,7 @@ def test_it_ends_before_a_value_that_is_not_finite():
 def test_the_page_has_both_drawings(tmp_path):
     fmu: Path = build(spring(), tmp_path)
     page = zipfile.ZipFile(fmu).read("documentation/index.html").decode()
-    assert page.count("<svg") == 2 and "x [2] m, m/s" in page
+    assert page.count("<svg") == 2
+    assert "x [2] m, m/s" in page
     assert page.count('class="input"') == 1  # F
     assert page.count('class="output"') == 4  # x[1], x[2], a, time
