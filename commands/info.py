@@ -98,7 +98,8 @@ def _starts(scene: Any, start: dict[str, float]) -> None:
     elif start:
         say(f"\nthe operational point starts at {workspace.placed(_pose(start))}")
     if scene.hand:
-        say(f"hand: {scene.hand.type}")
+        swapped = (fmu.path or fmu.engine for fmu in scene.fmu if fmu.replaces == "hand")
+        say(f"hand: {next(swapped, scene.hand.type)}")
     if scene.contacts and start:
         from hapticlink.analysis.findings import contact_warnings
         from hapticlink.components.contact.broad_phase import near

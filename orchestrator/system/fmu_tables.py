@@ -18,7 +18,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import ForeignFmu, Value
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem, reported
-from hapticlink.orchestrator.system.port_map import Mapped, mapped, renamed
+from hapticlink.orchestrator.system.port_map import Mapped, mapped, renamed, with_declarations
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component
@@ -41,9 +41,12 @@ def fmus(
             continue
         block, names = replaced.get(fmu.name), Mapped()
         if block:
-            with reported(problems, ("fmu", i, "map")):
+            try:
                 names = mapped(description, block, fmu.map)
-            description = renamed(description, names, block)
+            except ValueError as fault:
+                problems.append((("fmu", i, "map"), str(fault)))
+                continue
+            description = with_declarations(renamed(description, names, block), block)
         if fmu.timing:
             description = replace(description, timing=fmu.timing)
         elif block and not description.declares_timing:

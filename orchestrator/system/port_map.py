@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.fmi.kind_check import misfit
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component, Variable
+    from hapticlink.components.ports import Kind
 
 _INDEX = re.compile(r"[\[(_ ]?(\d+(?:[,_]\d+)?)[\])]?$")
 """The index at the end of a name: F[1], F(1), F_1, F1, M[1,2], M_1_2."""
@@ -32,7 +34,9 @@ def mapped(
     renamings: Mapped = {}
     for port, names in given.items():
         if port not in ports:
-            raise ValueError(unknown("port of the block", port, ports))
+            there = unknown("port of the block", port, ports)
+            hint = "what it has with other settings alone is fed by a [[connection]]"
+            raise ValueError(f"{there}; {hint}")
         renamings[port] = tuple(s.name for s in _named(description, names))
         if len(renamings[port]) != (size := len(_places(ports[port][0]))):
             raise ValueError(f"{len(renamings[port])} variables for the {size} entries of {port}")
@@ -66,6 +70,37 @@ def renamed(description: Description, names: Mapped, block: Component) -> Descri
             for output, on in description.dependencies.items()
         },
         derivatives={new.get(a, a): new.get(b, b) for a, b in description.derivatives.items()},
+    )
+
+
+def with_declarations(description: Description, block: Component) -> Description:
+    """The description with what the block declares of its ports, where the FMU has ports of these
+    names and sizes and declares nothing else: kinds, power ports and time derivatives."""
+
+    def there(name: str, causality: str) -> tuple[Scalar, ...]:
+        variable = next(v for v in (*block.inputs, *block.outputs) if v.name == name)
+        entries = description.port(name, causality)
+        return entries if len(entries) == variable.size else ()
+
+    kinds: dict[str, Kind] = {}
+    rates: dict[str, str] = {}
+    for v in block.outputs:
+        entries = there(v.name, "output")
+        if v.kind and entries and not misfit(v.kind, [description.unit(s) for s in entries]):
+            kinds[v.name] = v.kind
+        if v.derivative_of:
+            values = there(v.derivative_of, "output")
+            rates |= {x.name: rate.name for x, rate in zip(values, entries, strict=False)}
+    power = {
+        v.name: v.power
+        for v in block.inputs
+        if v.power and there(v.name, "input") and there(v.power.displacement, "output")
+    }
+    return replace(
+        description,
+        kinds=kinds | dict(description.kinds),
+        power=power | dict(description.power),
+        derivatives=rates | dict(description.derivatives),
     )
 
 

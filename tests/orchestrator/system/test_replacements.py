@@ -8,9 +8,12 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.commands.options import Changes
+from hapticlink.components.ports import Power
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.system.build_system import built
 from tests.orchestrator.foreign_fmus import entries, slave
 from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import status
@@ -104,6 +107,26 @@ def test_an_fmu_that_fits_nothing_is_refused(tmp_path, block, capsys):
     assert given[block] in told
 
 
+def test_ports_are_held_as_those_of_the_block_and_carry_its_power(tmp_path):
+    """What a foreign FMU does not declare, where its ports have the block's names and sizes."""
+    matrix = {f"Lambda_inv[{i},{j}]": float(i == j) for i in (1, 2, 3) for j in (1, 2, 3)}
+    outputs = entries("x", 3) | entries("v", 3) | matrix | entries("P_c", 4)
+    copy = slave(tmp_path, "Copy", ("input", entries("q_ref", 4)), ("output", outputs))
+    inputs = entries("F_motor", 3) | entries("F_hand", 3)
+    device = slave(
+        tmp_path, "Device", ("input", inputs), ("output", entries("x", 3) | entries("x_true", 3))
+    )
+    files = {"virtual_environment": copy, "haptic_device": device}
+    swaps = [f'fmu.+={{replaces="{name}", path="{file}"}}' for name, file in files.items()]
+    with built(open_scene.load("closed-loop", ["controller.topology=false", *swaps])) as system:
+        about = {name: system.fmu[name].description for name in files}
+    assert about["virtual_environment"].kinds == {"Lambda_inv": "semidefinite"}  # P_c has 4 entries
+    rates = {f"x[{i}]": f"v[{i}]" for i in (1, 2, 3)}
+    assert about["virtual_environment"].derivatives == rates
+    carried = about["haptic_device"].power
+    assert carried == {name: Power("x_true") for name in ("F_motor", "F_hand")}
+
+
 def pull(folder: Path, *names: str) -> Path:
     """The constant hand of closed-loop."""
     return slave(folder, "Pull", ("output", dict(zip(names, (-0.5, 0.0, -0.0025), strict=True))))
@@ -148,7 +171,9 @@ def test_a_map_that_does_not_fit_is_refused(tmp_path, given, said, capsys):
     file = pull(tmp_path, "force0", "force1", "force2")
     command = ["info", "closed-loop", "--swap", f"hand={file}", "--map", given]
     assert status(*command) == 2
-    assert said in " ".join(capsys.readouterr().err.split())
+    told = " ".join(capsys.readouterr().err.split())
+    assert said in told
+    assert "none of its outputs" not in told
 
 
 def test_a_scene_has_map_and_connections_too(tmp_path):
