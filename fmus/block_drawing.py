@@ -41,9 +41,10 @@ def diagram(component: Component) -> str:
 
 
 def strips(run: ReferenceRun) -> str:
-    """What moved over time, each on a scale of its own from its least to its greatest value."""
+    """What moved over time, each on a scale of its own from its least to its greatest value; all
+    outputs where none did."""
     moving = {name: values for name, values in run.answers.items() if np.ptp(values) > 0}
-    kinds = ("input", run.moved), ("output", moving)
+    kinds = ("input", run.moved), ("output", moving or run.answers)
     rows = [(kind, *row) for kind, of in kinds for row in list(of.items())[:SHOWN]]
     parts = []
     for k, (kind, name, values) in enumerate(rows):

@@ -13,7 +13,7 @@ import pytest
 from hapticlink.fmus.build import build
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.reference_run import reference_run
-from tests.fmus.sample_components import controller, fragile, spring
+from tests.fmus.sample_components import controller, fragile, spring, stateless
 
 STEP = 1 / 64
 
@@ -39,6 +39,11 @@ def test_inputs_without_a_hand_s_unit_stay(tmp_path):
     assert not run.moved
     assert set(run.answers) == {"y[1]", "y[2]", "count"}
     assert "no input moves it" in documentation(fragile(), run).decode()
+
+
+def test_outputs_are_drawn_where_none_moves():
+    page = documentation(stateless(), reference_run(stateless(), STEP)).decode()
+    assert page.count('class="output"') == 1
 
 
 def test_it_ends_before_a_value_that_is_not_finite():
