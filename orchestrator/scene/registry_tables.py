@@ -46,12 +46,11 @@ def record_of(path: Path, data: Any) -> Any:
 def _arguments(block: Callable[..., Any]) -> Any:
     """A record of a block's arguments."""
     arguments = inspect.signature(block).parameters.values()
-    return make_dataclass(
-        "Settings",
-        [(a.name, a.annotation, field(**_default(a))) for a in arguments],
-        namespace={"__module__": block.__module__},  # resolves annotations that are texts
-        kw_only=True,
-    )
+    named = [(a.name, a.annotation, field(**_default(a))) for a in arguments]
+    record = make_dataclass("Settings", named, kw_only=True)
+    # Resolves annotations that are texts; from Python 3.12 on make_dataclass sets it by itself.
+    record.__module__ = block.__module__
+    return record
 
 
 def _default(argument: inspect.Parameter) -> dict[str, Any]:
