@@ -171,9 +171,10 @@ def _objects(
 def global_names(source: Iterable[Path], folder: Path) -> list[str]:
     """The names that C files define for the linker, compiled in `folder` for Linux on x86-64. They
     are in the index of an archive of the object files, the entry "/": their count, as many
-    big-endian offsets, and the names, each ended by a zero. Raises as `compile_library`."""
+    big-endian offsets, and the names, each ended by a zero; names need no optimisation. Raises as
+    `compile_library`."""
     compiler_version()
-    objects = _objects(source, folder, TARGETS["x86_64-linux"][0], ())
+    objects = _objects(source, folder, TARGETS["x86_64-linux"][0], ("-O0", "-fno-sanitize=all"))
     archive = folder / "names.a"
     command = [*_ZIG, "ar", "--format=gnu", "rcs", archive.name, *objects]
     subprocess.run(command, cwd=folder, capture_output=True, check=True)
