@@ -3,7 +3,7 @@ somebody waits for it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,36 +64,53 @@ def trying(*asked: Turn) -> tuple[Turn, list[str]]:
 NUMBERS = (-1.0, -1, float("nan"), float("inf"), -float("inf"), 1e30, "x", None, True, [1], 2**70)
 
 
-@pytest.mark.parametrize("value", NUMBERS, ids=repr)
-def test_what_no_scene_may_have_is_refused_while_it_runs(value: Any) -> None:
-    """And the run goes on as if it had not been asked for."""
-    asked: dict[str, Turn] = {
-        "delay": lambda live: live.hold("virtual_environment.Lambda_inv", None, value),
-        "rate": lambda live: live.rate("graphics", value),
-        "jitter": lambda live: live.rate("graphics", 20, value),
-        "seed": lambda live: live.rate("graphics", 20, 0.1, value),
-        "ticks": lambda live: live.step(value),
-        "hand.wrench": lambda live: live.set("hand.wrench", value),
-    }
-    if value is None:
-        del asked["delay"], asked["rate"]  # None leaves it, or brings back that of the scene
-    turn, refused = trying(*asked.values())
-    made = ran("closed-loop", turn, "duration=0.1")
-    assert [name in said for name, said in zip(asked, refused, strict=True)] == [True] * len(asked)
+def changes(value: Any) -> Iterator[tuple[str, Turn]]:
+    """What is asked with a number that none of it may have, and the word by which it is refused."""
+    if value is not None:  # which leaves a delay, and brings back the rate of the scene
+        yield "delay", lambda live: live.hold("virtual_environment.Lambda_inv", None, value)
+        yield "rate", lambda live: live.rate("graphics", value)
+    yield "jitter", lambda live: live.rate("graphics", 20, value)
+    yield "seed", lambda live: live.rate("graphics", 20, 0.1, value)
+    yield "ticks", lambda live: live.step(value)
+    yield "hand.wrench", lambda live: live.set("hand.wrench", value)
+
+
+def unknown(value: Any) -> Iterator[tuple[str, Turn]]:
+    """The same with a name that there is not."""
+    yield "", lambda live: live[value]
+    yield "", lambda live: live.set(value, 1.0)
+    yield "", lambda live: live.hold(value, "zoh")
+    yield "", lambda live: live.hold("virtual_environment.Lambda_inv", value or 0)  # None leaves it
+    yield "", lambda live: live.rate(value, 20.0)
+
+
+REFUSED: list[tuple[str, Turn]] = [
+    ("give 3 finite numbers", lambda live: live.set("hand.wrench", (1.0, 2.0))),
+    ("give 3 finite numbers", lambda live: live.set("hand.wrench", (1.0, 2.0, np.nan))),
+    ("no input or parameter 'wrong'", lambda live: live.set("hand.wrong", 1.0)),
+    ("is fed by a connection", lambda live: live.set("controller.x_D", np.zeros(3))),
+    ("is not tunable", lambda live: live.set("haptic_device.x_start", np.zeros(3))),
+    ("did you mean 'hand'", lambda live: live["hands.F"]),
+    ("did you mean 'zoh'", lambda live: live.hold("virtual_environment.P_c", "zohh")),
+    ("spring", lambda live: live.hold("virtual_environment.P_c", "pspm")),
+    ("connection with a hold", lambda live: live.hold("hand.F", "foh")),
+    ("clock 'haptics'", lambda live: live.rate("haptics", 100.0)),
+    ("up to that of the haptics", lambda live: live.rate("graphics", 600.0)),
+    ("at 256 Hz give 0 to 0.5", lambda live: live.rate("graphics", 256.0, 0.6)),
+    *(asked for value in NUMBERS for asked in changes(value)),
+    *(asked for value in (None, 7, b"x", {"x": 1}, ["hand.F"], "x") for asked in unknown(value)),
+]
+"""What cannot be while a scene runs, by a part of the message."""
+
+
+def test_what_cannot_be_is_refused_and_changes_nothing() -> None:
+    turn, refused = trying(*(ask for _, ask in REFUSED))
+    made = ran("closed-loop", turn, "duration=0.2")
+    assert len(refused) == len(REFUSED)
+    assert [each for each in zip(REFUSED, refused, strict=True) if each[0][0] not in each[1]] == []
+    assert made.fault is None
+    assert made.run["end"]["reason"] == "stopped"
     assert made.run["real_time"]["changes"] == []
-
-
-@pytest.mark.parametrize("value", [None, 7, b"x", {"x": 1}, ["hand.F"], "x"], ids=repr)
-def test_names_that_are_none_are_refused_while_it_runs(value: Any) -> None:
-    turn, refused = trying(
-        lambda live: live[value],
-        lambda live: live.set(value, 1.0),
-        lambda live: live.hold(value, "zoh"),
-        lambda live: live.hold("virtual_environment.Lambda_inv", value or 0),  # None leaves it
-        lambda live: live.rate(value, 20.0),
-    )
-    ran("closed-loop", turn, "duration=0.1")
-    assert len(refused) == 5
 
 
 @pytest.mark.parametrize("every", [float("nan"), -1.0, "x"])
@@ -160,32 +177,6 @@ def test_an_input_of_an_fmu_beside_the_loop_is_set_before_its_next_step(tmp_path
     made = ran(str(path), once(0.07, lambda live: live.set("two.u", 3.0)))
     found = dict(zip(made.time("two.y"), made["two.y"], strict=True))
     assert found == {k / 32: 0.0 if k < 4 else 3.0 for k in range(9)}
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda live: live.set("hand.wrench", (1.0, 2.0)), "give 3 finite numbers"),
-        (lambda live: live.set("hand.wrench", (1.0, 2.0, np.nan)), "give 3 finite numbers"),
-        (lambda live: live.set("hand.wrong", 1.0), "no input or parameter 'wrong'"),
-        (lambda live: live.set("controller.x_D", np.zeros(3)), "is fed by a connection"),
-        (lambda live: live.set("haptic_device.x_start", np.zeros(3)), "is not tunable"),
-        (lambda live: live["hands.F"], "did you mean 'hand'"),
-        (lambda live: live.hold("virtual_environment.P_c", "zohh"), "did you mean 'zoh'"),
-        (lambda live: live.hold("virtual_environment.P_c", "pspm"), "spring"),
-        (lambda live: live.hold("hand.F", "foh"), "connection with a hold"),
-        (lambda live: live.rate("haptics", 100.0), "clock 'haptics'"),
-        (lambda live: live.rate("graphics", 600.0), "up to that of the haptics"),
-        (lambda live: live.rate("graphics", 256.0, 0.6), "at 256 Hz give 0 to 0.5"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_is_refused_and_changes_nothing(change: Turn, said: str) -> None:
-    turn, refused = trying(change)
-    made = ran("closed-loop", turn, "duration=0.2")
-    assert [said in message for message in refused] == [True]
-    assert made.fault is None
-    assert made.run["end"]["reason"] == "stopped"
-    assert made.run["real_time"]["changes"] == []
 
 
 def test_a_hold_is_changed_and_begins_with_the_newest_sample() -> None:

@@ -24,6 +24,10 @@ from pathlib import Path
 
 from hapticlink import commands
 from hapticlink.commands import internal_error
+from hapticlink.commands import run as run
+from hapticlink.orchestrator import experiment as experiment
+from hapticlink.orchestrator.scene.scene import adapter
+from hapticlink.visualization.figures import run_figures as run_figures
 from tests.attack.processes import PATIENCE, Room
 
 ENOUGH = 0.5
@@ -44,6 +48,7 @@ class Place(Room):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
+        adapter()  # once, not in each process
         self.out, self.earlier, self.here = (folder / name for name in ("out", "earlier", "here"))
         self.here.mkdir()
         status, said = self.forked(["run", "pendulum", "--out", str(self.earlier)])

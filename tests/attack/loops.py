@@ -105,7 +105,7 @@ def sanitized(folder: Path) -> str:
     """The folder of the loop compiled with sanitizers."""
     place = folder / "sanitized"
     place.mkdir()
-    flags = (*UNDEFINED, "-fsanitize=address", "-fno-sanitize-recover=all", "-O1")
+    flags = (*UNDEFINED, "-fsanitize=address", "-fno-sanitize-recover=all", "-O0")
     build.compile_loop(place / "loop.so", build.Compiler(["gcc", *flags]))
     return str(place)
 

@@ -20,7 +20,6 @@ from hapticlink.orchestrator.results import tables
 from tests.attack.cases import OF_SIGNALS, Made, command, hear_interrupts
 from tests.attack.processes import PATIENCE, Process, Room, own_folder
 
-RUN = ["run", "closed-loop"]
 KINDS = {
     "in process": [],
     "isolated": ["--set", "isolate=true"],
@@ -31,11 +30,11 @@ KINDS = {
 class Attack(Room):
     """Cases in a folder of their own."""
 
-    def __init__(self, folder: Path, duration: float) -> None:
+    def __init__(self, folder: Path, scene: str, duration: float) -> None:
         hear_interrupts()
         super().__init__(folder, HAPTICLINK_CACHE=str(folder / "cache"))
         self.out, self._earlier = folder / "out", folder / "earlier"
-        self._arguments = [*RUN, "--out", str(self.out), "--set", f"duration={duration}"]
+        self._arguments = ["run", scene, "--out", str(self.out), "--set", f"duration={duration}"]
         self.lasts: dict[str, float] = {}
         """How long (s) an undisturbed run of each kind takes."""
         for kind in ("building", "in process", "isolated"):
@@ -104,11 +103,13 @@ def python_itself(status: int, said: str) -> bool:
     return status == -signal.SIGINT or ("KeyboardInterrupt" in said and "hapticlink" not in said)
 
 
-def attack(number: int, seed: int, duration: float = 0.2) -> Iterator[Made]:
+def attack(
+    number: int, seed: int, scene: str = "closed-loop", duration: float = 0.2
+) -> Iterator[Made]:
     """Each case that is made."""
     draw = random.Random(seed)
     with own_folder() as folder:
-        room = Attack(folder, duration)
+        room = Attack(folder, scene, duration)
         kinds = [kind for kind in room.lasts for _ in range(1 if kind == "building" else 3)]
         for i in range(number):
             kind = kinds[i % len(kinds)]

@@ -100,7 +100,7 @@ def test_a_program_in_c_plus_plus_gets_the_pose_of_our_own_run(tmp_path: Path) -
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    ours = hl.run("closed-loop", {"hand.wrench": [0.5, 0.0, 0.0], "packaging": "native"})
+    ours = hl.run("closed-loop", {"hand.wrench": [0.5, 0.0, 0.0]})
     pose = done.stdout.splitlines()[-1].split()
     assert [*map(float, pose)] == ours["virtual_mechanism.x"][-1].tolist()
 

@@ -12,6 +12,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -21,13 +22,15 @@ import hapticlink as hl
 from hapticlink.analysis.sweep.grid import grid, parse
 from hapticlink.commands import COMMANDS, _commands, app
 from hapticlink.commands.json_schema import json_schema
+from hapticlink.orchestrator.scene import find_scene
 from tests.docs.pages import PAGES, ROOT, Block, blocks, name, prose
 from tests.plugins import hapticlink
 
 ELSEWHERE = {"docs/extending.md", "docs/api.md"}
 WITH_EXAMPLES = [p for p in PAGES if name(p) not in ELSEWHERE and [*blocks(p, "sh", "python")]]
+SHIPPED = tuple(find_scene.shipped())
 SHORTER = {"hapticlink sweep": 0.02} | {
-    f"hapticlink run {name}": 0.2 for name in (*hl.shipped(), "watt.toml")
+    f"hapticlink run {name}": 0.2 for name in (*SHIPPED, "watt.toml")
 }
 """Duration (s) of commands that take longer than their page needs."""
 NOT_RUN = {
@@ -98,9 +101,7 @@ def shown(command: str, folder: Path) -> str:
 
 def first_pages() -> dict[str, Path]:
     """Each command without files of a page, with the first page that has it, where it is run."""
-    alone = re.compile(
-        rf"hapticlink (doctor|schema|\w+ ({'|'.join(hl.shipped())}))( (?!.*--out)|$)"
-    )
+    alone = re.compile(rf"hapticlink (doctor|schema|\w+ ({'|'.join(SHIPPED)}))( (?!.*--out)|$)")
     return {
         command: page
         for page in reversed(WITH_EXAMPLES)
@@ -171,12 +172,18 @@ def test_every_command_can_be_parsed(page: Path) -> None:
     """Options, and keys and values of shipped scenes; those of sweeps too."""
     _commands([])
     for command in every_command(page):
-        _, bound, _ = app.parse_args(shlex.split(command)[1:], exit_on_error=False)
-        scene = bound.args[0] if bound.args else None
-        if isinstance(scene, str) and scene in hl.shipped():
-            for point in grid([parse(text) for text in bound.kwargs.get("vary") or ()]):
-                varied = (f"{key}={value}" for key, value in point.items())
-                hl.scene(scene, [*(bound.kwargs.get("set") or ()), *varied])
+        parsed(command)
+
+
+@cache
+def parsed(command: str) -> None:
+    """Many pages have the same commands."""
+    _, bound, _ = app.parse_args(shlex.split(command)[1:], exit_on_error=False)
+    scene = bound.args[0] if bound.args else None
+    if scene in SHIPPED:
+        for point in grid([parse(text) for text in bound.kwargs.get("vary") or ()]):
+            varied = (f"{key}={value}" for key, value in point.items())
+            hl.scene(scene, [*(bound.kwargs.get("set") or ()), *varied])
 
 
 def test_extras_that_are_installed_exist() -> None:

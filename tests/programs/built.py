@@ -6,7 +6,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -32,21 +32,37 @@ def _folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="hapticlink-programs-", dir="/tmp"))
 
 
-@cache
 def program(
     scene: str, options: tuple[str, ...] = (), without: str | None = None, fmi: int = 2
 ) -> Path:
     """The FMU of a scene."""
+    return _program(scene, options, without, fmi)
+
+
+@cache
+def _program(scene: str, options: tuple[str, ...], without: str | None, fmi: int) -> Path:
     files = program_files(open_scene.load(scene, options), "program", without, fmi)
-    sources = (n for n in files if n.startswith("sources/"))
-    library = compiled({n.removeprefix("sources/"): files[n] for n in sources})
+    folder = Path(tempfile.mkdtemp(dir=_folder()))
+    shared = ("-shared", "-Wl,-Bsymbolic")
+    library = linked(str(COMPILER), sources(files), folder / "library", FLAGS, shared).read_bytes()
     place = platform if fmi == 2 else platform_tuple
     whole = {**files, f"binaries/{place}/program{sharedLibraryExtension}": library}
-    return write_fmu(whole, tempfile.mkdtemp(dir=_folder()), "program")
+    return write_fmu(whole, folder, "program")
 
 
-def compiled(sources: dict[str, bytes], flags: Sequence[str] = FLAGS) -> bytes:
-    """The shared library of C files, as `cc *.c` makes it."""
+def sources(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The files in the folder `sources` of an FMU."""
+    return {n.removeprefix("sources/"): files[n] for n in files if n.startswith("sources/")}
+
+
+def linked(
+    compiler: str,
+    sources: dict[str, bytes],
+    target: Path,
+    flags: Sequence[str] = FLAGS,
+    link: Sequence[str] = (),
+) -> Path:
+    """What a compiler makes of C files. Raises CalledProcessError with what it said."""
     foreign = {n for n in sources if "/" in n}
     headers_alone = {n for n in sources if n.endswith(".h")} - {*DATA_OF.values()}
     shared = sorted(foreign | headers_alone)
@@ -59,16 +75,15 @@ def compiled(sources: dict[str, bytes], flags: Sequence[str] = FLAGS) -> bytes:
             (room / file).write_bytes(content)
         for file in sorted(n for n in sources if n.endswith(".c") and n not in foreign):
             uses = sources[DATA_OF[file]] if file in DATA_OF else b""
-            key = sha256(b"\0".join([sources[file], headers, uses, *map(str.encode, flags)]))
+            how = map(str.encode, (compiler, *flags))
+            key = sha256(b"\0".join([sources[file], headers, uses, *how]))
             kept = _folder() / f"{key.hexdigest()}.o"
             if not kept.exists():
-                _run(flags, "-c", "-o", str(kept), str(room / file))
+                _run(compiler, *flags, "-c", "-o", str(kept), str(room / file))
             objects.append(str(kept))
-        library = room / "library"
-        _run(flags, "-shared", "-Wl,-Bsymbolic", "-o", str(library), *objects, "-lm")
-        return library.read_bytes()
+        _run(compiler, *flags, *link, "-o", str(target), *objects, "-lm")
+    return target
 
 
-def _run(flags: Sequence[str], *arguments: str) -> None:
-    assert COMPILER
-    subprocess.run([COMPILER, *flags, *arguments], check=True)
+def _run(*command: str) -> None:
+    subprocess.run(command, check=True, capture_output=True, text=True)

@@ -8,8 +8,22 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from tests.programs import built
+
 SOURCES = {2: Path(__file__).with_name("life.c"), 3: Path(__file__).with_name("life3.c")}
 """By version of FMI."""
+
+
+def made(
+    compiler: str,
+    sources: Mapping[str, bytes],
+    fmi: int,
+    folder: Path,
+    flags: Sequence[str] = built.FLAGS,
+) -> Path:
+    """The life with the C files of a program."""
+    whole = {**sources, "life.c": SOURCES[fmi].read_bytes()}
+    return built.linked(compiler, whole, folder / "life", flags)
 
 
 def lived(

@@ -60,15 +60,19 @@ def agree(path: str, options: tuple[str, ...], folder: Path) -> None:
         assert [*differing(outputs(built, experiment, step), experiment)] == [], step
 
 
-@pytest.fixture
-def two(tmp_path: Path) -> str:
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return two_in(tmp_path_factory.mktemp("two"))
+
+
+def two_in(folder: Path) -> str:
     """Two FMUs of one source with other start values, a third one of which there are two instances,
     at another rate, with values for all types and a unit that is converted."""
-    mass_fmus(tmp_path)
-    table_fmu(tmp_path)
+    mass_fmus(folder)
+    table_fmu(folder)
     given = 'start = { scale = 0.5, most = 900, text = "seven??" }\n'
     return scene(
-        tmp_path,
+        folder,
         fmu("one", "one"),
         fmu("two", "two"),
         fmu("fast", "table", given),
@@ -139,14 +143,14 @@ def test_it_runs_in_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     table_fmu(tmp_path)
     beside = f'fmu.+={{name="one", path="{tmp_path}/one.fmu"}}'
     wired = 'connection.+={from="virtual_mechanism.x[1]", to="one.F", factor=100, convert=false}'
-    opened = viewed("closed-loop", (beside, wired))
-    rows = test_page_program.under_node(opened, [])
+    opened = viewed("pendulum", (beside, wired))
+    rows = test_page_program.under_node(page.html(opened, "page"), [])
     monkeypatch.setattr(test_page_program, "CHANGES", [])
     changed = test_page_program.changed_run(opened, tmp_path, lambda *_: None)
     assert np.abs(rows - changed).max() < 1e-9
     with pytest.raises(InputFault, match="table has resources, files that a page lacks"):
         page.html(
-            viewed("closed-loop", (f'fmu.+={{name="table", path="{tmp_path}/table.fmu"}}',)), "t"
+            viewed("pendulum", (f'fmu.+={{name="table", path="{tmp_path}/table.fmu"}}',)), "t"
         )
 
 
@@ -197,10 +201,8 @@ def test_a_failure_names_the_fmu_and_passes_its_message_on(
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_what_is_built_for_others_has_the_resources_of_each(
-    fmi: int, two: str, tmp_path: Path
-) -> None:
-    path = build_program(open_scene.load(two), "two", out=tmp_path / "out", fmi=fmi)
+def test_it_has_the_resources_of_each(fmi: int, two: str, tmp_path: Path) -> None:
+    path = program(two, fmi=fmi)
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
     assert "resources/fast_2/gain.txt" in names
@@ -246,7 +248,8 @@ def test_an_fmu_of_fmi_3_is_refused(tmp_path: Path) -> None:
         build_program(loaded, "types", out=tmp_path)
 
 
-def test_an_fmu_without_sources_can_be_left_out(two: str, tmp_path: Path) -> None:
+def test_an_fmu_without_sources_can_be_left_out(tmp_path: Path) -> None:
+    two = two_in(tmp_path)
     native_mass.held(tmp_path)  # both again, without sources
     with pytest.raises(InputFault, match="an FMU can be left out: --without one"):
         program_files(open_scene.load(two), "program")

@@ -3,9 +3,10 @@ for Windows under wine, and by its C files for ARM under qemu."""
 
 from __future__ import annotations
 
+import os
 import shutil
-import subprocess
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,61 +16,55 @@ import pytest
 from hapticlink.fmus.native.compiler import compile_library
 from hapticlink.programs.build import OPTIONS
 from tests.programs import life, windows
-from tests.programs.built import COMPILER, needs_compiler, program
+from tests.programs.built import COMPILER, FLAGS, needs_compiler, program, sources
 from tests.programs.windows import WINE
 
 pytestmark = needs_compiler
 ARM, QEMU = shutil.which("aarch64-linux-gnu-gcc"), shutil.which("qemu-aarch64")
-FLAGS = ("-std=gnu11", "-O0", "-w", "-ffp-contract=off", *OPTIONS)
 
 
 @dataclass
-class Unpacked:
-    """An FMU of a scene in a folder, with the life beside it as life.c."""
+class Life:
+    """The life of an FMU of a scene."""
 
+    fmi: int
     folder: Path
 
-    @property
-    def sources(self) -> Path:
-        return self.folder / "sources"
+    @cached_property
+    def files(self) -> dict[str, bytes]:
+        with zipfile.ZipFile(program("closed-loop", fmi=self.fmi)) as archive:
+            return {name: archive.read(name) for name in archive.namelist()}
 
-    @property
-    def description(self) -> str:
-        return (self.folder / "modelDescription.xml").read_text()
-
-    def compiled(self, compiler: list[str], name: str) -> Path:
-        """The life with the FMU's C files."""
-        files = [*map(str, self.sources.glob("*.c")), "life.c", "-lm"]
-        command = [*compiler, *FLAGS, f"-I{self.sources}", "-o", name, *files]
-        subprocess.run(command, cwd=self.folder, check=True)
-        return self.folder / name
+    def lived(self, command: list[str], environment: Mapping[str, str] = os.environ) -> float:
+        return life.lived(command, self.files["modelDescription.xml"].decode(), environment)
 
     @cached_property
     def here(self) -> float:
         """The sum on this machine."""
-        assert COMPILER
-        return life.lived([self.compiled([COMPILER], "here")], self.description)
+        return self.lived(
+            [str(life.made(str(COMPILER), sources(self.files), self.fmi, self.folder))]
+        )
 
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
-def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
-    folder = tmp_path_factory.mktemp("one")
-    with zipfile.ZipFile(program("closed-loop", fmi=request.param)) as archive:
-        archive.extractall(folder)
-    shutil.copy(life.SOURCES[request.param], folder / "life.c")
-    return Unpacked(folder)
+def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Life:
+    return Life(request.param, tmp_path_factory.mktemp("one"))
 
 
 @pytest.mark.skipif(not (ARM and QEMU), reason="no cross compiler for ARM, or no qemu-aarch64")
-def test_arm(fmu: Unpacked) -> None:
-    command = [str(QEMU), fmu.compiled([str(ARM), "-static"], "on-arm")]
-    assert life.lived(command, fmu.description) == pytest.approx(fmu.here, rel=1e-13)
+def test_arm(fmu: Life, tmp_path: Path) -> None:
+    made = life.made(str(ARM), sources(fmu.files), fmu.fmi, tmp_path, ("-static", *FLAGS))
+    assert fmu.lived([str(QEMU), str(made)]) == pytest.approx(fmu.here, rel=1e-13)
 
 
 @pytest.mark.skipif(not WINE, reason="no wine64")
-def test_windows(fmu: Unpacked) -> None:
-    library = fmu.folder / "library.dll"  # its name inside, by which life.exe asks for it
-    compile_library([*fmu.sources.glob("*.c")], library, "win64", OPTIONS)
-    command = windows.program(fmu.folder / "life.c", library, [f"-I{fmu.sources}"])
-    found = life.lived(command, fmu.description, windows.environment())
+def test_windows(fmu: Life, tmp_path: Path) -> None:
+    for name, content in sources(fmu.files).items():
+        (tmp_path / name).write_bytes(content)
+    files = sorted(tmp_path.glob("*.c"))
+    library = tmp_path / "library.dll"  # its name inside, by which life.exe asks for it
+    compile_library(files, library, "win64", (*OPTIONS, "-O0", "-fno-sanitize=all"))
+    shutil.copy(life.SOURCES[fmu.fmi], tmp_path / "life.c")
+    command = windows.program(tmp_path / "life.c", library, [f"-I{tmp_path}"])
+    found = fmu.lived(command, windows.environment())
     assert found == pytest.approx(fmu.here, rel=1e-13)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import random
 import re
-import shutil
 import subprocess
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -19,7 +18,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.programs.build import build_program, program_files
 from tests.programs import life
-from tests.programs.built import COMPILER, FLAGS, needs_compiler, program
+from tests.programs.built import COMPILER, FLAGS, needs_compiler, program, sources
 from tests.programs.comparison import differing, outputs, run
 
 pytestmark = needs_compiler
@@ -320,15 +319,11 @@ def test_its_memory_is_its_own(fmi: int, tmp_path: Path) -> None:
     """The life of two instances under the sanitizers for addresses and undefined behaviour."""
     scene = open_scene.load("closed-loop-direct", ("graphics.rate=30", "hold=passive"))
     files = program_files(scene, "program", fmi=fmi)
-    xml = files["modelDescription.xml"].decode()
-    for name, content in files.items():
-        if name.startswith("sources/"):
-            (tmp_path / Path(name).name).write_bytes(content)
-    shutil.copy(life.SOURCES[fmi], tmp_path)
-    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", *FLAGS]
-    command = [COMPILER, *flags, "-o", tmp_path / "life", *tmp_path.glob("*.c"), "-lm"]
-    made = subprocess.run(command, capture_output=True, text=True, check=False)
-    if "cannot find" in made.stderr:
+    flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", *FLAGS)
+    try:
+        made = life.made(str(COMPILER), sources(files), fmi, tmp_path, flags)
+    except subprocess.CalledProcessError as failed:
+        if "cannot find" not in failed.stderr:
+            raise AssertionError(failed.stderr) from failed
         pytest.skip("the compiler has no sanitizers")
-    assert made.returncode == 0, made.stderr
-    life.lived([tmp_path / "life"], xml)
+    life.lived([made], files["modelDescription.xml"].decode())

@@ -47,10 +47,15 @@ def browser() -> Iterator[Any]:
         yield opened
 
 
+@pytest.fixture(scope="module")
+def file(runs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "replay.html"
+    replay_page.write([Recorded(str(folder)) for folder in runs], path)
+    return path
+
+
 @pytest.fixture
-def page(browser: Any, runs: tuple[Path, Path], tmp_path: Path) -> Iterator[Page]:
-    file = tmp_path / "replay.html"
-    replay_page.write([Recorded(str(folder)) for folder in runs], file)
+def page(browser: Any, file: Path) -> Iterator[Page]:
     opened = Page(browser, file.as_uri(), dark=True)
     yield opened
     assert opened.faults == []
@@ -69,15 +74,15 @@ def seek(page: Page, t: float) -> None:
     page.until(f"Math.abs(view.t - {t}) < 1e-3")
 
 
-@pytest.mark.parametrize("t", [0.0, 0.3717, 0.99])
 def test_the_slider_moves_both_linkages_to_their_recorded_poses(
-    page: Page, runs: tuple[Path, Path], t: float
+    page: Page, runs: tuple[Path, Path]
 ) -> None:
-    seek(page, t)
-    for i, folder in enumerate(runs):
-        x, y, angle = page.get(f"view.frames[{i}].poses.link2")
-        place, turned = elbow(folder, t)
-        assert [x, y, angle] == pytest.approx([*place, turned], abs=2e-6)
+    for t in (0.0, 0.99, 0.3717):
+        seek(page, t)
+        for i, folder in enumerate(runs):
+            x, y, angle = page.get(f"view.frames[{i}].poses.link2")
+            place, turned = elbow(folder, t)
+            assert [x, y, angle] == pytest.approx([*place, turned], abs=2e-6)
 
 
 def test_a_run_that_has_ended_stays_at_its_last_pose_and_says_so(
@@ -125,8 +130,12 @@ def test_a_click_on_a_chart_or_lane_goes_to_its_time(page: Page) -> None:
     page.until("Math.abs(view.t - 0.3) < 0.02")
 
 
-@pytest.mark.parametrize("size", [(1600, 900), (800, 1000), (360, 640)])
-def test_nothing_is_cut_off_in_wide_and_narrow_windows(page: Page, size: tuple[int, int]) -> None:
+def test_nothing_is_cut_off_in_wide_and_narrow_windows(page: Page) -> None:
+    for size in ((1600, 900), (800, 1000), (360, 640)):
+        nothing_is_cut_off(page, size)
+
+
+def nothing_is_cut_off(page: Page, size: tuple[int, int]) -> None:
     page.page.set_viewport_size({"width": size[0], "height": size[1]})
     page.page.wait_for_timeout(200)
     assert page.get("document.documentElement.scrollWidth") <= size[0]
