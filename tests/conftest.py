@@ -19,6 +19,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+
+def pytest_xdist_auto_num_workers() -> int:
+    """A worker more than there are processors: for a quarter of their time tests wait, for other
+    processes, a browser or a deadline."""
+    return (os.cpu_count() or 1) + 1
+
+
 # pythonfmu is imported above from where it is installed: after a test in which FMPy runs a Python
 # FMU, it would be the copy of that FMU, whose folder is gone, and runs in this process could not
 # tell that theirs is the same.
