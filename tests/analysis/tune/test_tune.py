@@ -196,8 +196,9 @@ def pressed(name: str, pose: Pose, n: NDArray[np.float64], hertz: float, swing: 
 
 @pytest.mark.parametrize("name", ["closed-loop", "obstacles"])
 def test_pressing_gives_the_felt_stiffness(name: str) -> None:
-    """A constraint alone, and with a contact: n' x is n' X F, F the hand's; a run that does not swing is taken off, since the handle still
-    settles along a wall, which has a part at any frequency."""
+    """A constraint alone, and with a contact. n' x is n' X F, F the hand's; a run that does not
+    swing is taken off, since the handle still settles along a wall, which has a part at any
+    frequency."""
     found = recorded(name)
     pose = {pose.name: pose for pose in poses(found)}[found["felt_at"]]
     X = np.array(found["compliance"]) @ [1.0, 1j]
@@ -209,8 +210,9 @@ def test_pressing_gives_the_felt_stiffness(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["closed-loop", "telescope"])
 def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
-    """Where constraints limit the gains, and where contacts do, from 0.1 mm off rest: with all gains at 0.9 of the margin the handle comes to rest in every
-    pose, in a firm grip, at 1.1 of it in one it does not."""
+    """Where constraints limit the gains, and where contacts do. From 0.1 mm off rest: with all
+    gains at 0.9 of the margin the handle comes to rest in every pose, in a firm grip, at 1.1 of it
+    in one it does not."""
     found = recorded(name)
 
     def late(pose: Pose, share: float) -> float:
