@@ -38,8 +38,8 @@ class Running:
         self.p = self._flat(component.parameters, parameters or {})
         self.x = np.array(component.initialize(self.u, self.p)).ravel()
         self.t = 0.0
-        self._step = _on_own_memory(component.step)
-        self._substep = _on_own_memory(component.substep or component.step)
+        self._step = on_own_memory(component.step)
+        self._substep = on_own_memory(component.substep or component.step)
         self._outputs = {}
 
     @staticmethod
@@ -90,7 +90,7 @@ class Running:
         variables = [v for v in self.component.outputs if v.name in names]
         assert len(variables) == len(names), names
         if names not in self._outputs:
-            self._outputs[names] = _on_own_memory(self._output(variables))
+            self._outputs[names] = on_own_memory(self._output(variables))
         return self._named(variables, self._outputs[names](self.x, self.u, self.p, self.t))
 
     def _output(self, variables):
@@ -144,7 +144,7 @@ def order(errors, rates=RATES):
     return -np.polyfit(np.log(rates), np.log(errors), 1)[0]
 
 
-def _on_own_memory(function):
+def on_own_memory(function):
     """`function` of flat arrays, as a call that costs no conversion."""
     arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
     result = np.zeros(function.numel_out(0))

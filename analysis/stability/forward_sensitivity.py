@@ -113,10 +113,12 @@ class ForwardSensitivity:
         self._applied: dict[Any, Applied] = {}
 
     def forget(self, fmus: Container[str]) -> None:
-        """Slopes of these FMUs hold no longer, since parameters of theirs were changed."""
-        for key in list(self._known):
-            if isinstance(key[0], Repeat) or getattr(key[0], "fmu", None) in fmus:
-                del self._known[key]
+        """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
+        what they are told is the same with any."""
+        for operation, *ages in list(self._known):
+            own = isinstance(operation, Step | Get) and operation.fmu in fmus
+            if own or isinstance(operation, Repeat):
+                del self._known[operation, *ages]
 
     def begin(self) -> None:
         """A period begins, of which `slopes_by` tells."""
@@ -221,35 +223,37 @@ class ForwardSensitivity:
             if isinstance(operation, Set) or (np.abs(z[read] - slopes.at) <= wide).all():
                 return slopes, sizes
         exact, linear = self._exact(operation, template), self._linear(operation)
-        apart = np.zeros(len(written), bool)
         J, E = np.zeros((2, len(written), len(read)))
-        inert = [False] * len(read)
+        inert = np.zeros(len(read), bool)
         if known:  # what nothing reads, as outputs, has the slopes that it has anywhere
             coordinates = self._coordinates(key, state, template)
-            inert = [coordinates[i].inert for i in read]
+            inert = np.array([coordinates[i].inert for i in read])
             J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
-        inverse = {int(place): i for i, place in enumerate(read)}
-        for places, weights in self._directions(key, state, template, read[~np.array(inert)], z):
+        column = {int(place): i for i, place in enumerate(read)}
+        rest, sides, along = image[written], [], []
+        for places, weights in self._directions(key, state, template, read[~inert], z):
             d = STEP * max(1.0, float(np.abs(z[places]).max()))
-            sides = []
             for way in (d,) if linear else (d, -d):
                 shifted = z.copy()
                 shifted[places] += way * weights
                 state.put(template, shifted)
                 call(tick)
                 width = weights @ (shifted[places] - z[places])
-                sides.append((state.now()[written] - image[written]) / width)
-            columns = [inverse[int(place)] for place in places]
-            slope, error = (sides[0] + sides[-1]) / 2, (sides[0] - sides[-1]) / 2
+                sides.append((state.now()[written] - rest) / width)
+            direction = np.zeros(len(read))
+            direction[[column[int(place)] for place in places]] = weights
+            along.append(direction)
+        differ = np.zeros((len(written), len(along)), bool)
+        if along:
+            ways, of_read = np.array(sides).T, np.array(along)
+            ahead, behind = (ways, ways) if linear else (ways[:, ::2], ways[:, 1::2])
+            slope, error = (ahead + behind) / 2, (ahead - behind) / 2
             if exact is not None:
-                along = exact[:, columns] @ weights
-                slope, error, differ = decided(along, slope, error)
-                apart |= differ
-            J[:, columns] += np.outer(slope, weights)
-            E[:, columns] += np.outer(error, weights)
+                slope, error, differ = decided(exact @ of_read.T, slope, error)
+            J, E = J + slope @ of_read, E + error @ of_read
         state.restore(after)
         coordinates = self._coordinates(key, state, template)
-        names = frozenset(coordinates[i].variable for i in written[apart])
+        names = frozenset(coordinates[i].variable for i in written[differ.any(axis=1)])
         known.insert(0, Slopes(z[read], J, E, None if exact is None else names))
         return known[0], sizes
 
@@ -352,10 +356,11 @@ class ForwardSensitivity:
 
 
 def decided(
-    exact: Vector, slope: Vector, error: Vector
-) -> tuple[Vector, Vector, NDArray[np.bool_]]:
-    """Slopes and their errors from exact ones, and where they are by differences all the same."""
-    most = KINK * max(SMALL, np.abs(slope).max(initial=0.0))
+    exact: Matrix, slope: Matrix, error: Matrix
+) -> tuple[Matrix, Matrix, NDArray[np.bool_]]:
+    """Slopes and their errors, a column each direction, from exact ones, and where they are by
+    differences all the same."""
+    most = KINK * np.maximum(SMALL, np.abs(slope).max(axis=0, initial=0.0))
     differ = ~(np.abs(slope - exact) <= most) | (np.abs(error) > most)
     gap = slope - exact
     wider = ~differ & (np.abs(gap) > np.abs(error))

@@ -24,12 +24,10 @@ from hapticlink.visualization.figures import run_figures
 from hapticlink.visualization.figures.curves import STRETCHES, curve, extremes
 
 CASES = {
-    "closed-loop": [],
     "closed-loop-direct": ["graphics.rate=29.97", "graphics.align=tick"],
     "enclosure": ["coupling=jacobi"],
     "two-users": [],
     "push-disc": ["record.every=3"],
-    "obstacles": [],
 }
 
 

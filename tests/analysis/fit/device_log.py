@@ -3,6 +3,8 @@ handle, encoders that count, a force sensor with noise."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 import numpy as np
 
@@ -12,6 +14,7 @@ from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.component import Component
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import Hand
+from tests.blocks import on_own_memory
 
 PERIOD = 1 / 512
 FINER = 8
@@ -35,34 +38,34 @@ def recorded(device: Device, user: Hand, seconds: float, seed: int, noise: float
     motors = shaken(samples, seed)
     plant, user_block = haptic_device(device, encoders=True), hand(user)
     device_moves, arm_moves = _stepped(plant), _stepped(user_block)
+    settings = np.array(user_block.start_parameters)
     x, arm = _start(plant), None
     pose, wrench = np.zeros((samples, 3)), np.zeros((samples, 3))
-    size = sum(v.size for v in user_block.inputs)
+    size, force = sum(v.size for v in user_block.inputs), on_own_memory(user_block.output)
     for k in range(samples * FINER):
         t = k * PERIOD / FINER
-        state = np.asarray(x).ravel()
-        handle = state[:size]  # its true pose and velocity are the first states
+        handle = x[:size]  # its true pose and velocity are the first states
         if arm is None:
-            arm = user_block.initialize(handle, [*user_block.start_parameters])
-        F = np.asarray(user_block.output(arm, handle, [*user_block.start_parameters], t)).ravel()
+            arm = np.asarray(user_block.initialize(handle, settings)).ravel()
+        F = force(arm, handle, settings, t)
         sample, within = divmod(k, FINER)
         if not within:
-            pose[sample], wrench[sample] = state[6:9], F  # as the encoders count
+            pose[sample], wrench[sample] = x[6:9], F  # as the encoders count
         arm = arm_moves(arm, handle, t)
         x = device_moves(x, np.r_[motors[sample], F], t)
     sensor = np.random.default_rng(seed + 1).normal(0.0, noise, (samples, 3)) * [1, 1, 0.01]
     return Log(PERIOD, pose, motors, wrench + sensor)
 
 
-def _stepped(block: Component) -> ca.Function:
+def _stepped(block: Component) -> Callable[..., np.ndarray]:
     x, u, t = (
         ca.MX.sym("x", block.step.size1_in(0)),
         ca.MX.sym("u", block.step.size1_in(1)),
         ca.MX.sym("t"),
     )
     after = block.step(x, u, ca.DM([*block.start_parameters]), t, PERIOD / FINER)
-    return ca.Function("moved", [x, u, t], [after])
+    return on_own_memory(ca.Function("moved", [x, u, t], [after]))
 
 
-def _start(block: Component) -> ca.DM:
-    return block.initialize(ca.DM([*block.start_inputs]), ca.DM([*block.start_parameters]))
+def _start(block: Component) -> np.ndarray:
+    return np.asarray(block.initialize([*block.start_inputs], [*block.start_parameters])).ravel()

@@ -37,7 +37,7 @@ def test_it_is_the_one_at_which_the_run_rests(scene: str | Path, options: dict[s
     """Newton's method from the start of these scenes ends at others, which are unstable."""
     found = hl.equilibrium_stability(scene, options)
     assert isinstance(found, hl.Stability)
-    run = hl.run(scene, options | {"duration": 12.0}, figures=False)
+    run = hl.run(scene, options | {"duration": 8.0}, figures=False)
     x = run["virtual_mechanism.x"]
     assert np.abs(run["virtual_mechanism.qd"][-2:]).max() < 1e-3
     assert found.verdict == "stable"
@@ -46,14 +46,13 @@ def test_it_is_the_one_at_which_the_run_rests(scene: str | Path, options: dict[s
     assert np.abs(x[-1] - x[0]).max() > 1e-3
 
 
-@pytest.mark.parametrize("damping", [0.6, 0.7])
-def test_a_limit_cycle_that_divides_the_period_is_no_rest(damping: float) -> None:
+def test_a_limit_cycle_that_divides_the_period_is_no_rest() -> None:
     """A coupling beyond the limit of test_virtual_coupling.py shakes at half the haptic rate until
     the motors saturate: after the 16 ticks of a period each state is the same."""
     options = HELD | {
         "graphics.rate": 32,
         "hand.target": [[0.0, *POINT[:2], POINT[2] + 1e-3]],
-        "controller.teleoperation.damping": [70.0, 70.0, damping],
+        "controller.teleoperation.damping": [70.0, 70.0, 0.6],
     }
     run = hl.run("closed-loop", options | {"duration": 2.0}, figures=False)
     speed = run["virtual_mechanism.qd"][-17:, 3]

@@ -13,7 +13,7 @@ from hapticlink.analysis.stability import forward_sensitivity
 from tests.analysis.stability.own_hand import own_hand
 from tests.analysis.stability.test_stability import HELD
 
-Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 AMPLIFIED = 1000
 """Of the rounding of results of order 1, by mobilities of 400 1/kg on the way to them."""
 CASES = {
@@ -46,10 +46,10 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
     compared, worst = 0, 0.0
     decide = forward_sensitivity.decided
 
-    def watched(exact: Vector, slope: Vector, error: Vector) -> Any:
+    def watched(exact: Matrix, slope: Matrix, error: Matrix) -> Any:
         nonlocal compared, worst
         rounding = AMPLIFIED * np.finfo(float).eps / forward_sensitivity.STEP
-        allowed = np.abs(error) + rounding * max(1.0, np.abs(slope).max(initial=0.0))
+        allowed = np.abs(error) + rounding * np.maximum(1.0, np.abs(slope).max(axis=0, initial=0.0))
         has = np.isfinite(exact)
         compared += int(np.count_nonzero(exact[has]))
         worst = max(worst, (np.abs(slope - exact) / allowed)[has].max(initial=0.0))

@@ -32,7 +32,6 @@ from tests.analysis.stability.own_hand import linearised
 pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
 
 RECORDED = Path(__file__).parents[3] / "results" / "tune"
-TUNED = ("closed-loop", "enclosure", "obstacles", "serial", "telescope")
 NO_ENCODER = ("device.encoder_resolution=1e-12",)
 """The map has no quantisation."""
 
@@ -195,10 +194,11 @@ def pressed(name: str, pose: Pose, n: NDArray[np.float64], hertz: float, swing: 
     return np.array([(phase[:, None] * run[s][window]).mean(axis=0) for s in signals])
 
 
-@pytest.mark.parametrize("name", TUNED)
+@pytest.mark.parametrize("name", ["closed-loop", "obstacles"])
 def test_pressing_gives_the_felt_stiffness(name: str) -> None:
-    """n' x is n' X F, F the hand's; a run that does not swing is taken off, since the handle still
-    settles along a wall, which has a part at any frequency."""
+    """A constraint alone, and with a contact. n' x is n' X F, F the hand's; a run that does not
+    swing is taken off, since the handle still settles along a wall, which has a part at any
+    frequency."""
     found = recorded(name)
     pose = {pose.name: pose for pose in poses(found)}[found["felt_at"]]
     X = np.array(found["compliance"]) @ [1.0, 1j]
@@ -208,10 +208,11 @@ def test_pressing_gives_the_felt_stiffness(name: str) -> None:
         assert n @ x == pytest.approx(n @ X @ F, rel=0.03)
 
 
-@pytest.mark.parametrize("name", TUNED)
+@pytest.mark.parametrize("name", ["closed-loop", "telescope"])
 def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
-    """From 0.1 mm off rest: with all gains at 0.9 of the margin the handle comes to rest in every
-    pose, in a firm grip, at 1.1 of it in one it does not."""
+    """Where constraints limit the gains, and where contacts do. From 0.1 mm off rest: with all
+    gains at 0.9 of the margin the handle comes to rest in every pose, in a firm grip, at 1.1 of it
+    in one it does not."""
     found = recorded(name)
 
     def late(pose: Pose, share: float) -> float:
@@ -220,7 +221,7 @@ def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
             *gains(found, found["margins"]["tuned"] * share),
             *pose.options(()),
             *written({"hand": spring(off, pose.press, FIRM)}),
-            "duration=2.0",
+            "duration=1.5",
             *NO_ENCODER,
         ]
         run = hl.run(RECORDED / name / "tuned.toml", options, figures=False)
@@ -261,11 +262,10 @@ def test_slopes_of_operations_have_the_radius_of_the_whole_map() -> None:
     pose = poses(recorded("closed-loop"))[0]
     given = pose.options(("sensing=encoders", "graphics.rate=128"))
     with resting("closed-loop", given) as place:
-        for scale in (0.1, 1.0, 3.0):
-            period = place.period(dict.fromkeys(("drift", "topology"), scale))
-            whole = linearised(place.map, period.point)
-            radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (period.in_map, whole)]
-            assert radii[0] == pytest.approx(radii[1], rel=1e-6)
+        period = place.period(dict.fromkeys(("drift", "topology"), 3.0))
+        whole = linearised(place.map, period.point)
+        radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (period.in_map, whole)]
+        assert radii[0] == pytest.approx(radii[1], rel=1e-6)
 
 
 @pytest.mark.parametrize(

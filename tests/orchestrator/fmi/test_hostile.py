@@ -28,14 +28,12 @@ ACTS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("place", "act"), ACTS)
 @pytest.mark.parametrize(
-    ("fmi", "loop", "isolate"),
+    ("fmi", "loop", "isolate", "place", "act"),
     [
-        *((fmi, loop, "") for fmi in "23" for loop in LOOPS),
+        *((fmi, loop, "", *act) for fmi in "23" for loop in LOOPS for act in ACTS),
         # Python steps it in either loop, and its worker is the same for every version of FMI.
-        ("2", LOOPS[-1], ISOLATED),
-        ("3", "python", ISOLATED),
+        *(("2", LOOPS[-1], ISOLATED, *act) for act in ACTS),
     ],
 )
 def test_only_ok_and_warning_are_success(tmp_path, monkeypatch, fmi, loop, isolate, place, act):

@@ -130,7 +130,7 @@ def path_over(xs: list[float], steps: int) -> float:
 rates = st.sampled_from([(1, 1), (5, 1), (1, 5), (3, 2), (2, 7)])
 
 
-@settings(max_examples=120)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), rates, st.none() | st.integers(0, 30), st.booleans())
 def test_passive_makes_nothing_where_the_way_is_foreseen(seed, rates, least, known):
     """The theorem, its premise reaching over the latency: random forces and speeds, no latency, for
@@ -168,7 +168,7 @@ def test_passive_makes_nothing_where_the_way_is_foreseen(seed, rates, least, kno
     assert line.truth.energy(1.0).peak <= limit + 1e-9
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), rates, st.integers(0, 30), st.booleans())
 def test_what_passive_makes_of_white_noise_is_bounded(seed, rates, least, known):
     """White forces on white motions, foreseen or not: beside the swing's first time, only steps

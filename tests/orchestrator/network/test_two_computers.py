@@ -37,7 +37,7 @@ from tests.shared_fixtures import needs_compiled_loop, status
 pytest.importorskip("zmq")
 pytest.importorskip("msgpack")
 pytestmark = needs_compiled_loop
-OPTIONS = ("hold=foh", "duration=1.5")
+OPTIONS = ("hold=foh", "duration=0.75")
 SETS = [word for option in OPTIONS for word in ("--set", option)]
 
 
@@ -104,7 +104,7 @@ def test_recorded_arrivals_replay_a_run(
     with relay(folder, served, *network, 5, -1) as at:
         run = run_at(at, folder, out)
     assert run["fault"] is None
-    assert read_table(out / "haptics.csv").total == 769
+    assert read_table(out / "haptics.csv").total == 385
     assert replayed(out) == tables(out)
     sides, told = run["real_time"]["samples"]["graphics"], run["network"]["virtual_environment"]
     frames, samples = (

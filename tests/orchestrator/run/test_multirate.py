@@ -50,16 +50,11 @@ ROWS = {
 }
 
 LIMITS = [
-    ("linkage", 10, "tick", 152),
     ("linkage", 20, "tick", 561),
-    ("linkage", 30, "tick", 1186),
     ("linkage", 60, "tick", 1199),
     ("linkage", 512, "tick", 2487),
     ("sprung", 10, "tick", 181),
-    ("sprung", 20, "tick", 528),
-    ("sprung", 30, "tick", 1071),
     ("sprung", 60, "tick", 1122),
-    ("sprung", 512, "tick", 2559),
     ("sprung", 60, "exact", 1004),
 ]
 """Linkage, graphics rate (Hz), alignment of its frames, and the limit (N/m)."""
