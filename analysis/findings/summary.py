@@ -166,6 +166,7 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
             "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
         )
     yield from replaced(record.replaced)
+    yield from _lacking(results)
     yield from unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
         yield (
@@ -354,6 +355,23 @@ def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:
             yield f"{name}: inputs that nothing feeds: {', '.join(unfed)}"
         if lost and unfed:
             yield f"{name}: --map 'PORT={unfed[0]}', with a port of {name}, connects such an input"
+
+
+LACKED = {
+    WORKSPACE_MARGIN: "that the handle leaves its workspace is not seen",
+    MECHANISM_ENERGY: "there is no energy at the user's port",
+}
+"""What is not known of a run without an output of one of the blocks."""
+
+
+def _lacking(results: Results) -> Iterator[str]:
+    """A line for each such output that an FMU in the place of a block does not have."""
+    record, window = results.record, next(results.windows())
+    for signal, what in LACKED.items():
+        name, _, output = signal.partition(".")
+        there = signal in record.not_recorded or of_block(window, signal)
+        if name in record.replaced and not there:
+            yield f"{name} has no {output}: {what}"
 
 
 def _start(run: Results) -> Iterator[str]:

@@ -84,8 +84,10 @@ def as_typed(option: str) -> str:
         names, value = parse(option)
     except InputFault:
         names, value = (), None
-    if names == ("fmu", "+") and isinstance(value, dict) and value.keys() == {"replaces", "path"}:
-        return f"--swap {value['replaces']}={value['path']}"
+    if names == ("fmu", "+") and isinstance(value, dict):
+        by = value.get("path") or value.get("engine")
+        if by and len(value) == 2 and "replaces" in value:
+            return f"--swap {value['replaces']}={by}"
     return f"--set {option}"
 
 

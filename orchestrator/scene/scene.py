@@ -27,7 +27,7 @@ from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkag
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.base.plain_data import plain
-from hapticlink.orchestrator.base.signal_names import DEVICE, WORKSPACE_MARGIN
+from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
@@ -142,7 +142,7 @@ class Scene:
     [local model](local-model.md)."""
     stop_when: str | None = None
     """Comparison of a signal with a number that ends the run early, without an error. By default
-    "haptic_device.workspace_margin < 0" if there is a device; "" for never."""
+    "haptic_device.workspace_margin < 0" if the device has that output; "" for never."""
     haptics: Haptics = field(default_factory=Haptics)
     """The fast rate."""
     graphics: Graphics | None = None
@@ -241,8 +241,7 @@ class Scene:
     def ends_when(self) -> str:
         """The condition that ends the run, its default included; "" where there is none."""
         if self.stop_when is None:
-            own = self.device and all(f.replaces != DEVICE for f in self.fmu)
-            return f"{WORKSPACE_MARGIN} < 0" if own else ""
+            return f"{WORKSPACE_MARGIN} < 0" if self.device else ""
         return self.stop_when
 
 

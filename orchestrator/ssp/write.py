@@ -199,7 +199,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     tables = pydantic.TypeAdapter(Scene).dump_python(
         scene, mode="json", by_alias=True, exclude_none=True, include=keys
     )
-    tables["stop_when"] = scene.ends_when
+    tables["stop_when"] = scene.ends_when if system.ends_when else ""
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
     tables["holds"] = {**scene.holds, **own}
     rates = blocks(scene).rates

@@ -45,7 +45,10 @@ def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
     """Problems unless the FMU is a file, a block to build or one by an engine."""
     if fmu.engine is not None:
         if fmu.replaces not in SHARED:
-            yield (*path, "engine"), f"it is the engine of {' and '.join(SHARED)}: give `replaces`"
+            file = f"give `path`, an FMU with the ports of {fmu.replaces}"
+            remedy = file if fmu.replaces else "say which by `replaces`"
+            can_be = f"{fmu.engine} can be {' and '.join(SHARED)} alone"
+            yield (*path, "engine"), f"{can_be}: {remedy}"
         for key in ("path", "block", "settings"):
             if getattr(fmu, key):
                 yield (

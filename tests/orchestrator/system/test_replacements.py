@@ -65,6 +65,7 @@ def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path, own_files, own
     swapped = hl.run("closed-loop", swap, out=tmp_path, figures=False)
     assert swapped.run["replaced"] == {block: {"lost": [], "unfed": [], "mapped": {}}}
     assert swapped.run["connections"] == own_run.run["connections"]
+    assert swapped.run["stop_when"] == own_run.run["stop_when"] != ""
     assert tables_of(own_run.folder) == tables_of(tmp_path)
 
 
@@ -120,6 +121,7 @@ def test_ports_are_held_as_those_of_the_block_and_carry_its_power(tmp_path):
     swaps = [f'fmu.+={{replaces="{name}", path="{file}"}}' for name, file in files.items()]
     with built(open_scene.load("closed-loop", ["controller.topology=false", *swaps])) as system:
         about = {name: system.fmu[name].description for name in files}
+        assert system.ends_when is None  # this device has no workspace_margin
     assert about["virtual_environment"].kinds == {"Lambda_inv": "semidefinite"}  # P_c has 4 entries
     rates = {f"x[{i}]": f"v[{i}]" for i in (1, 2, 3)}
     assert about["virtual_environment"].derivatives == rates
