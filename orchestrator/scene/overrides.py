@@ -84,10 +84,9 @@ def as_typed(option: str) -> str:
         names, value = parse(option)
     except InputFault:
         names, value = (), None
-    if names == ("fmu", "+") and isinstance(value, dict):
-        by = value.get("path") or value.get("engine")
-        if by and len(value) == 2 and "replaces" in value:
-            return f"--swap {value['replaces']}={by}"
+    swaps = (["replaces", "path"], ["replaces", "engine"])
+    if names == ("fmu", "+") and isinstance(value, dict) and [*value] in swaps:
+        return f"--swap {'='.join(map(str, value.values()))}"
     return f"--set {option}"
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from hapticlink.orchestrator.base.errors import SceneFault
-from hapticlink.orchestrator.base.signal_names import DEVICE, HAND
+from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.scene.blocks import Blocks
@@ -65,7 +65,7 @@ def from_scene(
     problems += checks.iterated(scene, fmus, assigned)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
-        if scene.stop_when is not None or DEVICE not in replaced:
+        if scene.stop_when is not None:
             problems.append((("stop_when",), f"{condition}: there is no such output"))
         condition = None
     changes = timed_events.changes(scene, fmus, assigned, timeline, rules, problems)
