@@ -10,7 +10,8 @@ J is that of central differences of 1e-6 max(1, |z|) of the operation itself, E 
 difference of its slopes to both sides; copies and holds without a regime have one side and E = 0.
 For a doStep and a get of an FMU with a graph, J
 is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
-have a slope in one way only, or another one to each side, keep those by differences. Slopes at the
+have a slope in one way only, or another one to each side, keep those by differences. The graph is
+evaluated at all points of these at once, where at z it has the result of the FMU. Slopes at the
 same numbers, with the same age of samples, are the same, so that around a state of rest each
 operation is differentiated once.
 """
@@ -18,8 +19,8 @@ operation is differentiated once.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Container, Iterator
-from dataclasses import dataclass
+from collections.abc import Container
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -67,11 +68,12 @@ SAME = 1e-8
 @dataclass(frozen=True)
 class Reach:
     """What an operation touches: the state of its FMUs and holds, and which signals it reads and
-    writes."""
+    writes; and by the ages of samples what it does since `begin`."""
 
     state: StateVector
     reads: NDArray[np.intp]
     writes: NDArray[np.intp]
+    applied: dict[Any, Applied] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,6 @@ class ForwardSensitivity:
         self._apart: dict[str, frozenset[str] | None] = {}
         self._graphs: dict[str, GraphSlopes | None] = {}
         self._named: dict[Any, list[Coordinate]] = {}
-        self._applied: dict[Any, Applied] = {}
 
     def forget(self, fmus: Container[str]) -> None:
         """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
@@ -123,7 +124,8 @@ class ForwardSensitivity:
     def begin(self) -> None:
         """A period begins, of which `slopes_by` tells."""
         self._apart.clear()
-        self._applied.clear()
+        for reach in filter(None, self._reach.values()):
+            reach.applied.clear()
 
     def slopes_by(self) -> dict[str, str]:
         """By FMU, where its slopes since `begin` are from."""
@@ -138,27 +140,30 @@ class ForwardSensitivity:
 
     def applied(self, tick: int, operation: Instruction, call: Call) -> Applied | None:
         """Carries out an operation of a co-simulation at rest, in which its slopes depend on the
-        ages of samples alone."""
+        ages of samples alone; one of an FMU only where these are not known yet."""
         if isinstance(operation, Finish):
             return None
-        call = self._alone(operation, call)
         reach = self._of(operation)
         if reach is None:
             call(tick)
             return None
-        key = operation, reach.state.ages(lambda kept: _ages(kept, tick))
-        if key in self._applied:
-            if not isinstance(operation, Get | Set | Step):  # at rest those change nothing
-                call(tick)
-            return self._applied[key]
+        of_fmu = isinstance(operation, Get | Set | Step)
+        ages = () if of_fmu else reach.state.ages(lambda kept: _ages(kept, tick))
+        found = reach.applied.get(ages)
+        if found and of_fmu:  # at rest it would change nothing
+            return found
+        call = self._alone(operation, call)
+        if found:
+            call(tick)
+            return found
         owners = tuple(o for o in reach.state.owners if o != SIGNALS)
         before = reach.state.sizes()
-        of_fmu = isinstance(operation, Get | Set | Step)
-        found, after = self._slopes(tick, operation, call, reach, SAME if of_fmu else NEARBY)
-        self._tell(operation, reach, found)
+        same = SAME if of_fmu else NEARBY
+        slopes, after = self._slopes(tick, operation, call, reach, same)
+        self._tell(operation, reach, slopes)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
-        self._applied[key] = made = Applied(
-            operation, owners, counts, tuple(after), reach.reads, reach.writes, found.J, found.E
+        reach.applied[ages] = made = Applied(
+            operation, owners, counts, tuple(after), reach.reads, reach.writes, slopes.J, slopes.E
         )
         return made
 
@@ -222,60 +227,67 @@ class ForwardSensitivity:
         for slopes in known:
             if isinstance(operation, Set) or (np.abs(z[read] - slopes.at) <= wide).all():
                 return slopes, sizes
-        exact, linear = self._exact(operation, template), self._linear(operation)
-        J, E = np.zeros((2, len(written), len(read)))
         inert = np.zeros(len(read), bool)
         if known:  # what nothing reads, as outputs, has the slopes that it has anywhere
             coordinates = self._coordinates(key, state, template)
-            inert = np.array([coordinates[i].inert for i in read])
-            J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
-        column = {int(place): i for i, place in enumerate(read)}
-        rest, sides, along = image[written], [], []
-        for places, weights in self._directions(key, state, template, read[~inert], z):
-            d = STEP * max(1.0, float(np.abs(z[places]).max()))
-            for way in (d,) if linear else (d, -d):
-                shifted = z.copy()
-                shifted[places] += way * weights
-                state.put(template, shifted)
-                call(tick)
-                width = weights @ (shifted[places] - z[places])
-                sides.append((state.now()[written] - rest) / width)
-            direction = np.zeros(len(read))
-            direction[[column[int(place)] for place in places]] = weights
-            along.append(direction)
-        differ = np.zeros((len(written), len(along)), bool)
-        if along:
-            ways, of_read = np.array(sides).T, np.array(along)
-            ahead, behind = (ways, ways) if linear else (ways[:, ::2], ways[:, 1::2])
-            slope, error = (ahead + behind) / 2, (ahead - behind) / 2
-            if exact is not None:
-                slope, error, differ = decided(exact @ of_read.T, slope, error)
-            J, E = J + slope @ of_read, E + error @ of_read
+            inert = np.array([coordinates[i].inert for i in read], bool)
+
+        def carried(point: Vector) -> Vector:
+            state.put(template, point)
+            call(tick)
+            return state.now()[written]
+
+        along = self._directions(key, state, template, read[~inert], z)
+        widths = STEP * np.maximum(1.0, np.abs(np.where(along != 0.0, z, 0.0)).max(axis=1))
+        ways = (1.0,) if self._linear(operation) else (1.0, -1.0)
+        points = [z + way * widths[:, None] * along for way in ways]
+        exact, images = None, None
+        if found := self._in_graph(operation, template, np.vstack([z, *points])[:, read]):
+            (unmoved, *moved), exact = found
+            if (np.abs(unmoved - image[written]) <= SAME * np.maximum(1.0, np.abs(unmoved))).all():
+                images = np.split(np.array(moved), len(ways))
+        if images is None:
+            images = [np.array([*map(carried, each)]).reshape(-1, len(written)) for each in points]
         state.restore(after)
+        sides = [
+            (moved - image[written]).T / ((each - z) * along).sum(axis=1)
+            for each, moved in zip(points, images, strict=True)
+        ]
+        slope, error = (sides[0] + sides[-1]) / 2, (sides[0] - sides[-1]) / 2
+        along, apart = along[:, read], np.zeros(slope.shape, bool)
+        if exact is not None:
+            slope, error, apart = decided(exact @ along.T, slope, error)
+        J, E = slope @ along, error @ along
+        if known:
+            J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
         coordinates = self._coordinates(key, state, template)
-        names = frozenset(coordinates[i].variable for i in written[differ.any(axis=1)])
+        names = frozenset(coordinates[i].variable for i in written[apart.any(axis=1)])
         known.insert(0, Slopes(z[read], J, E, None if exact is None else names))
         return known[0], sizes
 
-    def _exact(self, operation: Instruction, before: Template) -> Matrix | None:
-        """J of a doStep or a get of an FMU with a graph."""
+    def _in_graph(
+        self, operation: Instruction, before: Template, own: Matrix
+    ) -> tuple[Matrix, Matrix] | None:
+        """What a doStep or a get of an FMU with a graph makes of its numbers, a row for each point,
+        and J at the first."""
         if not isinstance(operation, Step | Get):
             return None
-        fmu = operation.fmu
-        description = self._simulation.system.fmu[fmu].description
+        fmu, system = operation.fmu, self._simulation.system
+        description = system.fmu[fmu].description
+        scene = self.closures.scene if self.closures else None
         if fmu not in self._graphs:
-            scene = self.closures.scene if self.closures else None
             self._graphs[fmu] = graph_slopes(description, fmu, scene)
-        graph = self._graphs[fmu]
+        graph, state = self._graphs[fmu], doubles(before.fmus[fmu])
         if graph is None:
             return None
         if isinstance(operation, Step):
             # Not the difference of the FMU's times: at rest most of its steps are left out.
-            seconds = self._simulation.system.timeline.seconds(operation.dticks) / operation.parts
-            return graph.step(doubles(before.fmus[fmu]), seconds)
-        J, outputs = graph.get(doubles(before.fmus[fmu])), description.outputs
-        ranks = np.argsort(np.argsort([s.reference for s in outputs]))
-        return np.vstack([J, J[graph.n_u + ranks]])
+            seconds = system.timeline.seconds(operation.dticks) / operation.parts
+            return graph.step(state, own, seconds)
+        images, J = graph.get(state, own)
+        ranks = np.argsort(np.argsort([s.reference for s in description.outputs]))
+        rows = np.concatenate([np.arange(len(J)), graph.n_u + ranks])
+        return images[:, rows], J[rows]
 
     def _coordinates(self, key: Any, state: StateVector, template: Any) -> list[Coordinate]:
         if key not in self._named:
@@ -284,16 +296,14 @@ class ForwardSensitivity:
 
     def _directions(
         self, key: Any, state: StateVector, template: Any, read: NDArray[np.intp], z: Vector
-    ) -> Iterator[tuple[NDArray[np.intp], Vector]]:
-        """The numbers that a direction moves, and by how much."""
+    ) -> Matrix:
+        """The directions in which the numbers z are moved, a row each."""
         coordinates = self._coordinates(key, state, template)
         free = np.array([i for i in read if not discrete(coordinates[i])], dtype=np.intp)
         if not self.closures:
-            yield from ((free[i : i + 1], np.ones(1)) for i in range(len(free)))
-            return
-        for along in self.closures.directions(coordinates, free, z):
-            places = np.flatnonzero(along)
-            yield places, along[places]
+            return np.eye(len(z))[free]
+        along = [*self.closures.directions(coordinates, free, z)]
+        return np.array(along).reshape(-1, len(z))
 
     def _places(self, reach: Reach, template: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Of the numbers of a saved state: which an operation reads, and which it writes."""

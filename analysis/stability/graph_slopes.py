@@ -60,66 +60,72 @@ def _read(path: Path, guid: str) -> GraphSlopes | None:
         if FUNCTIONS not in archive.namelist():
             return None
         texts, about = (json.loads(archive.read(name)) for name in (FUNCTIONS, ABOUT))
-    functions = {name: ca.Function.deserialize(text) for name, text in texts.items()}
-    return GraphSlopes(functions, about["timing"] == "sampled", about["substeps"])
+    texts.pop("initialize", "")
+    return _deserialized(tuple(texts.items()), about["timing"] == "sampled", about["substeps"])
+
+
+@lru_cache(KEPT)
+def _deserialized(texts: tuple[tuple[str, str], ...], sampled: bool, substeps: int) -> GraphSlopes:
+    """Once for all FMUs that differ in their start alone, as in other poses."""
+    functions = {name: ca.Function.deserialize(text) for name, text in texts}
+    return GraphSlopes(functions, sampled, substeps)
 
 
 class GraphSlopes:
-    """The slopes of an FMU with these `functions`, of what it keeps: inputs u, outputs y, states x.
-    `before` is its serialised state, which ends with (time, u, p, y, x)."""
+    """The map and the slopes of an FMU with these `functions`, of what it keeps: inputs u, outputs
+    y, states x. `before` is its serialised state, which ends with (time, u, p, y, x); `own` are
+    numbers (u, y, x) in its place, a row for each point, the first of which has the slopes."""
 
     def __init__(self, functions: dict[str, ca.Function], sampled: bool, substeps: int) -> None:
         advance, output = functions["advance"], functions["output"]
         x, u, p, t, h, end, _ = advance.sx_in()
         y, shared = output(x, u, p, t)
         after, y_end, _ = advance(x, u, p, t, h, end, shared)
-        self._sampled, self._others = sampled, substeps - 1
+        kept = ca.SX.sym("y", y.numel())
+        self._sampled, self._others, before = sampled, substeps - 1, ca.vertcat(u, kept, x)
         self._n = [s.numel() for s in (t, u, p, y, x)]
-        self._advance = _jacobian([x, u, p, t, h, end], [after, y_end])
-        self._output = None if sampled else _jacobian([x, u, p, t], [y])
+        self._advance = _mapped([before, p, t, h, end], ca.vertcat(u, y_end, after))
+        got = before if sampled else ca.vertcat(u, y, x)
+        self._output = _mapped([before, p, t], got)
         if self._others:
-            self._substep = _jacobian([x, u, p, t, h], [functions["substep"](x, u, p, t, h)])
+            further = ca.vertcat(u, kept, functions["substep"](x, u, p, t, h))
+            self._substep = _mapped([before, p, t, h, end], further)
 
     @property
     def n_u(self) -> int:
         return self._n[1]
 
-    def step(self, before: Vector, seconds: float) -> Matrix:
-        """d(u, y, x after)/d(u, y, x before) of a doStep over so many seconds."""
-        (time,), u, p, y, x = self._parts(before)
-        end, n = float(time) + seconds, self._others + 1
-        size, J = seconds / n, np.eye(len(x), len(x) + len(u))  # dx/d(x, u)
-        of_u = np.eye(len(u), len(x) + len(u), len(x))
-        dy = np.zeros((len(y), len(x) + len(u)))
+    def step(self, before: Vector, own: Matrix, seconds: float) -> tuple[Matrix, Matrix]:
+        """The numbers after a doStep over so many seconds, and d(u, y, x after)/d(u, y, x)."""
+        (time,), _, p, *_ = self._parts(before)
+        n, J = self._others + 1, np.eye(own.shape[1])
         for k in range(n):
-            if whole := k == (0 if self._sampled else n - 1):
-                x, _, slopes = self._advance(x, u, p, time + k * size, size, end)
-            else:
-                x, slopes = self._substep(x, u, p, time + k * size, size)
-            moved = np.asarray(slopes) @ np.vstack([J, of_u])
-            J = moved[: len(J)]
-            dy = moved[len(J) :] if whole else dy
-        return self._arranged(dy, J)
+            whole = k == (0 if self._sampled else n - 1)
+            when = time + k * (seconds / n), seconds / n, time + seconds
+            own, slopes = _at(self._advance if whole else self._substep, own, p, *when)
+            J = slopes @ J if k else slopes
+        return own, J
 
-    def get(self, before: Vector) -> Matrix:
-        """d(u, y, x)/d(u, y, x) of reading all outputs, which a plant evaluates anew."""
-        (time,), u, p, y, x = self._parts(before)
-        if self._output is None:
-            return np.eye(len(u) + len(y) + len(x))
-        slopes = np.asarray(self._output(x, u, p, time)[1])
-        return self._arranged(slopes, np.eye(len(x), len(x) + len(u)))
+    def get(self, before: Vector, own: Matrix) -> tuple[Matrix, Matrix]:
+        """As `step`, of reading all outputs, which a plant evaluates anew."""
+        (time,), _, p, *_ = self._parts(before)
+        return _at(self._output, own, p, time)
 
     def _parts(self, state: Vector) -> list[Vector]:
         return np.split(state[-sum(self._n) :], np.cumsum(self._n)[:-1])
 
-    def _arranged(self, y: Matrix, x: Matrix) -> Matrix:
-        """Slopes of (u, y, x) by (u, y, x), from those of y and x by (x, u)."""
-        n, m = len(x), y.shape[1] - len(x)
-        rows = np.vstack([np.eye(m, n + m, n), y, x])
-        return np.hstack([rows[:, n:], np.zeros((len(rows), len(y))), rows[:, :n]])
+
+_Mapped = tuple[ca.Function, ca.Function]
 
 
-def _jacobian(arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
-    """The results, and their Jacobian by the first two arguments, x and u."""
-    slopes = ca.jacobian(ca.vertcat(*results), ca.vertcat(*arguments[:2]))
-    return ca.Function("slopes", arguments, [*results, ca.densify(slopes)])
+def _mapped(arguments: list[ca.SX], result: ca.SX) -> _Mapped:
+    """A function, and its Jacobian by the first argument."""
+    slopes = ca.densify(ca.jacobian(result, arguments[0]))
+    values = ca.Function("values", arguments, [ca.densify(result)])
+    return values, ca.Function("slopes", arguments, [slopes])
+
+
+def _at(mapped: _Mapped, own: Matrix, *others: Vector | float) -> tuple[Matrix, Matrix]:
+    """The results at the rows of `own`, and the Jacobian at the first one."""
+    values, slopes = mapped
+    return np.asarray(values(own.T, *others)).T, np.asarray(slopes(own[0], *others))

@@ -50,6 +50,7 @@ def hand_slopes(spec: Hand, T: float) -> HandSlopes:
     size = PORTS + n_x
     step, got = np.eye(size), np.eye(size)
     step[6:] = got[6:] = 0.0
-    for J, slopes in ((step, graph.step(state, T)), (got, graph.get(state))):
+    at = np.zeros((1, len(places)))
+    for J, (_, slopes) in ((step, graph.step(state, at, T)), (got, graph.get(state, at))):
         J[np.ix_(places, places)] = slopes
     return HandSlopes(step, np.vstack([got, got[6:PORTS]]))

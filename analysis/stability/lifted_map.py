@@ -24,10 +24,11 @@ from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.plan.operations import Event, Operation, Record, StopWhen
+from hapticlink.orchestrator.plan.operations import Event, Operation, Record, Repeat, StopWhen
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.bind_operations import Binder, Bound
+from hapticlink.orchestrator.run.instructions import Feed, Move, Sample
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -114,18 +115,23 @@ class LiftedMap:
         interrupt.check()
         return self._numbers()
 
-    def recorded(self, point: Vector) -> tuple[float, list[list[Applied]]]:
-        """What each event of the period does to perturbations of a state at rest, and the largest
-        change of a state or input of an FMU within PINNED events, relative to max(1, |z|). The FMUs
-        are put back to rest after these, so that nothing grows meanwhile."""
+    def recorded(self, point: Vector) -> tuple[float, list[tuple[Applied, ...]]]:
+        """What each event of the period does to perturbations of a state at rest, equal ones as the
+        same object; and the largest change of a state or input of an FMU within PINNED events,
+        relative to max(1, |z|). The FMUs are put back to rest after these, so that nothing grows
+        meanwhile."""
         self._state.put(self._template, point)
         self._sensitivity.begin()
-        moving, moved = self.moving, 0.0
-        events = []
+        moving, moved, ran = self.moving, 0.0, False
+        events, known = [], dict[tuple[int, ...], tuple[Applied, ...]]()
         for k, (tick, event) in enumerate(self._moments):
             each = (self._sensitivity.applied(tick, *both) for both in self._instructions(event))
-            events.append([applied for applied in each if applied])
-            if k % PINNED == PINNED - 1 or k == self.events - 1:
+            acting = tuple(applied for applied in each if applied)
+            key = tuple(map(id, acting))
+            ran = ran or key not in known or any(isinstance(a.operation, Repeat) for a in acting)
+            events.append(known.setdefault(key, acting))
+            if (k % PINNED == PINNED - 1 and ran) or k == self.events - 1:
+                ran = False
                 numbers = self._state.now()
                 change = np.abs(numbers[moving] - point[moving])
                 moved = max(moved, (change / np.maximum(1.0, np.abs(point[moving]))).max(initial=0))
@@ -205,15 +211,16 @@ class LiftedMap:
             call(tick)
 
     def _instructions(self, kind: Event) -> Bound:
-        """The operations of a kind of event, without those that write rows or end a run, and their
-        calls."""
+        """The operations of a kind of event, without those that write rows, measure energy or end a
+        run, and their calls."""
         if kind not in self._bound:
             operations: list[Operation] = [
                 operation
                 for operation in self._plan.block(kind)
                 if not isinstance(operation, Record | StopWhen)
             ]
-            self._bound[kind] = self._binder.instructions(operations)
+            bound = self._binder.instructions(operations)
+            self._bound[kind] = [b for b in bound if not isinstance(b[0], Sample | Move | Feed)]
         return self._bound[kind]
 
 

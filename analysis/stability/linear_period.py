@@ -13,6 +13,7 @@ matrices of its own doStep and get: one recorded period serves every hand.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -45,11 +46,16 @@ class Act:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """An event: C and E of the rows that are read later by those `before` it."""
+    """An event, or several that follow each other: C and E of the rows that are read later by those
+    `before` it."""
 
     before: Rows
     C: Matrix
     E: Matrix
+
+    def then(self, later: _Step) -> _Step:
+        """This and a `later` one as one."""
+        return _Step(self.before, later.C @ self.C, later.C @ self.E + later.E @ self.C)
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,7 @@ class LinearPeriod:
     moved: float
     """The largest change of a state or input within a few events, relative to max(1, |z|)."""
     events: tuple[tuple[Act, ...], ...]
+    """Equal ones are the same object."""
     rows: int
     sources: Mapping[Act, tuple[type, str]]
     """Of the acts of FMUs: doStep, get or set, and the FMU."""
@@ -111,17 +118,17 @@ class LinearPeriod:
         return self._with(made, rows)
 
     def _with(self, made: Mapping[Act, Act], rows: int) -> LinearPeriod:
-        events = tuple(tuple(made.get(act, act) for act in event) for event in self.events)
+        kinds = {id(event): event for event in self.events}
+        others = {k: tuple(made.get(act, act) for act in event) for k, event in kinds.items()}
+        events = tuple(others[id(event)] for event in self.events)
         sources = {made.get(act, act): source for act, source in self.sources.items()}
         return replace(self, events=events, rows=rows, sources=sources)
 
     @cached_property
     def linear(self) -> Linearisation:
         """The linearisation over the coordinates that act on themselves."""
-        taken = self._steps[0].before
-        A, D = np.eye(len(taken)), np.zeros((len(taken), len(taken)))
-        for step in self._steps:
-            A, D = step.C @ A, step.C @ D + step.E @ A
+        whole = _product(self._steps)
+        taken, A, D = whole.before, whole.C, whole.E
         kept = ~constant(A, np.ones(len(A), dtype=bool))
         V = np.zeros((self.rows, np.count_nonzero(kept)))
         V[taken[kept], np.arange(V.shape[1])] = 1.0
@@ -171,17 +178,18 @@ class LinearPeriod:
     @cached_property
     def _steps(self) -> list[_Step]:
         """The events, between the coordinates that are read later."""
-        live = [np.flatnonzero(rows) for rows in self._live()]
-        known: dict[tuple[tuple[int, ...], bytes, bytes], _Step] = {}
+        live = self._live()
+        known: dict[tuple[int, bytes, bytes], _Step] = {}
         steps = []
-        for event, start, end in zip(self.events, live[:-1], live[1:], strict=True):
-            key = tuple(map(id, event)), start.tobytes(), end.tobytes()
+        for event, (start, end) in zip(self.events, pairwise(live), strict=True):
+            key = id(event), start, end
             if key not in known:
-                known[key] = self._product(event, start, end)
+                both = (np.flatnonzero(np.frombuffer(rows, bool)) for rows in (start, end))
+                known[key] = self._step(event, *both)
             steps.append(known[key])
         return steps
 
-    def _product(self, event: Sequence[Act], start: Rows, end: Rows) -> _Step:
+    def _step(self, event: Sequence[Act], start: Rows, end: Rows) -> _Step:
         X, D = np.zeros((2, self.rows, len(start)))
         X[start, np.arange(len(start))] = 1.0
         for act in event:
@@ -189,21 +197,37 @@ class LinearPeriod:
             X[act.into], D[act.into] = act.J @ x, act.J @ d + act.E @ x
         return _Step(start, X[end], D[end])
 
-    def _live(self) -> list[NDArray[np.bool_]]:
+    def _live(self) -> list[bytes]:
         """Which rows are read before they are overwritten, from the start of each event on, and
         behind the last one."""
-        known: dict[tuple[tuple[int, ...], bytes], NDArray[np.bool_]] = {}
+        known: dict[tuple[int, bytes], bytes] = {}
         live = np.ones(self.rows, dtype=bool)
         while True:
-            starts = [live]
+            starts = [live.tobytes()]
             for event in reversed(self.events):
-                key = tuple(map(id, event)), starts[-1].tobytes()
+                key = id(event), starts[-1]
                 if key not in known:
-                    known[key] = _before(event, starts[-1])
+                    known[key] = _before(event, np.frombuffer(starts[-1], bool)).tobytes()
                 starts.append(known[key])
-            if (starts[-1] == live).all():
+            if starts[-1] == starts[0]:
                 return starts[::-1]
-            live = starts[-1] & live
+            live &= np.frombuffer(starts[-1], bool)
+
+
+def _product(steps: Sequence[_Step]) -> _Step:
+    """All steps as one. The pair that follows each other most often is multiplied once for all its
+    places, again and again, so that equal frames share their products, and equal steps powers."""
+    while len(steps) > 1:
+        (first, later), _ = Counter(pairwise(steps)).most_common(1)[0]
+        both, merged = first.then(later), list[_Step]()
+        for step in steps:
+            # A product cannot be the first of this pair: each is new.
+            if merged and merged[-1] is first and step is later:
+                merged[-1] = both
+            else:
+                merged.append(step)
+        steps = merged
+    return steps[0]
 
 
 def _before(event: Sequence[Act], live: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -220,7 +244,8 @@ def linear_period(map_: LiftedMap, point: Vector) -> LinearPeriod:
     """The period of the map from a `point` on at which it rests."""
     moved, events = map_.recorded(point)
     sizes: dict[str, int] = dict(map_.sizes())
-    for applied in (a for event in events for a in event):
+    kinds = {id(event): event for event in events}
+    for applied in chain.from_iterable(kinds.values()):
         for owner, *both in zip(applied.owners, applied.before, applied.after, strict=True):
             sizes[owner] = max(sizes[owner], *both)
     places = np.concatenate([[0], np.cumsum(list(sizes.values()))])
@@ -242,11 +267,12 @@ def linear_period(map_: LiftedMap, point: Vector) -> LinearPeriod:
                 sources[new] = type(applied.operation), applied.operation.fmu
         return made[id(applied)]
 
-    acts = tuple(tuple(map(act, event)) for event in events)
+    acts = {k: tuple(map(act, event)) for k, event in kinds.items()}
     order = np.concatenate(
         [np.arange(first[owner], first[owner] + n) for owner, n in map_.sizes().items()]
     ).astype(np.intp)
-    return LinearPeriod(map_, point, moved, acts, int(places[-1]), sources, first, order)
+    period = tuple(acts[id(event)] for event in events)
+    return LinearPeriod(map_, point, moved, period, int(places[-1]), sources, first, order)
 
 
 def _rows(applied: Applied, first: Mapping[str, int], counts: Sequence[int], signals: Rows) -> Rows:

@@ -220,7 +220,9 @@ class _Search:
         And softer gains with which all decays."""
         growth = {change: self._growth(change) for change in candidates}
         judged: dict[tuple[str, ...], Remedy] = {}
-        for change in sorted(growth, key=lambda change: growth[change])[:TRIED]:
+        # What leaves the same mode of an arm differs by rounding: fewer options, which come first.
+        best = sorted(growth, key=lambda change: float(f"{growth[change]:.9g}"))
+        for change in best[:TRIED]:
             if growth[change] >= 0.0 and judged:
                 break
             judged[change] = self._in_all(change, visited)

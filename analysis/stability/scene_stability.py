@@ -42,6 +42,7 @@ from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
@@ -87,7 +88,7 @@ def stability(
         return _judged(scene, given, _at_rest(scene), {UNHELD: None}, bounds, progress, rounded)
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
-    with interrupt.held():
+    with interrupt.held(), process_cache.unpacked_once():
         (progress or _silent)("the scene's own run", 0, poses + 2)
         own = _visited(scene, given, poses, grid)
 

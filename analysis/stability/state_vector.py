@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Container, Iterator
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -191,6 +192,7 @@ def size(system: System) -> int:
     return len(entries) + sum(len(fmu.description.outputs) for fmu in system.fmus)
 
 
+@lru_cache(4096)
 def _signal(column: str) -> Coordinate:
     fmu, _, variable = column.partition(".")
     return Coordinate(fmu, variable, "signal")

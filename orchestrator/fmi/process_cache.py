@@ -59,14 +59,14 @@ def file_at(path: Path) -> File:
 
 @contextmanager
 def unpacked_once() -> Iterator[None]:
-    """Within the context, FMUs of this project stay unpacked until `trim` drops them."""
+    """Within the outermost context, FMUs of this project stay unpacked until `trim` drops them."""
     global _stay
-    _stay = True
+    before, _stay = _stay, True
     try:
         yield
     finally:
-        trim(0)
-        _stay = False
+        _stay = before
+        trim(MAX_UNPACKED if before else 0)
 
 
 def unpack(description: Description, folder: str) -> str:

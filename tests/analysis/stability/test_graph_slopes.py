@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability import forward_sensitivity
+from hapticlink.analysis.stability.graph_slopes import GraphSlopes
 from tests.analysis.stability.own_hand import own_hand
 from tests.analysis.stability.test_stability import HELD
 
@@ -55,9 +56,18 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
         worst = max(worst, (np.abs(slope - exact) / allowed)[has].max(initial=0.0))
         return decide(exact, slope, error)
 
-    monkeypatch.setattr(forward_sensitivity, "decided", watched)
+    def elsewhere(own: Matrix, J: Matrix) -> tuple[Matrix, Matrix]:
+        return own + 1.0, J
+
     found = own_hand(scene, options)
+    monkeypatch.setattr(forward_sensitivity, "decided", watched)
+    for name in ("step", "get"):  # a graph with another result leaves the differences to the FMU
+        call = getattr(GraphSlopes, name)
+        monkeypatch.setattr(GraphSlopes, name, lambda *given, call=call: elsewhere(*call(*given)))
+    one_by_one = own_hand(scene, options)
     assert compared > 10
+    assert one_by_one.slopes == found.slopes
+    assert one_by_one.radius == pytest.approx(found.radius, abs=1e-9)
     assert worst < 1.0
     for fmu, way in found.slopes.items():
         graph, _, others = way.partition("; by differences: ")
