@@ -81,9 +81,9 @@ def main() -> None:
 
     def receive() -> None:
         while (question := read(sys.stdin.buffer)) is not None:
-            questions.put(question)
             if not interrupt.came():
-                signal.raise_signal(signal.SIGINT)  # ends what is being computed
+                signal.raise_signal(signal.SIGINT)  # ends what is being computed, not this question
+            questions.put(question)
         temporary_folders.clear(os.getpid())
         os._exit(1)
 
