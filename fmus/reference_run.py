@@ -11,8 +11,8 @@ import numpy as np
 
 from hapticlink.components.component import Component, Variable
 
-DURATION = 0.5
-"""Of the run (s)."""
+DURATION, STEPS = 0.5, 256
+"""Of the run (s), and how many steps it takes at most: each build of a block waits for it."""
 AMPLITUDES: Mapping[str, float] = {"N": 0.5, "N.m": 0.0025, "m": 0.001, "rad": 0.01}
 """Of the sines by which a scalar or vector input of this unit moves."""
 
@@ -32,7 +32,8 @@ class ReferenceRun:
 
 
 def reference_run(component: Component, step_size: float) -> ReferenceRun:
-    """The run from the start values, over half a second or until a value is not finite.
+    """The run from the start values, over half a second, 256 steps at most, or until a value is not
+    finite.
 
     Entry k = 0, 1 ... of the wrenches and poses among the inputs is its start value plus
     a sin(2 pi (2 + k) t), which a hand can do; other inputs keep their start values.
@@ -41,15 +42,12 @@ def reference_run(component: Component, step_size: float) -> ReferenceRun:
     start, p = np.array(component.start_inputs), np.array(component.start_parameters)
     amplitude = np.array([a for v in component.inputs for a in _amplitudes(v)])
     frequency = 1 + np.cumsum(amplitude > 0)
+    times = np.arange(min(STEPS, max(1, round(DURATION / step_size)))) * step_size
+    inputs = start + amplitude * np.sin(2 * math.pi * frequency * times[:, None])
 
-    def inputs(t: float) -> np.ndarray:
-        return start + amplitude * np.sin(2 * math.pi * frequency * t)
-
-    times = np.arange(max(1, round(DURATION / step_size))) * step_size
-    x = component.initialize(inputs(0.0), p)
+    x = component.initialize(inputs[0], p)
     rows = []
-    for t in times:
-        u = inputs(t)
+    for t, u in zip(times, inputs, strict=True):
         if component.timing == "sampled":
             y, x = component.output(x, u, p, t), _after(component, x, u, p, t, step_size)
         else:
@@ -58,12 +56,11 @@ def reference_run(component: Component, step_size: float) -> ReferenceRun:
         if not np.isfinite(row := y.full().ravel()).all():
             break
         rows.append(row)
-    moved = np.array([inputs(t) for t in times])
     of_inputs = [name for v in component.inputs for name in v.names]
     of_outputs = (name for v in component.outputs for name in v.names)
     return ReferenceRun(
         times=times[: len(rows)],
-        moved={of_inputs[i]: moved[: len(rows), i] for i in np.flatnonzero(amplitude)},
+        moved={of_inputs[i]: inputs[: len(rows), i] for i in np.flatnonzero(amplitude)},
         answers=dict(zip(of_outputs, np.array(rows).T, strict=True)) if rows else {},
         duration=len(rows) * step_size,
     )

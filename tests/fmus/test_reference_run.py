@@ -53,6 +53,12 @@ def test_it_ends_before_a_value_that_is_not_finite():
     assert all(len(v) == len(run.times) and np.isfinite(v).all() for v in run.answers.values())
 
 
+def test_it_takes_no_more_steps_at_a_high_rate():
+    run = reference_run(spring(), 1e-4)
+    assert len(run.times) == 256
+    assert run.duration == pytest.approx(0.0256)
+
+
 def test_the_page_has_both_drawings(tmp_path):
     fmu: Path = build(spring(), tmp_path)
     page = zipfile.ZipFile(fmu).read("documentation/index.html").decode()
