@@ -122,7 +122,7 @@ def _axes(wide: bool) -> tuple[Figure, Any]:
 
 def _named(metric: str) -> str:
     """Its label: energies are drawn in mJ."""
-    return NAMES.get(metric, metric.replace("generated_J", "generated (mJ),"))
+    return NAMES.get(metric, metric.replace("_J", " (mJ)"))
 
 
 def _label(row: Row, keys: Iterable[str]) -> str:
