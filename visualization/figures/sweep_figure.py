@@ -122,7 +122,8 @@ def _axes(wide: bool) -> tuple[Figure, Any]:
 
 def _named(metric: str) -> str:
     """Its label: energies are drawn in mJ."""
-    return NAMES.get(metric, metric.replace("_J", " (mJ)"))
+    name, unit, rest = metric.partition("_J")
+    return NAMES.get(metric, f"{name}{rest} (mJ)" if unit else metric)
 
 
 def _label(row: Row, keys: Iterable[str]) -> str:

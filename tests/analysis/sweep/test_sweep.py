@@ -503,6 +503,17 @@ def test_every_shape_of_a_sweep_has_a_figure(
     assert sweep_figure.draw([row.failed("died", "")], ()) is None
 
 
+@pytest.mark.parametrize("metric", ["port_peak_J", "port_J shaping", "generated_J a.F -> b.F"])
+def test_energies_are_drawn_in_mj(metric: str) -> None:
+    rows = [{"k": str(k), "end": "duration", metric: 1e-3 * k} for k in (1, 2)]
+    found = sweep_figure.draw(rows, ["k"], metric)
+    assert found is not None
+    axes = found.axes[0]
+    assert axes.get_ylabel().endswith(" (mJ)")
+    assert list(axes.lines[0].get_ydata()) == [1.0, 2.0]
+    assert "down to 1 mJ" in axes.get_title()
+
+
 # --- a cluster --------------------------------------------------------------------------------
 
 
