@@ -18,14 +18,27 @@ def browser() -> Iterator[Any]:
         yield opened
 
 
-@pytest.mark.parametrize(("way", "moved"), [(FREE, 0.02), (CONSTRAINED, 0.0)])
-def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
-    served: Served, browser: Any, way: tuple[float, float], moved: float
-) -> None:
+@pytest.fixture(autouse=True)
+def no_window_of_one_test_is_left_to_the_next(browser: Any) -> Iterator[None]:
+    yield
+    for window in browser.pages[1:]:
+        window.close()
+
+
+def at_the_start(served: Served, browser: Any) -> Page:
+    """A page of a run that begins: wherever other tests have left the linkage, it stands still."""
     page = Page(browser, served.url)
     page.until("view.frame?.t > 0.4")
     page.page.click("#reset")
     page.until("view.frame?.t < 0.3 && view.stage.limits")
+    return page
+
+
+@pytest.mark.parametrize(("way", "moved"), [(FREE, 0.02), (CONSTRAINED, 0.0)])
+def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
+    served: Served, browser: Any, way: tuple[float, float], moved: float
+) -> None:
+    page = at_the_start(served, browser)
     start = np.array(page.get("view.frame.x.slice(0, 2)"))
     page.pull(*(0.02 * np.array(way)))
     page.run_for(1.5)
@@ -37,7 +50,6 @@ def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
     page.run_for(1.0)
     assert np.hypot(*page.get("view.frame.F_hand.slice(0, 2)")) < 0.1
     assert page.faults == []
-    page.page.close()
 
 
 def test_the_page_says_what_to_do_until_somebody_does_it(served: Served, browser: Any) -> None:
@@ -49,11 +61,10 @@ def test_the_page_says_what_to_do_until_somebody_does_it(served: Served, browser
     page.until("document.getElementById('door').hidden")
     page.page.mouse.up()
     assert page.faults == []
-    page.page.close()
 
 
 def test_a_run_that_begins_anew_is_pulled_on(served: Served, browser: Any) -> None:
-    page = Page(browser, served.url)
+    page = at_the_start(served, browser)
     page.pull(*(0.02 * np.array(CONSTRAINED)))
     page.until("view.frame?.t > 0.8 && Math.hypot(...view.frame.F_hand.slice(0, 2)) > 1")
     page.page.keyboard.press("r")
@@ -62,7 +73,6 @@ def test_a_run_that_begins_anew_is_pulled_on(served: Served, browser: Any) -> No
     page.page.mouse.up()
     page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.1")
     assert page.faults == []
-    page.page.close()
 
 
 def test_arrow_keys_pull_and_let_go(served: Served, browser: Any) -> None:
@@ -71,7 +81,6 @@ def test_arrow_keys_pull_and_let_go(served: Served, browser: Any) -> None:
     page.until("view.frame.F_hand[1] > 0.1")
     page.page.keyboard.up("ArrowUp")
     page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.1")
-    page.page.close()
 
 
 def test_the_wheel_zooms_about_the_pointer_and_shift_moves(served: Served, browser: Any) -> None:
@@ -99,7 +108,6 @@ def test_the_wheel_zooms_about_the_pointer_and_shift_moves(served: Served, brows
     assert np.hypot(*np.subtract(target, held_at)) < 0.01
     page.until("view.frame.F_hand[0] > 0.1")
     page.page.mouse.up()
-    page.page.close()
 
 
 REACHED = """[...document.querySelectorAll('button, select, input, summary')].filter((each) => {
@@ -119,7 +127,6 @@ def test_every_button_and_control_of_a_phone_can_be_reached(served: Served, brow
     assert len(page.page.query_selector_all("button, select, input, summary")) > 15
     assert page.get(REACHED) == []
     assert page.get("document.documentElement.scrollWidth") == 390
-    page.page.close()
 
 
 def test_restore_sets_back_what_was_changed(served: Served, browser: Any) -> None:
@@ -129,7 +136,6 @@ def test_restore_sets_back_what_was_changed(served: Served, browser: Any) -> Non
     page.until(f"!{said}.includes(' 100 N/m') && {said}.includes('316')")
     page.page.click("#restore")
     page.until(f"{said}.includes('100 N/m')")
-    page.page.close()
 
 
 def test_idle_charts_are_scaled_by_what_can_be_felt(served: Served, browser: Any) -> None:
@@ -148,7 +154,6 @@ def test_idle_charts_are_scaled_by_what_can_be_felt(served: Served, browser: Any
     ticks = page.get(written)
     assert ticks
     assert min(abs(tick) for tick in ticks if tick) >= 0.25
-    page.page.close()
 
 
 MOVES = """{
@@ -174,7 +179,6 @@ def test_the_hand_pulls_to_where_the_mouse_has_stopped(served: Served, browser: 
     target = "[...view.stage.pulls.values()][0].target"
     page.until(f"JSON.stringify(sent.at(-1).at) === JSON.stringify({target})")
     page.page.mouse.up()
-    page.page.close()
 
 
 def test_a_control_changes_the_run_and_is_seen_in_a_second_window(
@@ -191,7 +195,6 @@ def test_a_control_changes_the_run_and_is_seen_in_a_second_window(
     first.page.close()
     second.run_for(0.3)
     assert first.faults == second.faults == []
-    second.page.close()
 
 
 def test_pause_and_step(served: Served, browser: Any) -> None:
@@ -204,7 +207,6 @@ def test_pause_and_step(served: Served, browser: Any) -> None:
     assert page.get("view.frame.t") < still + 0.1
     page.page.click("#pause")
     page.run_for(0.1)
-    page.page.close()
 
 
 def test_nothing_is_cut_off_in_wide_and_narrow_windows(served: Served, browser: Any) -> None:
@@ -214,7 +216,6 @@ def test_nothing_is_cut_off_in_wide_and_narrow_windows(served: Served, browser: 
         page.run_for(0.1)
         nothing_is_cut_off(page, size)
     assert page.faults == []
-    page.page.close()
 
 
 def nothing_is_cut_off(page: Page, size: tuple[int, int]) -> None:
