@@ -45,23 +45,21 @@ def reference_run(component: Component, step_size: float) -> ReferenceRun:
     times = np.arange(min(STEPS, max(1, round(DURATION / step_size)))) * step_size
     inputs = start + amplitude * np.sin(2 * math.pi * frequency * times[:, None])
 
-    x = component.initialize(inputs[0], p)
-    rows = []
-    for t, u in zip(times, inputs, strict=True):
-        if component.timing == "sampled":
-            y, x = component.output(x, u, p, t), _after(component, x, u, p, t, step_size)
-        else:
-            x = _after(component, x, u, p, t, step_size)
-            y = component.output(x, u, p, t + step_size)
-        if not np.isfinite(row := y.full().ravel()).all():
-            break
-        rows.append(row)
+    U, P, T = inputs.T, np.tile(p, (len(times), 1)).T, times[None, :]
+    x0 = component.initialize(inputs[0], p)
+    X = _step(component, step_size).mapaccum("run", len(times))(x0, U, P, T).full()
+    if component.timing == "sampled":
+        X, at = np.hstack([np.array(x0), X[:, :-1]]), T
+    else:
+        at = T + step_size
+    Y = component.output.map(len(times))(X, U, P, at).full().T
+    rows = Y[: int(np.cumprod(np.isfinite(Y).all(axis=1)).sum())]
     of_inputs = [name for v in component.inputs for name in v.names]
     of_outputs = (name for v in component.outputs for name in v.names)
     return ReferenceRun(
         times=times[: len(rows)],
         moved={of_inputs[i]: inputs[: len(rows), i] for i in np.flatnonzero(amplitude)},
-        answers=dict(zip(of_outputs, np.array(rows).T, strict=True)) if rows else {},
+        answers=dict(zip(of_outputs, rows.T, strict=True)) if len(rows) else {},
         duration=len(rows) * step_size,
     )
 
@@ -72,13 +70,13 @@ def _amplitudes(variable: Variable) -> Iterator[float]:
         yield AMPLITUDES.get(unit, 0.0) if len(variable.shape) < 2 else 0.0
 
 
-def _after(
-    component: Component, x: ca.DM, u: np.ndarray, p: np.ndarray, t: float, step_size: float
-) -> ca.DM:
-    """The state after one communication step."""
+def _step(component: Component, step_size: float) -> ca.Function:
+    """(x, u, p, t) -> the state after one communication step."""
     n = component.substeps
     parts = [component.substep or component.step] * n
     parts[0 if component.timing == "sampled" else -1] = component.step
+    start, u, p, t = (ca.MX.sym(name, component.step.size1_in(i)) for i, name in enumerate("xupt"))
+    x = start
     for k, part in enumerate(parts):
         x = part(x, u, p, t + k * step_size / n, step_size / n)
-    return x
+    return ca.Function("after", [start, u, p, t], [x])

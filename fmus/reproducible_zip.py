@@ -8,17 +8,18 @@ from collections.abc import Mapping
 from typing import BinaryIO
 
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
+LEVEL = 3  # of zlib: less than half the time of its default, and a tenth larger
 
 
 def write(files: Mapping[str, bytes], target: BinaryIO) -> None:
     """Writes a zip archive whose bytes depend on `files` only: sorted names, a fixed date and
     system."""
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(target, "w") as archive:
         for name in sorted(files):
             info = zipfile.ZipInfo(name, EPOCH)
             info.create_system = 3  # Unix, wherever it is written
             info.external_attr = 0o644 << 16
-            archive.writestr(info, files[name], zipfile.ZIP_DEFLATED)
+            archive.writestr(info, files[name], zipfile.ZIP_DEFLATED, LEVEL)
 
 
 def digest(content: Mapping[str, bytes]) -> str:
