@@ -2,9 +2,15 @@
 
 import os
 import signal
+from pathlib import Path
 
+import pytest
 import pythonfmu  # noqa: F401
 from hypothesis import settings
+
+SLOW = Path(__file__).with_name("slow_tests.txt")
+"""Names of tests, or of cases of tests, that take longer than 2 s of a processor or 10 s of time,
+and have a quicker relative: they are marked slow, and left to `pytest -m ""`."""
 
 # The same draws every time: a test that fails here fails everywhere.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -21,9 +27,18 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """A worker more than there are processors: for a quarter of their time tests wait, for other
+    """Twice as many workers as there are processors: for half of their time tests wait, for other
     processes, a browser or a deadline."""
-    return (os.cpu_count() or 1) + 1
+    return 2 * (os.cpu_count() or 1)
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests are selected by their marks
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    slow = set(SLOW.read_text().splitlines())
+    for item in items:
+        name = item.nodeid.removeprefix("tests/")
+        if name in slow or name.partition("[")[0] in slow:
+            item.add_marker("slow")
 
 
 # pythonfmu is imported above from where it is installed: after a test in which FMPy runs a Python
