@@ -9,8 +9,8 @@ import pythonfmu  # noqa: F401
 from hypothesis import settings
 
 SLOW = Path(__file__).with_name("slow_tests.txt")
-"""Names of tests, or of cases of tests, that take longer than 2 s of a processor or 10 s of time,
-and have a quicker relative: they are marked slow, and left to `pytest -m ""`."""
+"""The slowest twelfth of the tests, which takes more than half of the time: files, tests and cases
+that need a second of a processor or more and have a quicker relative. `pytest -m ""` runs them."""
 
 # The same draws every time: a test that fails here fails everywhere.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -37,7 +37,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     slow = set(SLOW.read_text().splitlines())
     for item in items:
         name = item.nodeid.removeprefix("tests/")
-        if name in slow or name.partition("[")[0] in slow:
+        if slow & {name, name.partition("[")[0], name.partition("::")[0]}:
             item.add_marker("slow")
 
 
