@@ -66,7 +66,7 @@ def _read(path: Path, guid: str) -> GraphSlopes | None:
 
 @lru_cache(KEPT)
 def _deserialized(texts: tuple[tuple[str, str], ...], sampled: bool, substeps: int) -> GraphSlopes:
-    """Once for all FMUs that differ in their start alone, as in other poses."""
+    """Once for all FMUs of the same functions."""
     functions = {name: ca.Function.deserialize(text) for name, text in texts}
     return GraphSlopes(functions, sampled, substeps)
 

@@ -43,6 +43,11 @@ class Act:
     J: Matrix
     E: Matrix
 
+    @cached_property
+    def depends(self) -> NDArray[np.bool_]:
+        """Which rows depend on which."""
+        return np.asarray((self.J != 0.0) | (self.E != 0.0))
+
 
 @dataclass(frozen=True, eq=False)
 class _Step:
@@ -233,8 +238,7 @@ def _product(steps: Sequence[_Step]) -> _Step:
 def _before(event: Sequence[Act], live: NDArray[np.bool_]) -> NDArray[np.bool_]:
     live = live.copy()
     for act in reversed(event):
-        wanted = live[act.into]
-        read = (act.J[wanted] != 0.0).any(axis=0) | (act.E[wanted] != 0.0).any(axis=0)
+        read = act.depends[live[act.into]].any(axis=0)
         live[act.into] = False
         live[act.of] |= read
     return live

@@ -14,6 +14,7 @@ from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.analysis.stability.hands import FIRM, own_hand, spring, standing
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.smooth_scene import Joints
 from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
 from hapticlink.components.specs.linkage import Linkage
@@ -91,22 +92,25 @@ class Pose:
             return True
         beside = np.add(self.point, OFF)
         changes = {"hand": standing(hand, beside), "duration": LEAVING, "stop_when": ""}
-        run = simulated(scene, self.options(given, held=False), changes)
+        run = simulated(scene, self.started(given), changes)
         moved = np.abs(_recorded(run)[POINT_POSE] - self.point).max(axis=0)
         return bool(run.record.fault) or bool((moved > NEAR).any())
 
-    def options(self, given: Sequence[str], held: bool = True) -> tuple[str, ...]:
-        """The options of the scene at rest in this pose, in a spring hand if it is `held`."""
-        start: dict[str, object] = {
-            "linkage.start": self.joints,
-            "linkage.start_velocity": {},
-        }
-        if not held:
-            return (*given, *overrides.written(start))
-        start["hand"] = spring(self.point, self.press, FIRM)
-        no_force = (0.0, 0.0, 0.0)
-        start |= {f"hands.{u}": spring(x, no_force, FIRM) for u, x in self.others.items()}
+    def options(self, given: Sequence[str]) -> tuple[str, ...]:
+        """The options of the scene that starts at rest in this pose, in a spring hand."""
+        return self.started(self.held(given))
+
+    def started(self, given: Sequence[str]) -> tuple[str, ...]:
+        """The options of the scene that starts at rest in this pose."""
+        start = {"linkage.start": self.joints, "linkage.start_velocity": {}}
         return (*given, *overrides.written(start))
+
+    def held(self, given: Sequence[str]) -> tuple[str, ...]:
+        """The options of the scene in a spring hand that stands still in this pose."""
+        no_force = (0.0, 0.0, 0.0)
+        hands = {f"hands.{u}": spring(x, no_force, FIRM) for u, x in self.others.items()}
+        hand = {"hand": spring(self.point, self.press, FIRM)}
+        return (*given, *overrides.written(hand | hands))
 
 
 def simulated(
@@ -188,9 +192,9 @@ def in_own_hand(
     equilibrium."""
     with ExitStack() as stack:
         found, last = None, Fault()
-        for options, hand in _own_equilibria(scene, given):
+        for options, joints, hand in _own_equilibria(scene, given):
             try:
-                found = stack.enter_context(resting(scene, options)), hand
+                found = stack.enter_context(resting(scene, options, joints=joints)), hand
                 break
             except (InputFault, FmuFault) as fault:
                 last = fault
@@ -201,16 +205,16 @@ def in_own_hand(
 
 def _own_equilibria(
     scene: str | Path | Scene, given: Sequence[str]
-) -> Iterator[tuple[tuple[str, ...], Hand | None]]:
-    """The options of `in_own_hand` and its hand, in the order in which they are tried."""
+) -> Iterator[tuple[tuple[str, ...], Joints | None, Hand | None]]:
+    """The options of `in_own_hand`, its pose and its hand, in the order in which they are tried."""
     read = open_scene.load(scene, given)
     if not presses(read):
-        yield tuple(given), None
+        yield tuple(given), None, None
     if read.linkage is None or read.hand is None or replaced(read):
         return
     leads = settled if presses(read) else lambda *scene: [rest(*scene)]
     for pose in leads(scene, given, read.linkage):
-        yield pose.options(given), own_hand(read.hand)
+        yield pose.held(given), pose.joints, own_hand(read.hand)
 
 
 def presses(read: Scene) -> bool:
@@ -283,13 +287,14 @@ def at_pose(
     from the state `start`. Raises InputFault or FmuFault where there is none."""
     with ExitStack() as stack:
         try:
-            place = stack.enter_context(resting(scene, pose.options(given, held), start))
+            options = pose.held(given) if held else given
+            place = stack.enter_context(resting(scene, options, start, pose.joints))
             _require_touch(pose, place)
         except (InputFault, FmuFault):
             if not pose.touches:
                 raise
             pose = pose.lighter
-            place = stack.enter_context(resting(scene, pose.options(given), start))
+            place = stack.enter_context(resting(scene, pose.held(given), start, pose.joints))
         yield place, pose
 
 

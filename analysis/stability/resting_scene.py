@@ -19,7 +19,7 @@ from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
 from hapticlink.analysis.stability.modes import Mode, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
-from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.analysis.stability.smooth_scene import Joints, linearisable
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH, HAND
@@ -135,12 +135,15 @@ class RestingScene:
 
 @contextmanager
 def resting(
-    scene: str | Path | Scene, options: Options = (), start: Vector | None = None
+    scene: str | Path | Scene,
+    options: Options = (),
+    start: Vector | None = None,
+    joints: Joints | None = None,
 ) -> Iterator[RestingScene]:
-    """A scene with `options` at its equilibrium next to its start, or to the state `start`, in the
-    hand that it has. Raises InputFault or FmuFault where it has none."""
+    """A scene with `options` at its equilibrium next to its start, to the pose `joints` or to the
+    state `start`, in the hand that it has. Raises InputFault or FmuFault where it has none."""
     with (
-        linearisable(scene, options) as (read, system, _),
+        linearisable(scene, options, joints) as (read, system, _),
         resting_system(read, system, start) as place,
     ):
         yield place

@@ -1,30 +1,57 @@
-"""A scene as it is linearised: read, built, and without what has no slope."""
+"""A scene as it is linearised: read, built, in a pose, and without what has no slope."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
+from hapticlink.components.linkage.parameters import coordinates
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Fmu, System
+
+Joints = Mapping[str, float | list[float]]
+"""Joint coordinates (m, rad) as `linkage.start` has them."""
 
 
 @contextmanager
 def linearisable(
-    scene: str | Path | Scene, options: Options = ()
+    scene: str | Path | Scene, options: Options = (), joints: Joints | None = None
 ) -> Iterator[tuple[Scene, System, list[str]]]:
     """The scene with `options`, its system without quantisation, friction and passivity
-    controllers, and a line of text on each that was removed. Within the context signals are
-    deferred, and numbers that overflow raise no warnings."""
+    controllers, and a line of text on each that was removed; with `joints`, at rest in that pose.
+    Within the context signals are deferred, and numbers that overflow raise no warnings."""
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
         read = open_scene.load(scene, options)
         with built(read) as whole:
+            if joints is not None and read.linkage is not None:
+                whole = at_rest(whole, read.linkage, joints)
             yield read, *frozen_nonlinearities.without(whole)
+
+
+def at_rest(system: System, linkage: Linkage, joints: Joints) -> System:
+    """The system whose linkage starts at rest in a pose, with the same FMU files in all poses: the
+    start is a parameter of the mechanism and of its copy."""
+    q = coordinates(linkage, joints)
+    ports = {"q_start": q, "qd_start": [0.0] * len(q)}
+
+    def started(fmu: Fmu) -> Fmu:
+        given = [
+            row
+            for port, values in ports.items()
+            for row in zip(fmu.description.port(port, "parameter"), values, strict=False)
+        ]
+        names = {scalar.name for scalar, _ in given}
+        others = (row for row in fmu.starts if row[0].name not in names)
+        return replace(fmu, starts=(*others, *given)) if given else fmu
+
+    return replace(system, fmus=tuple(map(started, system.fmus)))

@@ -169,7 +169,7 @@ def transparency(
     given = tuple(options)
     for pose in _visited(scene, given, linkage, count):
         try:
-            found.append(at_pose(scene, pose.options(whole_frames(read, given)), pose.name))
+            found.append(at_pose(scene, whole_frames(read, given), pose))
         except (InputFault, FmuFault) as fault:
             why = f"{pose.name}: {fault}"
     if not found:
@@ -188,11 +188,12 @@ def _visited(
     return evenly_spaced(run, linkage, count)
 
 
-def at_pose(scene: str | Path | Scene, options: Sequence[str], name: str) -> Transparency:
-    """How a scene feels where it is at rest. Raises InputFault where it is not."""
-    read = open_scene.load(scene, options)
-    with resting(scene, options) as place:
-        return _felt(read, place, name, {})
+def at_pose(scene: str | Path | Scene, given: Sequence[str], pose: Pose) -> Transparency:
+    """How a scene feels at rest in a pose. Raises InputFault or FmuFault where it has no
+    equilibrium."""
+    options = pose.held(given)
+    with resting(scene, options, joints=pose.joints) as place:
+        return _felt(open_scene.load(scene, options), place, pose.name, {})
 
 
 def _felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
@@ -287,8 +288,8 @@ def costs(
     for name, change in changes.items():
         try:
             changed = (*given, *overrides.written(change))
-            options = pose.options(whole_frames(open_scene.load(scene, changed), changed))
-            with resting(scene, options) as place:
+            options = pose.held(whole_frames(open_scene.load(scene, changed), changed))
+            with resting(scene, options, joints=pose.joints) as place:
                 found.append(_cost(read, place, name))
         except (InputFault, FmuFault) as fault:
             tell(f"  {name}: {fault}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from hapticlink.components.component import Variable
 from hapticlink.components.specs.linkage import COORDINATE_UNITS, Linkage
@@ -61,12 +61,12 @@ def coordinate_units(linkage: Linkage) -> tuple[str, ...]:
     return tuple(unit for j in linkage.joint for unit in COORDINATE_UNITS[j.type])
 
 
-def coordinates(linkage: Linkage, values: Mapping[str, float | tuple[float, ...]]) -> list[float]:
+def coordinates(linkage: Linkage, values: Mapping[str, float | Sequence[float]]) -> list[float]:
     """Flat joint coordinates from values by joint name; missing ones are 0."""
     flat: list[float] = []
     for j in linkage.joint:
         value = values.get(j.name, (0.0,) * COORDINATES[j.type])
-        flat.extend(value if isinstance(value, tuple | list) else (value,))
+        flat.extend(value if isinstance(value, Sequence) else (value,))
     return flat
 
 

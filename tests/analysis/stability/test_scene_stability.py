@@ -54,6 +54,24 @@ def test_events_that_repeat_have_the_map_that_is_carried_through_the_period(
     assert leading(period) == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize("scene", ["geared-five-bar", "closed-loop-direct"])
+def test_a_pose_is_that_of_a_scene_that_starts_there_by_the_fmus_of_the_scenes_own_start(
+    scene: str,
+) -> None:
+    linkage = hl.scene(scene).linkage
+    assert linkage is not None
+    files = set()
+    for pose in evenly_spaced(simulated(scene, ("duration=0.5",)), linkage, 3):
+        with resting(scene, pose.options(())) as there:
+            start, expected = there.map.start, leading(there.period({}))
+        with resting(scene, pose.held(()), joints=pose.joints) as moved:
+            assert moved.map.start == pytest.approx(start, abs=1e-9)
+            assert leading(moved.period({})) == pytest.approx(expected, abs=1e-9)
+            fmus = moved.map.system.fmus
+        files.add(tuple(f.description.path for f in fmus if f.name != "hand"))
+    assert len(files) == 1
+
+
 def test_a_hand_in_place_of_another_has_the_map_of_its_own_fmu(place: RestingScene) -> None:
     arm: dict[str, Any] = {"type": "arm", "target": [[0.0, *POINT]]}
     spec = ArmHand(target=((0.0, 0.0, 0.0, 0.0),))
