@@ -124,7 +124,7 @@ class Chart {
     context.setLineDash([]);
     if (at !== undefined) line(context, themed("ink"), [[x(at), 0], [x(at), height]]);
     context.restore();
-    this.label(at, drawn);
+    queueMicrotask(() => this.label(at, drawn)); // behind all charts: the size of the next one would have the page laid out
   }
 
   // The series that are drawn: all, or the first one and those with the largest values.
