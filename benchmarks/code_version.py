@@ -58,10 +58,22 @@ MADE_FROM = "made_from.json"
 
 def sign(results: Path, what: str, page: Path) -> None:
     """Record what code the tables of a benchmark were just made from, and say it on their page."""
-    commit = subprocess.run(
-        ("git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"),
-        capture_output=True, text=True, check=False,
-    ).stdout.strip()  # fmt: skip
+    git = ("git", "-C", str(Path(__file__).parent))
+    named = subprocess.run(
+        (*git, "describe", "--always"), capture_output=True, text=True, check=False
+    )
+    commit = named.stdout.strip()
+    own = (
+        *git,
+        "diff",
+        "--quiet",
+        "HEAD",
+        "--",
+        ":/",
+        ":!/results",
+    )  # where pages are just written
+    if commit and subprocess.run(own, check=False).returncode:
+        commit += "-dirty"
     path = results / MADE_FROM
     record = json.loads(path.read_text()) if path.exists() else {}
     record[what] = {"commit": commit, "sources": _hashes()}
