@@ -62,19 +62,12 @@ const given = JSON.parse(readFileSync(0));
 given.program = Buffer.from(given.program, "base64");
 console.log(timed(given, now, ROUNDS));
 """
-IN_CHROMIUM = """async ([code, duration, rounds]) => {
-  const unpacked = async (id) => {
-    const text = atob(document.getElementById(id).textContent);
-    const packed = Uint8Array.from(text, (c) => c.charCodeAt(0));
-    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip")));
-  };
-  const text = async (id) => (await unpacked(id)).text();
-  const source = new Blob([await text("worker"), code], { type: "text/javascript" });
-  const worker = new Worker(URL.createObjectURL(source));
-  const answer = new Promise((resolve) => { worker.onmessage = ({ data }) => resolve(data); });
-  const program = await (await unpacked("program")).arrayBuffer();
-  const given = { data: JSON.parse(await text("data")), program, duration };
-  worker.postMessage([given, rounds]);
+IN_CHROMIUM = """async ([worker, data, program, duration, rounds]) => {
+  const source = new Blob([worker], { type: "text/javascript" });
+  const started = new Worker(URL.createObjectURL(source));
+  const answer = new Promise((resolve) => { started.onmessage = ({ data }) => resolve(data); });
+  const { buffer } = Uint8Array.from(atob(program), (c) => c.charCodeAt(0));
+  started.postMessage([{ data, program: buffer, duration }, rounds]);
   return answer;
 }"""
 IN_WORKER = """
@@ -130,7 +123,8 @@ def _measured(
             with patch.object(execute_plan, "perf_counter", process_time):
                 runs.append(simulate(shown, room / "run", csv=False).outcome.wall_time)
             nodes.append(_node(text))
-            wall.append(opened.evaluate(IN_CHROMIUM, [TIMED + IN_WORKER, DURATION, 5]))
+            worker = one_file.unpacked(text, "worker").decode() + TIMED + IN_WORKER
+            wall.append(opened.evaluate(IN_CHROMIUM, [worker, *_program(text).values(), 5]))
         opened.close()
         by_run, by_node, by_chromium = (DURATION / min(times) for times in (runs, nodes, wall))
         return len(text.encode()), make, by_run, by_node, by_chromium
@@ -138,17 +132,21 @@ def _measured(
 
 def _node(text: str) -> float:
     """The least processor time (s) of a run of a page's module under node."""
-    given = {
+    code = one_file.bundle("program.js") + TIMED + IN_NODE.replace("ROUNDS", "5")
+    command = ["node", "--input-type=module", "--eval", code]
+    done = subprocess.run(
+        command, input=json.dumps(_program(text)), capture_output=True, text=True, check=True
+    )
+    return float(done.stdout)
+
+
+def _program(text: str) -> dict[str, Any]:
+    """The program in a page, and how long it shall run."""
+    return {
         "data": json.loads(one_file.unpacked(text, "data")),
         "program": base64.b64encode(one_file.unpacked(text, "program")).decode(),
         "duration": DURATION,
     }
-    code = one_file.bundle("program.js") + TIMED + IN_NODE.replace("ROUNDS", "5")
-    command = ["node", "--input-type=module", "--eval", code]
-    done = subprocess.run(
-        command, input=json.dumps(given), capture_output=True, text=True, check=True
-    )
-    return float(done.stdout)
 
 
 def _page(rows: list[dict[str, str]], command: str) -> str:

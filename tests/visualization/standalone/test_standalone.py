@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from benchmarks import standalone as bench
 from hapticlink.commands import main
 from tests.visualization.browser_code.chromium import AT, Page, chromium
 from tests.visualization.browser_code.compared_runs import differ_without_topology
+from tests.visualization.browser_code.javascript import NODE
 
 
 @pytest.fixture(scope="module")
@@ -167,3 +169,9 @@ def test_a_drag_is_heard_once_it_is_asked_for(file: Path, browser: Any) -> None:
     page.until("!view.sound.context")
     assert page.faults == []
     page.page.close()
+
+
+@pytest.mark.skipif(not NODE, reason="node is not installed")
+def test_the_benchmark_runs_a_page_in_every_form(browser: Any) -> None:
+    _, _, *forms = bench._measured("pendulum", (), 1, browser)
+    assert min(forms) > 1  # times real time: by FMUs, under node and in Chromium
