@@ -14,11 +14,11 @@ from hapticlink.orchestrator.base.errors import COUNTED, InputFault, SceneFault
 from hapticlink.orchestrator.scene import checks, families, overrides, read_registry_tables
 from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
 from hapticlink.orchestrator.scene.frame_trace import frame_times
+from hapticlink.orchestrator.scene.refused_keys_and_values import beyond, problems
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Origin, Source
 from hapticlink.orchestrator.scene.toml_keys import flat, flatten
 from hapticlink.orchestrator.scene.unrepresentable_values import unsound
-from hapticlink.orchestrator.scene.validation_errors import beyond, problems
 
 
 def read(

@@ -12,10 +12,10 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.scene.refused_keys_and_values import problems
 from hapticlink.orchestrator.scene.registry_tables import record_of, tables
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
-from hapticlink.orchestrator.scene.validation_errors import problems
 
 
 def read(data: Any) -> tuple[dict[Path, Any], list[Problem]]:

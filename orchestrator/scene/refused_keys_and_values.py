@@ -1,4 +1,5 @@
-"""Translates pydantic's errors into problems of the scene: path in the file, fault and remedy."""
+"""What is wrong with the keys and values of a scene: path in the file, fault and remedy, from the
+errors of pydantic."""
 
 from __future__ import annotations
 
