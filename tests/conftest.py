@@ -25,6 +25,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+WAITING = ("tests/visualization", "tests/docs/test_examples", "tests/orchestrator/network")
+"""Tests that wait for a page, a command or a clock come first: others run meanwhile."""
+
 
 def pytest_xdist_auto_num_workers() -> int:
     """Twice as many workers as there are processors: for half of their time tests wait, for other
@@ -39,6 +42,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         name = item.nodeid.removeprefix("tests/")
         if slow & {name, name.partition("[")[0], name.partition("::")[0]}:
             item.add_marker("slow")
+    items.sort(key=lambda item: not item.nodeid.startswith(WAITING))
 
 
 # pythonfmu is imported above from where it is installed: after a test in which FMPy runs a Python

@@ -61,7 +61,7 @@ class Page:
     def until(self, condition: str) -> None:
         """Wait for a condition in JavaScript."""
         try:
-            self.page.wait_for_function(f"() => {condition}", timeout=60_000)
+            self.page.wait_for_function(f"() => {condition}", timeout=120_000)
         except playwright.TimeoutError:
             shown = self.get("JSON.stringify([view.state, view.refused, view.frames, view.frame])")
             raise AssertionError(f"{condition} did not come; the page has {shown}") from None

@@ -90,7 +90,7 @@ class Window:
     def send(self, **message: Any) -> None:
         self.socket.send(json.dumps(message))
 
-    def until(self, holds: Condition, seconds: float = 20) -> dict[str, Any]:
+    def until(self, holds: Condition, seconds: float = 120) -> dict[str, Any]:
         """The newest messages by type, once they are as asked for."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
