@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -166,7 +167,11 @@ def mapped(pid: int) -> list[str]:
     """What the processes that a process has started have in memory."""
     tasks = Path(f"/proc/{pid}/task").iterdir()
     children = [child for task in tasks for child in (task / "children").read_text().split()]
-    return [Path(f"/proc/{child}/maps").read_text() for child in children]
+    maps = []
+    for child in children:
+        with suppress(ProcessLookupError, FileNotFoundError):  # it has ended meanwhile
+            maps.append(Path(f"/proc/{child}/maps").read_text())
+    return maps
 
 
 def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path):
