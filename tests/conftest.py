@@ -10,7 +10,7 @@ from hypothesis import settings
 
 SLOW = Path(__file__).with_name("slow_tests.txt")
 """The slowest ninth of the tests, which takes more than half of the time: files, tests and cases
-that need a second of a processor or more and have a quicker relative. `pytest -m ""` runs them."""
+that need about a second of a processor or more. `pytest -m ""` runs them."""
 
 # The same draws every time: a test that fails here fails everywhere.
 settings.register_profile("repeatable", derandomize=True, deadline=None)

@@ -38,9 +38,7 @@ def without(system: System) -> tuple[System, list[str]]:
         for scalar, value, what in _removed(system, fmu):
             starts.append((scalar, value))
             lines.append(f"{fmu.name}.{scalar.name}: {what}, taken out")
-        set_anew = {scalar.name for scalar, _ in starts}
-        others = (start for start in fmu.starts if start[0].name not in set_anew)
-        fmus.append(replace(fmu, starts=(*others, *starts)))
+        fmus.append(fmu.starting(tuple(starts)))
     for c in system.connections:
         if has_friction(c):
             lines.append(f"{c.name}: the friction of hold {c.hold}, taken out")

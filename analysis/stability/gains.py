@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from hapticlink.orchestrator.base.signal_names import CONTROLLER
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import System
 
 LAWS = {
     "drift": ("controller.teleoperation", "K_pc", "B_pc"),
@@ -61,15 +61,9 @@ class Gains:
 
     def applied(self, system: System, scales: Scales) -> System:
         """The system that starts with the given scales."""
-        scaled = {scalar.name: (scalar, value) for _, scalar, value in self.parameters(scales)}
-
-        def started(fmu: Fmu) -> Fmu:
-            if fmu.name != CONTROLLER:
-                return fmu
-            others = (start for start in fmu.starts if start[0].name not in scaled)
-            return replace(fmu, starts=(*others, *scaled.values()))
-
-        return replace(system, fmus=tuple(map(started, system.fmus)))
+        scaled = tuple((scalar, value) for _, scalar, value in self.parameters(scales))
+        fmus = (fmu.starting(scaled) if fmu.name == CONTROLLER else fmu for fmu in system.fmus)
+        return replace(system, fmus=tuple(fmus))
 
     def options(self, scales: Scales) -> dict[str, float | list[float]]:
         """The options of a scene with the given scales, to four digits."""

@@ -96,10 +96,6 @@ class Pose:
         moved = np.abs(_recorded(run)[POINT_POSE] - self.point).max(axis=0)
         return bool(run.record.fault) or bool((moved > NEAR).any())
 
-    def options(self, given: Sequence[str]) -> tuple[str, ...]:
-        """The options of the scene that starts at rest in this pose, in a spring hand."""
-        return self.started(self.held(given))
-
     def started(self, given: Sequence[str]) -> tuple[str, ...]:
         """The options of the scene that starts at rest in this pose."""
         start = {"linkage.start": self.joints, "linkage.start_velocity": {}}

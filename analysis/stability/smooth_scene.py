@@ -45,13 +45,10 @@ def at_rest(system: System, linkage: Linkage, joints: Joints) -> System:
     ports = {"q_start": q, "qd_start": [0.0] * len(q)}
 
     def started(fmu: Fmu) -> Fmu:
-        given = [
-            row
-            for port, values in ports.items()
-            for row in zip(fmu.description.port(port, "parameter"), values, strict=False)
-        ]
-        names = {scalar.name for scalar, _ in given}
-        others = (row for row in fmu.starts if row[0].name not in names)
-        return replace(fmu, starts=(*others, *given)) if given else fmu
+        for port, values in ports.items():
+            scalars = fmu.description.port(port, "parameter")
+            if len(scalars) == len(values):  # those of an FMU of others may be something else
+                fmu = fmu.starting(tuple(zip(scalars, values, strict=True)))
+        return fmu
 
     return replace(system, fmus=tuple(map(started, system.fmus)))

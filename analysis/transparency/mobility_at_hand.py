@@ -169,7 +169,9 @@ def transparency(
     given = tuple(options)
     for pose in _visited(scene, given, linkage, count):
         try:
-            found.append(at_pose(scene, whole_frames(read, given), pose))
+            options = pose.held(whole_frames(read, given))
+            with resting(scene, options, joints=pose.joints) as place:
+                found.append(_felt(read, place, pose.name, {}))
         except (InputFault, FmuFault) as fault:
             why = f"{pose.name}: {fault}"
     if not found:
@@ -186,14 +188,6 @@ def _visited(
         warning = "warning: the scene's own run fails: %s; its poses are those up to there"
         logging.getLogger(__name__).warning(warning, why)
     return evenly_spaced(run, linkage, count)
-
-
-def at_pose(scene: str | Path | Scene, given: Sequence[str], pose: Pose) -> Transparency:
-    """How a scene feels at rest in a pose. Raises InputFault or FmuFault where it has no
-    equilibrium."""
-    options = pose.held(given)
-    with resting(scene, options, joints=pose.joints) as place:
-        return _felt(open_scene.load(scene, options), place, pose.name, {})
 
 
 def _felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:

@@ -22,14 +22,9 @@ def settled(system: System) -> System:
     Raises FmuFault where an FMU fails or the values do not settle.
     """
     carried = _carried(system)
-    fmus = []
-    for fmu in system.fmus:
-        new = carried.get(fmu.name, ())
-        names = {scalar.name for scalar, _ in new}
-        others = tuple(row for row in fmu.starts if row[0].name not in names)
-        fmus.append(replace(fmu, starts=others + new))
+    fmus = tuple(fmu.starting(carried.get(fmu.name, ())) for fmu in system.fmus)
     connections = tuple(c for c in system.connections if not c.initial)
-    return replace(system, fmus=tuple(fmus), connections=connections)
+    return replace(system, fmus=fmus, connections=connections)
 
 
 def by_port(system: System) -> dict[str, dict[str, tuple[float, ...]]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -48,6 +48,12 @@ class Fmu:
     @property
     def sampled(self) -> bool:
         return self.description.timing == "sampled"
+
+    def starting(self, new: Starts) -> Fmu:
+        """The FMU with `new` start values, in place of those that these variables have."""
+        names = {scalar.name for scalar, _ in new}
+        others = tuple(start for start in self.starts if start[0].name not in names)
+        return replace(self, starts=others + new)
 
 
 @dataclass(frozen=True)

@@ -144,13 +144,12 @@ def _ticks(scene: Scene) -> int:
 
 def _with_parameters(fmu: Fmu, parameters: Parameters) -> Fmu:
     """An FMU with other start values of parameters."""
-    starts = {scalar.name: (scalar, value) for scalar, value in fmu.starts}
     for name, values in parameters.items():
         owner, _, port = name.partition(".")
         if owner == fmu.name:
             scalars = fmu.description.port(port, "parameter")
-            starts |= {s.name: (s, v) for s, v in zip(scalars, values, strict=True)}
-    return replace(fmu, starts=tuple(starts.values()))
+            fmu = fmu.starting(tuple(zip(scalars, values, strict=True)))
+    return fmu
 
 
 def _summary(worst: Case) -> str:

@@ -62,7 +62,7 @@ def test_a_pose_is_that_of_a_scene_that_starts_there_by_the_fmus_of_the_scenes_o
     assert linkage is not None
     files = set()
     for pose in evenly_spaced(simulated(scene, ("duration=0.5",)), linkage, 3):
-        with resting(scene, pose.options(())) as there:
+        with resting(scene, pose.started(pose.held(()))) as there:
             start, expected = there.map.start, leading(there.period({}))
         with resting(scene, pose.held(()), joints=pose.joints) as moved:
             assert moved.map.start == pytest.approx(start, abs=1e-9)
