@@ -21,7 +21,6 @@ TEXT_ALONE = {
     "ports.md",
     "scene-reference.md",
     "glossary.md",
-    "history.md",
     "errata.md",
     "install.md",
 }
