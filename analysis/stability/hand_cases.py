@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -143,8 +142,7 @@ class InHands:
 
 
 def in_poses(
-    scene: str | Path | Scene,
-    given: Sequence[str],
+    read: Scene,
     poses: Sequence[Pose],
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
@@ -157,7 +155,7 @@ def in_poses(
         if any(case.pose == pose.name for case in cases):
             continue
         try:
-            with at_pose(scene, given, pose, held=hands.keys() != {UNHELD}) as (place, _):
+            with at_pose(read, pose, held=hands.keys() != {UNHELD}) as (place, _):
                 # A constant wrench slides off what it presses on, whatever the loop does.
                 lasting = {
                     name: hand

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
 
 from hapticlink.analysis.stability.bisection import largest
 from hapticlink.analysis.stability.gains import LAWS
@@ -49,8 +48,8 @@ DECAY = 0.05
 """Rate (1/s) at which a scene with a remedy decays at least, lest what is frozen takes it back."""
 
 
-Visited = Callable[[tuple[str, ...]], Sequence[Pose]]
-"""The poses in which a scene with these options is judged."""
+Visited = Callable[[Scene], Sequence[Pose]]
+"""The poses in which a scene is judged."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +76,7 @@ class Remedy:
 
 
 def improvements(
-    scene: str | Path | Scene,
-    given: Sequence[str],
+    read: Scene,
     poses: Sequence[Pose],
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
@@ -90,7 +88,7 @@ def improvements(
     pose = next(pose for pose in poses if pose.name == worst.pose)
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
-    search = _Search(scene, tuple(given), pose, held, bounds)
+    search = _Search(read, pose, held, bounds)
     stable = worst.free or worst.verdict != "unstable" or worst.drifts
     with search.place() as (place, _):
         margin = search.margin(place)
@@ -102,29 +100,20 @@ def improvements(
 class _Search:
     def __init__(
         self,
-        scene: str | Path | Scene,
-        given: tuple[str, ...],
+        read: Scene,
         pose: Pose,
         hands: Mapping[str, Hand | None],
         bounds: Bounds,
     ) -> None:
-        self._scene, self._given, self._pose = scene, given, pose
-        self._hands, self._bounds = hands, bounds
-        self._read = open_scene.load(scene, given)
+        self._read, self._pose, self._hands, self._bounds = read, pose, hands, bounds
         self._haptic = exact(self._read.haptics.rate)
 
     def place(
         self, change: Sequence[str] = ()
     ) -> AbstractContextManager[tuple[RestingScene, Pose]]:
         """The scene at rest in the pose; with a change, in frames of whole haptic periods."""
-        held = self._hands.keys() != {UNHELD}
-        given = self._quick(change) if change else self._given
-        return at_pose(self._scene, given, self._pose, held)
-
-    def _quick(self, change: Sequence[str]) -> tuple[str, ...]:
-        """The options of the scene with a change, with frames of whole haptic periods."""
-        given = (*self._given, *change)
-        return whole_frames(open_scene.load(self._scene, given), given)
+        read = whole_frames(open_scene.load(self._read, change)) if change else self._read
+        return at_pose(read, self._pose, held=self._hands.keys() != {UNHELD})
 
     def margin(self, place: RestingScene) -> Margin:
         stiffness = None
@@ -234,13 +223,12 @@ class _Search:
         return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
 
     def _in_all(self, change: tuple[str, ...], visited: Visited) -> Remedy:
-        changed = (*self._given, *change)
-        changed, _ = short(open_scene.load(self._scene, changed), changed)
+        changed, _ = short(open_scene.load(self._read, change))
         try:
             poses = visited(changed)
         except (InputFault, FmuFault):  # its run fails
             return Remedy(change, float("inf"), False)
-        cases, without = in_poses(self._scene, changed, poses, self._hands, self._bounds)
+        cases, without = in_poses(changed, poses, self._hands, self._bounds)
         worst = _worst(cases) if cases and not without else float("inf")
         return Remedy(change, worst, worst < -DECAY)
 

@@ -52,10 +52,10 @@ from hapticlink.analysis.stability.poses import in_own_hand
 from hapticlink.analysis.stability.short_hyperperiod import rounded
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact, written
-from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -134,30 +134,28 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     Raises InputFault for a scene without equilibrium in its own hand, one whose hand pushes no
     device, or with a hyperperiod of more than 600 forces with frames of whole haptic periods, too.
     """
-    given, said = overrides.written(options), ""
-    read, hand, mechanism, count = _ports(scene, given)
+    read, said = open_scene.load(scene, options), ""
+    hand, mechanism, count = _ports(read)
     if count > LARGEST and read.graphics is not None:
-        given, said = rounded(read, given)
-        read, hand, mechanism, count = _ports(scene, given)
+        read, said = rounded(read)
+        hand, mechanism, count = _ports(read)
     if count > LARGEST:
         raise InputFault(
             f"user's port: {count} forces in a hyperperiod, at most {LARGEST}: take a higher "
             f"graphics rate, such as --set graphics.rate={written(exact(read.haptics.rate) / 16)}"
         )
-    with in_own_hand(scene, given) as (place, _):
+    with in_own_hand(read) as (place, _):
         found = of(read.title, place.period({}), hand, mechanism, place.T)
     return replace(found, rounded=said)
 
 
-def _ports(
-    scene: str | Path | Scene, given: tuple[str, ...]
-) -> tuple[Scene, HandPort, MechanismPort | None, int]:
-    """A scene, its ports, and the entries of the forces there in a hyperperiod."""
-    with linearisable(scene, given) as (read, system, _):
+def _ports(read: Scene) -> tuple[HandPort, MechanismPort | None, int]:
+    """The ports of a scene, and the entries of the forces there in a hyperperiod."""
+    with linearisable(read) as (_, system, _):
         hand = hand_port(system)
         mechanism = mechanism_port(system, hand)
         with lifted_map(long_enough(read, system), read) as map_:
-            return read, hand, mechanism, forces(map_, hand, mechanism)
+            return hand, mechanism, forces(map_, hand, mechanism)
 
 
 def of(

@@ -18,7 +18,6 @@ from hapticlink.analysis.stability.smooth_scene import Joints
 from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import Fault, FmuFault, InputFault
@@ -33,7 +32,7 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results, Table, load
-from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.timeline import timeline
 
@@ -85,38 +84,34 @@ class Pose:
     def name(self) -> str:
         return self.title or f"{self.time:.3g} s" + (" (in contact)" if self.touches else "")
 
-    def leaves(self, scene: str | Path | Scene, given: Sequence[str], hand: Hand | None) -> bool:
+    def leaves(self, read: Scene, hand: Hand | None) -> bool:
         """Whether the run of a scene from this pose on, in a hand that stands still next to it,
         comes further away than NEAR; one that fails does."""
         if not isinstance(hand, ArmHand | SpringHand):
             return True
-        beside = np.add(self.point, OFF)
-        changes = {"hand": standing(hand, beside), "duration": LEAVING, "stop_when": ""}
-        run = simulated(scene, self.started(given), changes)
+        held = {"hand": standing(hand, np.add(self.point, OFF))}
+        changes = {**self.started, **held, "duration": LEAVING, "stop_when": ""}
+        run = simulated(read, changes)
         moved = np.abs(_recorded(run)[POINT_POSE] - self.point).max(axis=0)
         return bool(run.record.fault) or bool((moved > NEAR).any())
 
-    def started(self, given: Sequence[str]) -> tuple[str, ...]:
-        """The options of the scene that starts at rest in this pose."""
-        start = {"linkage.start": self.joints, "linkage.start_velocity": {}}
-        return (*given, *overrides.written(start))
+    @property
+    def started(self) -> dict[str, object]:
+        """The options with which a scene starts at rest in this pose."""
+        return {"linkage.start": self.joints, "linkage.start_velocity": {}}
 
-    def held(self, given: Sequence[str]) -> tuple[str, ...]:
-        """The options of the scene in a spring hand that stands still in this pose."""
+    @property
+    def held(self) -> dict[str, object]:
+        """The options with which a spring hand that stands still holds a scene in this pose."""
         no_force = (0.0, 0.0, 0.0)
         hands = {f"hands.{u}": spring(x, no_force, FIRM) for u, x in self.others.items()}
-        hand = {"hand": spring(self.point, self.press, FIRM)}
-        return (*given, *overrides.written(hand | hands))
+        return {"hand": spring(self.point, self.press, FIRM), **hands}
 
 
-def simulated(
-    scene: str | Path | Scene,
-    given: Sequence[str],
-    changes: Mapping[str, object] = {},
-) -> Results:
-    """A run of the scene with changes as options. Raises InputFault where it has no row."""
+def simulated(scene: str | Path | Scene, options: Options = ()) -> Results:
+    """A run of the scene. Raises InputFault where it has no row."""
     with temporary_folders.room() as room:
-        experiment = simulate(scene, room, (*given, *overrides.written(changes)), csv=False)
+        experiment = simulate(scene, room, options, csv=False)
         if not experiment.outcome.published:
             raise InputFault(f"the scene's own run fails: {experiment.outcome.fault}")
         return load(room, binary=True)
@@ -139,26 +134,25 @@ def evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     return [_pose(run, linkage, i) for i in moments]
 
 
-def settled(scene: str | Path | Scene, given: Sequence[str], linkage: Linkage) -> list[Pose]:
+def settled(read: Scene, linkage: Linkage) -> list[Pose]:
     """Where the constant wrench of a scene would come to rest, if it does, with a damped handle: at
     the end of a run, and about its mean if there is no equilibrium nearby. Raises InputFault where
     that fails."""
-    hand = open_scene.load(scene, given).hand
-    assert isinstance(hand, ConstantHand)
-    wrench = hand.wrench
+    assert isinstance(read.hand, ConstantHand)
+    wrench = read.hand.wrench
     damped = {"type": "constant", "wrench": list(wrench), "damping": SETTLED_BY}
-    run = simulated(scene, given, {"hand": damped, "duration": SETTLING, "stop_when": ""})
+    run = simulated(read, {"hand": damped, "duration": SETTLING, "stop_when": ""})
     if run.record.fault:
         raise InputFault(f"its run with a damped handle fails: {run.record.fault.message}")
     near = (_average(run, linkage, since) for since in (1.0, 1.0 - CALM))
     return [replace(pose, press=wrench, title="where its wrench leads") for pose in near]
 
 
-def rest(scene: str | Path | Scene, given: Sequence[str], linkage: Linkage) -> Pose:
+def rest(read: Scene, linkage: Linkage) -> Pose:
     """Where the run of a scene comes to rest within LONGEST, with what its hand presses there.
     Raises InputFault where it fails, or keeps moving."""
-    hyperperiod(timeline(open_scene.load(scene, given)))  # refuses rates without one
-    run = simulated(scene, given, {"duration": LONGEST, "stop_when": ""})
+    hyperperiod(timeline(read))  # refuses rates without one
+    run = simulated(read, {"duration": LONGEST, "stop_when": ""})
     if run.record.fault:
         raise InputFault(f"the run does not come to rest: {run.record.fault.message}")
     table = _recorded(run)
@@ -167,11 +161,16 @@ def rest(scene: str | Path | Scene, given: Sequence[str], linkage: Linkage) -> P
     if (speed := float(fastest.max())) > AT_REST:
         joint = rates[:, int(np.argmax(fastest))]
         hertz = np.count_nonzero(np.diff(np.sign(joint))) / 2 / (LATE * LONGEST)
-        raise InputFault(
+        moves = (
             f"the run does not come to rest in {LONGEST:g} s: its joints still move at up to "
-            f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz; an equilibrium takes damping, or a hand "
-            "that holds it"
+            f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz"
         )
+        if not (read.device or read.controller or read.hand or read.fmu):
+            raise InputFault(
+                f"{moves}. The scene is a mechanism alone, without a sampled loop to be judged: "
+                "that takes a [device] and a [controller], or an [[fmu]] such as a virtual wall"
+            )
+        raise InputFault(f"{moves}; an equilibrium takes damping, or a hand that holds it")
     pose = _average(run, linkage, 1.0)
     with_hand = table_of(run, HAND_WRENCH)
     press = (0.0, 0.0, 0.0) if with_hand is None else tuple(with_hand[HAND_WRENCH][-1].tolist())
@@ -179,18 +178,16 @@ def rest(scene: str | Path | Scene, given: Sequence[str], linkage: Linkage) -> P
 
 
 @contextmanager
-def in_own_hand(
-    scene: str | Path | Scene, given: Sequence[str]
-) -> Iterator[tuple[RestingScene, Hand | None]]:
+def in_own_hand(read: Scene) -> Iterator[tuple[RestingScene, Hand | None]]:
     """A scene at rest in its own hand, next to its start, or else where its run comes to rest; one
     with a constant wrench where that leads. In these it is held by a spring in whose place the hand
     that is given, too, is to be put. Raises InputFault or FmuFault where there is no
     equilibrium."""
     with ExitStack() as stack:
         found, last = None, Fault()
-        for options, joints, hand in _own_equilibria(scene, given):
+        for options, joints, hand in _own_equilibria(read):
             try:
-                found = stack.enter_context(resting(scene, options, joints=joints)), hand
+                found = stack.enter_context(resting(read, options, joints=joints)), hand
                 break
             except (InputFault, FmuFault) as fault:
                 last = fault
@@ -199,18 +196,15 @@ def in_own_hand(
         yield found
 
 
-def _own_equilibria(
-    scene: str | Path | Scene, given: Sequence[str]
-) -> Iterator[tuple[tuple[str, ...], Joints | None, Hand | None]]:
+def _own_equilibria(read: Scene) -> Iterator[tuple[Options, Joints | None, Hand | None]]:
     """The options of `in_own_hand`, its pose and its hand, in the order in which they are tried."""
-    read = open_scene.load(scene, given)
     if not presses(read):
-        yield tuple(given), None, None
+        yield (), None, None
     if read.linkage is None or read.hand is None or replaced(read):
         return
     leads = settled if presses(read) else lambda *scene: [rest(*scene)]
-    for pose in leads(scene, given, read.linkage):
-        yield pose.held(given), pose.joints, own_hand(read.hand)
+    for pose in leads(read, read.linkage):
+        yield pose.held, pose.joints, own_hand(read.hand)
 
 
 def presses(read: Scene) -> bool:
@@ -272,25 +266,21 @@ def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
 
 @contextmanager
 def at_pose(
-    scene: str | Path | Scene,
-    given: Sequence[str],
-    pose: Pose,
-    held: bool = True,
-    start: Vector | None = None,
+    read: Scene, pose: Pose, held: bool = True, start: Vector | None = None
 ) -> Iterator[tuple[RestingScene, Pose]]:
     """The scene at rest in a pose, `held` there by a firm spring or as it is, and the pose as it is
     pressed: a hand that slides off what it touches presses lightly. The equilibrium is searched
     from the state `start`. Raises InputFault or FmuFault where there is none."""
     with ExitStack() as stack:
         try:
-            options = pose.held(given) if held else given
-            place = stack.enter_context(resting(scene, options, start, pose.joints))
+            options = pose.held if held else {}
+            place = stack.enter_context(resting(read, options, start, pose.joints))
             _require_touch(pose, place)
         except (InputFault, FmuFault):
             if not pose.touches:
                 raise
             pose = pose.lighter
-            place = stack.enter_context(resting(scene, pose.held(given), start, pose.joints))
+            place = stack.enter_context(resting(read, pose.held, start, pose.joints))
         yield place, pose
 
 
@@ -301,8 +291,7 @@ def _require_touch(pose: Pose, place: RestingScene) -> None:
 
 @contextmanager
 def at_equilibrium(
-    scene: str | Path,
-    given: Sequence[str],
+    read: Scene,
     candidates: Sequence[Pose],
     tell: Callable[[str], object],
     starts: Mapping[str, Vector] = {},
@@ -314,7 +303,7 @@ def at_equilibrium(
         at_rest: list[Pose] = []
         held_at: dict[str, RestingScene] = {}
         for pose in candidates:
-            found = at_pose(scene, given, pose, start=starts.get(pose.name))
+            found = at_pose(read, pose, start=starts.get(pose.name))
             try:
                 place, pressed = stack.enter_context(found)
                 _require_touch(pose, place)

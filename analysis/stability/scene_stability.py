@@ -9,9 +9,9 @@ judged as it is, where its run comes to rest.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -43,7 +43,6 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, shortened
 from hapticlink.orchestrator.fmi import process_cache
-from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -76,30 +75,29 @@ def stability(
     poses = int(require("poses", poses, Annotated[int, Quantity("1", ge=1)]))
     grid = int(require("grid", grid, Annotated[int, Quantity("1", ge=0, le=GRID)]))
     _require_bounds(bounds)
-    given = overrides.written(options)
-    read = open_scene.load(scene, given)
+    read = open_scene.load(scene, options)
     if varies(read):
         raise InputFault(
             "a rate that varies is judged in mean square, at the equilibrium of the scene: "
             "--equilibrium, with a hand that holds it"
         )
-    given, rounded = short(read, given)
+    read, rounded = short(read)
     if read.hand is None or replaced(read):
-        return _judged(scene, given, _at_rest(scene), {UNHELD: None}, bounds, progress, rounded)
+        return _judged(read, _at_rest, {UNHELD: None}, bounds, progress, rounded)
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
     with interrupt.held(), process_cache.unpacked_once():
         (progress or _silent)("the scene's own run", 0, poses + 2)
-        own = _visited(scene, given, poses, grid)
+        own, own_fault = _visited(read, poses, grid)
 
-        def visits(options: tuple[str, ...]) -> list[Pose]:
-            found = own if options == given else _visited(scene, options, poses, grid)
-            if found.fault and not own.fault:
-                raise InputFault(found.fault)
-            return found.poses
+        def visits(changed: Scene) -> list[Pose]:
+            found, fault = (own, own_fault) if changed is read else _visited(changed, poses, grid)
+            if fault and not own_fault:
+                raise InputFault(fault)
+            return found
 
-        judged = _judged(scene, given, visits, hands_of(read.hand), bounds, progress, rounded)
-    return replace(judged, run_fault=own.fault)
+        judged = _judged(read, visits, hands_of(read.hand), bounds, progress, rounded)
+    return replace(judged, run_fault=own_fault)
 
 
 def equilibrium_stability(
@@ -116,16 +114,15 @@ def equilibrium_stability(
     keeps moving.
     """
     _require_bounds(bounds)
-    given = overrides.written(options)
-    read = open_scene.load(scene, given)
+    read = open_scene.load(scene, options)
     if varies(read):
         with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
             return varying_stability(read)
     hands: Hands = {UNHELD: None}
     if read.hand is not None and not replaced(read):
         hands = {OWN: own_hand(read.hand)}
-    given, rounded = short(read, given)
-    return _judged(scene, given, _at_rest(scene), hands, bounds, progress, rounded)
+    read, rounded = short(read)
+    return _judged(read, _at_rest, hands, bounds, progress, rounded)
 
 
 def _require_bounds(bounds: Bounds) -> None:
@@ -149,43 +146,29 @@ def hands_of(hand: Hand) -> dict[str, Hand]:
     return {**HANDS, (OWN_FREE if damped else FREE): own_hand(hand)}
 
 
-@dataclass(frozen=True)
-class _Visits:
+def _visited(read: Scene, count: int, grid: int) -> tuple[list[Pose], str]:
     """The poses that a scene's own run visits, and how that failed, "" where it did not."""
-
-    poses: list[Pose]
-    fault: str
-
-
-def _visited(scene: str | Path | Scene, given: Sequence[str], count: int, grid: int) -> _Visits:
-    read = open_scene.load(scene, given)
     assert read.linkage is not None
-    run = simulated(scene, given, {"duration": SPAN, "stop_when": ""})
+    run = simulated(read, {"duration": SPAN, "stop_when": ""})
     poses = evenly_spaced(run, read.linkage, count)
     if presses(read):
         with suppress(InputFault):
-            poses += settled(scene, given, read.linkage)
+            poses += settled(read, read.linkage)
     if grid:
         poses += grid_poses(run, read, read.linkage, grid)
-    return _Visits(poses, fault_of(run))
+    return poses, fault_of(run)
 
 
-def _at_rest(scene: str | Path | Scene) -> Visited:
-    """Where the run of a scene with given options comes to rest."""
-
-    def visited(given: tuple[str, ...]) -> list[Pose]:
-        linkage = open_scene.load(scene, given).linkage
-        if linkage is None:
-            raise InputFault("no linkage: nothing that comes to rest in a pose")
-        with interrupt.held():
-            return [rest(scene, given, linkage)]
-
-    return visited
+def _at_rest(read: Scene) -> list[Pose]:
+    """Where the run of a scene comes to rest."""
+    if read.linkage is None:
+        raise InputFault("no linkage: nothing that comes to rest in a pose")
+    with interrupt.held():
+        return [rest(read, read.linkage)]
 
 
 def _judged(
-    scene: str | Path | Scene,
-    given: tuple[str, ...],
+    read: Scene,
     visits: Visited,
     hands: Hands,
     bounds: Bounds,
@@ -193,15 +176,10 @@ def _judged(
     rounded: str,
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
-    step, visited = progress or _silent, visits(given)
+    step, visited = progress or _silent, visits(read)
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(
-            scene,
-            given,
-            visited,
-            hands,
-            bounds,
-            lambda done, of: step("poses", done + 1, of + 2),
+            read, visited, hands, bounds, lambda done, of: step("poses", done + 1, of + 2)
         )
         if not cases:
             name, why = next(iter(without.items()))
@@ -209,7 +187,7 @@ def _judged(
         worst = max(cases, key=lambda case: case.severity)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
             pose = next(pose for pose in visited if pose.name == worst.pose)
-            if pose.leaves(scene, given, hands[worst.hand]):
+            if pose.leaves(read, hands[worst.hand]):
                 break
             cases[cases.index(worst)] = replace(worst, verdict="marginal")
             worst = max(cases, key=lambda case: case.severity)
@@ -218,8 +196,8 @@ def _judged(
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         step("margins", len(visited) + 1, len(visited) + 2)
         judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
-        margin, remedies = improvements(scene, given, judged, held, bounds, worst, visits)
-        with linearisable(scene, given) as (read, system, removed):
+        margin, remedies = improvements(read, judged, held, bounds, worst, visits)
+        with linearisable(read) as (_, system, removed):
             frozen = (*removed, *frozen_nonlinearities.kept(system))
     return Stability(
         title=read.title,

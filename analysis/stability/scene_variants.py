@@ -6,7 +6,7 @@ search for its equilibrium starts from that of the variant before.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -18,10 +18,10 @@ from hapticlink.analysis.stability.poses import in_own_hand
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.components.specs.hand import Hand
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import Fault, FmuFault, InputFault
 from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -68,12 +68,12 @@ class SceneVariants:
     def judge(self, options: Options) -> Radius:
         """The spectral radius of the scene with `options`, around its equilibrium in its own hand.
         Raises InputFault and FmuFault where it has none."""
-        given = overrides.written(options)
-        with linearisable(self._scene, given) as (_, system, _):
+        read = open_scene.load(self._scene, options)
+        with linearisable(read) as (_, system, _):
             kind, starts = _kind(system), _starts(system)
         try:
             if kind != self._kind or not self._moved(starts):
-                self._load(given, kind)
+                self._load(read, kind)
         except Fault:
             self._kind = None
             raise
@@ -83,9 +83,9 @@ class SceneVariants:
         radius, uncertainty = (abs(leading[0].z), leading[0].uncertainty) if leading else (0.0, 0.0)
         return Radius(radius, uncertainty, self._place.map.period)
 
-    def _load(self, given: Sequence[str], kind: Hashable) -> None:
+    def _load(self, read: Scene, kind: Hashable) -> None:
         self._open.close()
-        self._place, self._hand = self._open.enter_context(in_own_hand(self._scene, given))
+        self._place, self._hand = self._open.enter_context(in_own_hand(read))
         self._kind = kind
         self.loads += 1
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from hapticlink.analysis.stability.lifted_map import hyperperiod
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene.scene import Scene
@@ -14,22 +13,22 @@ EVENTS = 600
 """Haptic periods after which all has to repeat in a scene that is judged at its own rates."""
 
 
-def short(read: Scene, given: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
-    """The options with which a scene is judged, and which rate is rounded in them: where its events
-    repeat only after more than EVENTS, as of 29.97 and 512 Hz after 100 s, frames are whole haptic
-    periods. Raises InputFault for a rate that varies."""
+def short(read: Scene) -> tuple[Scene, str]:
+    """The scene as it is judged, and which rate is rounded in it: where its events repeat only
+    after more than EVENTS, as of 29.97 and 512 Hz after 100 s, frames are whole haptic periods.
+    Raises InputFault for a rate that varies."""
     period = repetition(read)
     if read.graphics is None or period * float(read.haptics.rate) <= EVENTS:
-        return given, ""
-    return rounded(read, given)
+        return read, ""
+    return rounded(read)
 
 
-def rounded(read: Scene, given: Sequence[str]) -> tuple[tuple[str, ...], str]:
-    """The options with whole frames of a scene that has a graphics rate, and a sentence that says
-    so. Raises InputFault for one that varies."""
+def rounded(read: Scene) -> tuple[Scene, str]:
+    """A scene that has a graphics rate in whole frames, and a sentence that says so. Raises
+    InputFault for one that varies."""
     whole = float(exact(read.haptics.rate)) / frame_length(read)
     why = f"with its own rates all repeats only after {repetition(read):.4g} s"
-    return whole_frames(read, given), f"judged with graphics at {whole:.5g} Hz: {why}"
+    return whole_frames(read), f"judged with graphics at {whole:.5g} Hz: {why}"
 
 
 def repetition(read: Scene) -> float:
@@ -38,12 +37,13 @@ def repetition(read: Scene) -> float:
     return time.seconds(hyperperiod(time))
 
 
-def whole_frames(read: Scene, given: Sequence[str]) -> tuple[str, ...]:
-    """The options with the graphics rate next to that of a scene whose frames are whole haptic
-    periods. Raises InputFault for one that varies."""
+def whole_frames(read: Scene) -> Scene:
+    """The scene at the graphics rate next to its own with which frames are whole haptic periods.
+    Raises InputFault for one that varies."""
     if read.graphics is None:
-        return tuple(given)
-    return (*given, f'graphics.rate="{exact(read.haptics.rate) / frame_length(read)}"')
+        return read
+    rate = exact(read.haptics.rate) / frame_length(read)
+    return open_scene.load(read, [f'graphics.rate="{rate}"'])
 
 
 def frame_length(read: Scene) -> int:

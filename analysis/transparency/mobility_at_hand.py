@@ -39,7 +39,6 @@ from hapticlink.orchestrator.base.signal_names import MOBILITIES
 from hapticlink.orchestrator.base.text_table import aligned
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
 
 FORCE = 0.1
@@ -164,13 +163,11 @@ def transparency(
     again, with frames of whole haptic periods. Raises InputFault for a scene without device,
     controller or linkage, and where no pose has an equilibrium."""
     read = open_scene.load(scene, options)
-    linkage = _linkage(read)
+    poses, whole = _visited(read, count), whole_frames(read)
     found, why = [], ""
-    given = tuple(options)
-    for pose in _visited(scene, given, linkage, count):
+    for pose in poses:
         try:
-            options = pose.held(whole_frames(read, given))
-            with resting(scene, options, joints=pose.joints) as place:
+            with resting(whole, pose.held, joints=pose.joints) as place:
                 found.append(_felt(read, place, pose.name, {}))
         except (InputFault, FmuFault) as fault:
             why = f"{pose.name}: {fault}"
@@ -179,11 +176,10 @@ def transparency(
     return found
 
 
-def _visited(
-    scene: str | Path | Scene, given: Sequence[str], linkage: Linkage, count: int
-) -> list[Pose]:
+def _visited(read: Scene, count: int) -> list[Pose]:
     """Poses of the scene's own run, which is said where it fails."""
-    run = simulated(scene, given)
+    linkage = _linkage(read)
+    run = simulated(read)
     if why := fault_of(run):
         warning = "warning: the scene's own run fails: %s; its poses are those up to there"
         logging.getLogger(__name__).warning(warning, why)
@@ -263,8 +259,8 @@ def costs(
 ) -> list[Cost]:
     """How the scene feels at its start with other rates, delays and holds, and how stiff it can be
     made."""
-    read, given = open_scene.load(scene, options), tuple(options)
-    pose = _visited(scene, given, _linkage(read), 1)[0]
+    read = open_scene.load(scene, options)
+    pose = _visited(read, 1)[0]
     rate = float(exact(read.haptics.rate))
     late = {"motors": ("controller.F_motor",), "handle": ("haptic_device.x", "haptic_device.v")}
     late["mechanism"] = ("virtual_mechanism.x", "virtual_mechanism.v")
@@ -281,9 +277,8 @@ def costs(
     found = []
     for name, change in changes.items():
         try:
-            changed = (*given, *overrides.written(change))
-            options = pose.held(whole_frames(open_scene.load(scene, changed), changed))
-            with resting(scene, options, joints=pose.joints) as place:
+            whole = whole_frames(open_scene.load(read, change))
+            with resting(whole, pose.held, joints=pose.joints) as place:
                 found.append(_cost(read, place, name))
         except (InputFault, FmuFault) as fault:
             tell(f"  {name}: {fault}")

@@ -37,8 +37,8 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results.tables import Results
-from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.scene import Scene
 
 MARGIN, POSES = 2.0, 5
 REMEDY = "take a higher graphics.rate or haptics.rate, or a smaller --margin"
@@ -67,14 +67,14 @@ def tune(
         raise InputFault(f"margin {margin:g}: give 1 or more, the factor up to instability")
     tell, keep = tell or (lambda text: None), keep or (lambda tuned: None)
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
-        tuning = _Tuning(scene, overrides.written(options), margin, tell, keep)
+        tuning = _Tuning(open_scene.load(scene, options), margin, tell, keep)
         scales = tuning.judge_at_own_rates(tuning.search())
         tuning.judge_at_near_rates(scales)
     return tuning.result
 
 
 class _Tuning:
-    """A tuning in progress, of a scene with the options `given`."""
+    """A tuning in progress."""
 
     result: Tuned
     _resting: Sequence[Pose] = ()
@@ -83,25 +83,22 @@ class _Tuning:
 
     def __init__(
         self,
-        scene: str | Path,
-        given: tuple[str, ...],
+        read: Scene,
         margin: float,
         tell: Callable[[str], object],
         keep: Callable[[Tuned], object],
     ) -> None:
-        self._scene, self._given, self._margin = scene, given, margin
-        self._tell, self._keep = tell, keep
-        self._read = open_scene.load(scene, given)
-        self._linkage = required(self._read)
+        self._read, self._margin, self._tell, self._keep = read, margin, tell, keep
+        self._linkage = required(read)
 
     def search(self) -> dict[str, float]:
         """The scales of the largest gains with which margin and run hold, with frames of whole
         haptic periods."""
-        quick = whole_frames(self._read, self._given)
+        quick = whole_frames(self._read)
         self._tell("the scene's own run, for its poses")
-        run = simulated(self._scene, self._given)
+        run = simulated(self._read)
         moments = evenly_spaced(run, self._linkage, POSES)
-        with at_equilibrium(self._scene, quick, moments, self._tell) as (resting, held):
+        with at_equilibrium(quick, moments, self._tell) as (resting, held):
             pressed = [pose for pose in resting if pose.touches]
             if any(pose.touches for pose in moments) and not pressed:
                 raise InputFault(
@@ -143,7 +140,7 @@ class _Tuning:
     def judge_at_own_rates(self, scales: dict[str, float]) -> dict[str, float]:
         """The scales, lowered where the margin at the scene's own rates asks for it."""
         self._tell("the margin at the scene's own rates")
-        with self._at_equilibrium(self._given) as (self.result.poses, held):
+        with self._at_equilibrium(self._read) as (self.result.poses, held):
             judge = Judge(held)
             reached = judge.margin(scales)
             if reached < self._margin * (1 - 2 * FINE):
@@ -157,8 +154,7 @@ class _Tuning:
         """Adds the margins at neighbouring rates to the result, 0 where there is no equilibrium."""
         margins = self.result.margins
         for rate in near_rates(self._read):
-            near = (*self._given, rate)
-            near = whole_frames(open_scene.load(self._scene, near), near)
+            near = whole_frames(open_scene.load(self._read, [rate]))
             try:
                 with self._at_equilibrium(near) as (_, held):
                     margins[rate] = Judge(held).margin(scales, COARSE)
@@ -178,9 +174,9 @@ class _Tuning:
         self._keep(result)
 
     def _run(self, feel: Feel, scales: dict[str, float]) -> Results:
-        return simulated(self._scene, self._given, feel.gains.options(scales))
+        return simulated(self._read, feel.gains.options(scales))
 
     def _at_equilibrium(
-        self, options: tuple[str, ...]
+        self, read: Scene
     ) -> AbstractContextManager[tuple[list[Pose], dict[str, RestingScene]]]:
-        return at_equilibrium(self._scene, options, self._resting, self._tell, self._states)
+        return at_equilibrium(read, self._resting, self._tell, self._states)

@@ -15,7 +15,6 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linearisation import Linearisation, constant
 from hapticlink.analysis.stability.modes import Mode, counted, leading, modes, verdict
 from hapticlink.analysis.stability.poses import in_own_hand
-from hapticlink.orchestrator.scene import overrides
 
 LOST = 1e-6
 """Modes with a smaller |z| have vanished within a period."""
@@ -68,7 +67,7 @@ def linearised(map_: LiftedMap, point: np.ndarray) -> Linearisation:
 
 
 def own_hand(scene: str | Path | hl.Scene, options: Any = ()) -> OwnHand:
-    with in_own_hand(scene, overrides.written(options)) as (place, hand):
+    with in_own_hand(hl.scene(scene, options)) as (place, hand):
         period = place.period({})
         point = dict(zip(map(str, place.map.coordinates), period.point.tolist(), strict=True))
         slopes = place.map.slopes_by()

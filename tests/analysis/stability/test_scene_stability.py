@@ -62,9 +62,9 @@ def test_a_pose_is_that_of_a_scene_that_starts_there_by_the_fmus_of_the_scenes_o
     assert linkage is not None
     files = set()
     for pose in evenly_spaced(simulated(scene, ("duration=0.5",)), linkage, 3):
-        with resting(scene, pose.started(pose.held(()))) as there:
+        with resting(scene, pose.started | pose.held) as there:
             start, expected = there.map.start, leading(there.period({}))
-        with resting(scene, pose.held(()), joints=pose.joints) as moved:
+        with resting(scene, pose.held, joints=pose.joints) as moved:
             assert moved.map.start == pytest.approx(start, abs=1e-9)
             assert leading(moved.period({})) == pytest.approx(expected, abs=1e-9)
             fmus = moved.map.system.fmus
@@ -195,25 +195,24 @@ def test_rates_that_hardly_repeat_are_judged_with_frames_of_whole_periods() -> N
 
 def test_a_hand_beside_a_pose_leaves_it_where_it_pulls_away() -> None:
     """What is a divergence to the linearisation is judged by such a run."""
-    run = simulated("closed-loop", ("duration=0.1",))
-    (pose,) = evenly_spaced(run, hl.scene("closed-loop").linkage, 1)
-    assert not pose.leaves("closed-loop", (), HANDS["stiff arm, firm grip"])
+    scene = hl.scene("closed-loop")
+    (pose,) = evenly_spaced(simulated(scene, ("duration=0.1",)), scene.linkage, 1)
+    assert not pose.leaves(scene, HANDS["stiff arm, firm grip"])
     elsewhere = replace(pose, point=(pose.point[0] + 0.02, *pose.point[1:]))
-    assert elsewhere.leaves("closed-loop", (), HANDS["light touch"])
-    assert pose.leaves("closed-loop", (), None)
+    assert elsewhere.leaves(scene, HANDS["light touch"])
+    assert pose.leaves(scene, None)
 
 
 def test_softer_gains_stand_beside_another_remedy() -> None:
     """In a firm grip of the mechanism at 18 Hz a faster loop ends what softer gains end, too, which
     are below the limit of the margin: that of 18 Hz, where frames of 28 and 29 haptic periods take
     turns, and not of frames that are all alike, with which 2.8 times the gains are stable."""
-    scene, given = "closed-loop-direct", ("graphics.rate=18",)
-    linkage = hl.scene(scene).linkage
-    poses = evenly_spaced(simulated(scene, (*given, "duration=0.1")), linkage, 1)
+    scene = hl.scene("closed-loop-direct", ("graphics.rate=18",))
+    poses = evenly_spaced(simulated(scene, ("duration=0.1",)), scene.linkage, 1)
     hands = {"firm grip": HANDS["firm grip"]}
-    (case,), _ = in_poses(scene, given, poses, hands, DRIFT)
+    (case,), _ = in_poses(scene, poses, hands, DRIFT)
     assert case.verdict == "unstable"
-    margin, remedies = improvements(scene, given, poses, hands, DRIFT, case, lambda _: poses)
+    margin, remedies = improvements(scene, poses, hands, DRIFT, case, lambda _: poses)
     assert margin.stiffness
     softer = f"{100 * margin.stiffness / SAFE:.4g}"
     found = [r for r in remedies if f"teleoperation.stiffness=[{softer}" in r.options[0]]

@@ -126,7 +126,8 @@ def test_felt_stiffness_has_its_closed_form(
 ) -> None:
     """The closed form is the limit of high rates."""
     pose = Pose(0.0, {"rail": 0.0205}, (0.0205, 0.0, 0.0), (1.0, 0.0, 0.0))
-    options = pose.started(pose.held((f"haptics.rate={rate}", f"graphics.rate={rate // 16}")))
+    rates = {"haptics.rate": rate, "graphics.rate": rate // 16}
+    options = rates | pose.held | pose.started
     with resting(slider, options) as place:
         X = place.compliance({}, hertz)
         assert place.signal("virtual_mechanism.F_env")[0] == pytest.approx(-1.0, abs=0.03)
@@ -185,7 +186,7 @@ def pressed(name: str, pose: Pose, n: NDArray[np.float64], hertz: float, swing: 
         "amplitude": (swing * n / np.abs(n).max()).tolist(),
         "frequency": [hertz] * 3,
     }
-    options = [*pose.started(pose.held(())), *written({"hand": push}), "duration=4.0", *NO_ENCODER]
+    options = [*written(pose.started | pose.held | {"hand": push}), "duration=4.0", *NO_ENCODER]
     run = hl.run(RECORDED / name / "tuned.toml", options, figures=False)
     assert run.fault is None
     window = run.haptics["time"] > 3.0 + 1e-9
@@ -219,8 +220,7 @@ def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
         off = (pose.point[0] + 1e-4, *pose.point[1:])
         options = [
             *gains(found, found["margins"]["tuned"] * share),
-            *pose.started(pose.held(())),
-            *written({"hand": spring(off, pose.press, FIRM)}),
+            *written(pose.started | pose.held | {"hand": spring(off, pose.press, FIRM)}),
             "duration=1.5",
             *NO_ENCODER,
         ]
@@ -235,7 +235,7 @@ def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
 def test_rest_is_found_with_gains_that_are_unstable_there() -> None:
     """Own gains of `obstacles` throw the handle off; they are judged at the pose all the same."""
     pose = {pose.name: pose for pose in poses(recorded("obstacles"))}["1.8 s"]
-    given = pose.started(pose.held(("sensing=encoders", "graphics.rate=32")))
+    given = {"sensing": "encoders", "graphics.rate": 32} | pose.started | pose.held
     with resting("obstacles", given) as place:
         assert place.signal("haptic_device.x_true") == pytest.approx(pose.point, abs=1e-6)
         assert place.stable(dict.fromkeys(place.gains.laws, 0.5), FIRM)
@@ -249,7 +249,7 @@ def test_a_contact_that_is_slid_off_is_pressed_lightly() -> None:
     assert size == pytest.approx(LIGHT)
     for force, least, most in ((LIGHT, 0.0, 2e-4), (4.7, 4e-3, np.inf)):
         pressed = replace(pose, press=tuple(F * force / size for F in pose.press))
-        options = [*pressed.started(pressed.held(())), "duration=4.0", *NO_ENCODER]
+        options = [*written(pressed.started | pressed.held), "duration=4.0", *NO_ENCODER]
         run = hl.run(RECORDED / "obstacles" / "tuned.toml", options, figures=False)
         assert run.fault is None
         assert run["virtual_mechanism.F_env"][-1].any()
@@ -260,7 +260,7 @@ def test_slopes_of_operations_have_the_radius_of_the_whole_map() -> None:
     """A judgement takes the slopes of single operations; the whole map, by differences along all of
     its columns, has the same spectral radius."""
     pose = poses(recorded("closed-loop"))[0]
-    given = pose.started(pose.held(("sensing=encoders", "graphics.rate=128")))
+    given = {"sensing": "encoders", "graphics.rate": 128} | pose.started | pose.held
     with resting("closed-loop", given) as place:
         period = place.period(dict.fromkeys(("drift", "topology"), 3.0))
         whole = linearised(place.map, period.point)
@@ -314,7 +314,7 @@ def gains(found: dict[str, Any], factor: float) -> tuple[str, ...]:
 def test_the_energy_at_the_users_port_is_a_limit() -> None:
     """A run whose port gives more than that of the scene's own gains and a quarter of the work."""
     soft, stiff = (
-        simulated("closed-loop-direct", (), {"controller.teleoperation.stiffness": [k, k, 0.1]})
+        simulated("closed-loop-direct", {"controller.teleoperation.stiffness": [k, k, 0.1]})
         for k in (100.0, 150.0)
     )
     limit, peaks = RunLimit(soft), [motion(run)["energy_peak"] for run in (soft, stiff)]
