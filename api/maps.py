@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hapticlink.analysis.maps.stability_map import Map, compute_map
-from hapticlink.analysis.sweep.points import Vary, axes
+from hapticlink.analysis.sweep.grid import Vary, axes
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene import overrides

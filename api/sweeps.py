@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.sweep import grid, job, row, table
-from hapticlink.analysis.sweep.points import Runs, Vary, points
+from hapticlink.analysis.sweep.grid import Runs, Vary, points
 from hapticlink.analysis.sweep.run_sweep import Unfinished
 from hapticlink.analysis.sweep.run_sweep import sweep as make
 from hapticlink.api.frame import frame

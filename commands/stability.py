@@ -92,7 +92,7 @@ def stability(
         print_result((f"{name}: {first}", *rest), record, quiet, json)
         return 0
     import hapticlink as hl
-    from hapticlink.analysis.stability.mode_kinds import Bounds
+    from hapticlink.analysis.stability.modes import Bounds
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 

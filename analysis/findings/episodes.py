@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.episode_thresholds import EPISODES, FULL_TORQUE, NOTICEABLE_J
 from hapticlink.analysis.findings.forces import torques, touching
 from hapticlink.analysis.findings.tracking import (
     COPY_BRANCH_OK,
@@ -19,10 +18,22 @@ from hapticlink.analysis.findings.tracking import (
     constraint_counts,
     of_block,
 )
-from hapticlink.analysis.findings.user_port import UserPort, ports
+from hapticlink.analysis.findings.user_port import NOTICEABLE_J, UserPort, ports
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.results.recorded_scene import all_devices
 from hapticlink.orchestrator.results.tables import Results, Vector
+
+EPISODES = {
+    "folded": "graphics copy folded",
+    "saturated": "motors at their limit",
+    "energy": "energy generated at the user's port",
+    "constraints": "unusual number of constrained directions",
+    "contacts": "contacts",
+    "outside": "outside the device's workspace",
+}
+"""Kinds of episodes and their meaning."""
+FULL_TORQUE = 1 - 1e-6
+"""Share of their largest torque from which on motors are at their limit."""
 
 
 class Episode(NamedTuple):

@@ -20,7 +20,7 @@ a mobility or directions that are held or differ, velocity terms left out, satur
 
 Works on the handle and the mechanism are those of the energy meters, of the wrenches as they act:
 a sample that comes late, by a latency or in the order of Jacobi, or is lost is paired with the
-displacement over which it acts (`sample_arrivals.py`). Where a hold gives other values than
+displacement over which it acts (`work_of_wrenches.py`). Where a hold gives other values than
 samples, the work is known at the meter's last sample alone, and reached there in proportion to that
 of the samples.
 """

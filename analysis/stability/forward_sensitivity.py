@@ -78,13 +78,11 @@ class Reach:
 
 @dataclass(frozen=True)
 class Slopes:
-    """J and E of an operation where it reads the numbers `at`; `apart` are the variables with
-    slopes by differences beside those of the graph, None where all are by differences."""
+    """J and E of an operation where it reads the numbers `at`."""
 
     at: Vector
     J: Matrix
     E: Matrix
-    apart: frozenset[str] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +107,6 @@ class ForwardSensitivity:
         self._simulation, self.closures = simulation, closures
         self._reach: dict[Instruction, Reach | None] = {}
         self._known: dict[Any, list[Slopes]] = {}
-        self._apart: dict[str, frozenset[str] | None] = {}
         self._graphs: dict[str, GraphSlopes | None] = {}
         self._named: dict[Any, list[Coordinate]] = {}
 
@@ -122,21 +119,9 @@ class ForwardSensitivity:
                 del self._known[operation, *ages]
 
     def begin(self) -> None:
-        """A period begins, of which `slopes_by` tells."""
-        self._apart.clear()
+        """A period begins."""
         for reach in filter(None, self._reach.values()):
             reach.applied.clear()
-
-    def slopes_by(self) -> dict[str, str]:
-        """By FMU, where its slopes since `begin` are from."""
-        sources = {}
-        for fmu in self._simulation.system.fmus:
-            if (apart := self._apart.get(fmu.name)) is None:
-                sources[fmu.name] = "differences"
-            else:
-                others = ", ".join(sorted(apart))
-                sources[fmu.name] = f"graph; by differences: {others}" if others else "graph"
-        return sources
 
     def applied(self, tick: int, operation: Instruction, call: Call) -> Applied | None:
         """Carries out an operation of a co-simulation at rest, in which its slopes depend on the
@@ -160,7 +145,6 @@ class ForwardSensitivity:
         before = reach.state.sizes()
         same = SAME if of_fmu else NEARBY
         slopes, after = self._slopes(tick, operation, call, reach, same)
-        self._tell(operation, reach, slopes)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
         reach.applied[ages] = made = Applied(
             operation, owners, counts, tuple(after), reach.reads, reach.writes, slopes.J, slopes.E
@@ -179,12 +163,6 @@ class ForwardSensitivity:
         if isinstance(operation, Step) and operation.fmu in self._simulation.isolated:
             return self._awaited(operation.fmu, call)
         return self._from_here(operation, call) if isinstance(operation, Repeat) else call
-
-    def _tell(self, operation: Instruction, reach: Reach, found: Slopes) -> None:
-        for fmu in reach.state.owners if isinstance(operation, Step | Get | Repeat) else ():
-            apart = self._apart.get(fmu, frozenset())
-            if apart is not None:
-                self._apart[fmu] = None if found.apart is None else apart | found.apart
 
     def _awaited(self, fmu: str, step: Call) -> Call:
         """A doStep of an FMU in a process of its own, whose end is waited for."""
@@ -254,15 +232,13 @@ class ForwardSensitivity:
             for each, moved in zip(points, images, strict=True)
         ]
         slope, error = (sides[0] + sides[-1]) / 2, (sides[0] - sides[-1]) / 2
-        along, apart = along[:, read], np.zeros(slope.shape, bool)
+        along = along[:, read]
         if exact is not None:
-            slope, error, apart = decided(exact @ along.T, slope, error)
+            slope, error = decided(exact @ along.T, slope, error)
         J, E = slope @ along, error @ along
         if known:
             J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
-        coordinates = self._coordinates(key, state, template)
-        names = frozenset(coordinates[i].variable for i in written[apart.any(axis=1)])
-        known.insert(0, Slopes(z[read], J, E, None if exact is None else names))
+        known.insert(0, Slopes(z[read], J, E))
         return known[0], sizes
 
     def _in_graph(
@@ -365,16 +341,13 @@ class ForwardSensitivity:
                 return None
 
 
-def decided(
-    exact: Matrix, slope: Matrix, error: Matrix
-) -> tuple[Matrix, Matrix, NDArray[np.bool_]]:
-    """Slopes and their errors, a column each direction, from exact ones, and where they are by
-    differences all the same."""
+def decided(exact: Matrix, slope: Matrix, error: Matrix) -> tuple[Matrix, Matrix]:
+    """Slopes and their errors, a column each direction, from exact ones and differences."""
     most = KINK * np.maximum(SMALL, np.abs(slope).max(axis=0, initial=0.0))
     differ = ~(np.abs(slope - exact) <= most) | (np.abs(error) > most)
     gap = slope - exact
     wider = ~differ & (np.abs(gap) > np.abs(error))
-    return np.where(differ, slope, exact), np.where(wider, gap, error), differ
+    return np.where(differ, slope, exact), np.where(wider, gap, error)
 
 
 def _ages(value: Any, tick: int) -> Any:

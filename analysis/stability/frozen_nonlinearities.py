@@ -2,7 +2,8 @@
 
 Quantisation and Coulomb friction are taken out: their slope is 0, or that of a joint that sticks,
 whatever the loop does. So are passivity controllers, and the friction of the hold `passive`, which
-act by what has been. Switches stay as they are at the equilibrium.
+act by what has been: without it that hold is `zoh`, but beside `pspm`, whose tank it draws on.
+Switches stay as they are at the equilibrium.
 """
 
 from __future__ import annotations
@@ -39,10 +40,14 @@ def without(system: System) -> tuple[System, list[str]]:
             starts.append((scalar, value))
             lines.append(f"{fmu.name}.{scalar.name}: {what}, taken out")
         fmus.append(fmu.starting(tuple(starts)))
+    drawing = any(c.hold and HOLDS[c.hold].needs == "spring" for c in system.connections)
+    connections = []
     for c in system.connections:
         if has_friction(c):
             lines.append(f"{c.name}: the friction of hold {c.hold}, taken out")
-    return replace(system, fmus=tuple(fmus)), lines
+            c = c if drawing else replace(c, hold="zoh")
+        connections.append(c)
+    return replace(system, fmus=tuple(fmus), connections=tuple(connections)), lines
 
 
 def has_friction(c: Connection) -> bool:

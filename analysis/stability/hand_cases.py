@@ -13,8 +13,7 @@ from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD, free, holds
 from hapticlink.analysis.stability.linear_period import LinearPeriod
-from hapticlink.analysis.stability.mode_kinds import Bounds, kind
-from hapticlink.analysis.stability.modes import Mode, counted, leading, modes, verdict
+from hapticlink.analysis.stability.modes import Bounds, Mode, counted, kind, leading, modes, verdict
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.components.specs.hand import Hand

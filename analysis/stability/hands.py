@@ -88,11 +88,5 @@ def standing(hand: ArmHand | SpringHand, pose: Sequence[float] | Vector) -> dict
 
 def spring(pose: Sequence[float], wrench: Sequence[float], stiffness: float) -> dict[str, object]:
     """The [hand] table of a spring that presses with `wrench` on a handle at `pose`."""
-    stiff = [stiffness, stiffness, stiffness * LEVER]
-    target = [float(x + F / k) for x, F, k in zip(pose, wrench, stiff, strict=True)]
-    return {
-        "type": "spring",
-        "stiffness": stiff,
-        "damping": list(DAMPING),
-        "target": [[0.0, *target]],
-    }
+    hand = spring_hand(stiffness)
+    return standing(hand, [x + F / k for x, F, k in zip(pose, wrench, hand.stiffness, strict=True)])

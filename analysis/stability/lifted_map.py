@@ -5,7 +5,7 @@ the state before, z_{k+1} = F(z_k), carried out by the FMUs, holds and operation
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -34,7 +34,6 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
 
-Watch = Callable[[Vector], None]
 PINNED = 8
 """Events after which FMUs at rest are put back to it."""
 CONVERGED = 1e-12
@@ -104,14 +103,11 @@ class LiftedMap:
         self._state.restore(self._begin)
         return LiftedMap(Plan(system), self._simulation, self._sensitivity, window)
 
-    def image(self, state: Vector, watch: Watch | None = None) -> Vector:
-        """F(state). watch: called after each event with the numbers of the FMUs and signals, and
-        behind them those of holds, of which a latency can leave more or fewer than at the end."""
+    def image(self, state: Vector) -> Vector:
+        """F(state)."""
         self._state.put(self._template, state)
         for tick, event in self._moments:
             self._run(tick, event)
-            if watch:
-                watch(self._state.now())
         interrupt.check()
         return self._numbers()
 
@@ -163,11 +159,6 @@ class LiftedMap:
         """How many numbers each owner has in the state."""
         parts = self._state.parts(self._template)
         return dict(zip(self._state.owners, map(len, parts), strict=True))
-
-    def slopes_by(self) -> dict[str, str]:
-        """By FMU, where the slopes of the last linearisation are from: its graph, or
-        differences."""
-        return self._sensitivity.slopes_by()
 
     def count(self, kind: type[Operation], fmu: str) -> int:
         """The number of operations of a kind on an FMU within a period."""

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
-from hapticlink.analysis.stability.forward_sensitivity import SMALL
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 
 ONE = 1e-7
@@ -25,9 +24,7 @@ ONE = 1e-7
 @dataclass(frozen=True)
 class Linearisation:
     """The map around `point`: F(point) = image, with the Jacobian A (n, n) along the orthonormal
-    directions V, the columns of a matrix; its error E (n, n) by slopes to one side, and per
-    column the largest of them relative to the column (`kink`): of order 1 where the map is not
-    differentiable. Columns smaller than SMALL, which rounding can make, count as of that size."""
+    directions V, the columns of a matrix, and its error E (n, n) by slopes to one side."""
 
     point: Vector
     image: Vector
@@ -48,12 +45,6 @@ class Linearisation:
     def moved(self, by: Vector) -> Vector:
         """The point moved along the directions, with all that is overwritten as in the image."""
         return self.image + self.V @ (by - self.change)
-
-    @property
-    def kink(self) -> Vector:
-        size = np.abs(self.A).max(axis=0, initial=0.0)
-        kinks: Vector = np.abs(self.E).max(axis=0, initial=0.0) / np.maximum(size, SMALL)
-        return kinks
 
     @property
     def scales(self) -> Vector:

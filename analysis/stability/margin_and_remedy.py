@@ -16,7 +16,7 @@ from hapticlink.analysis.stability.bisection import largest
 from hapticlink.analysis.stability.gains import LAWS
 from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
-from hapticlink.analysis.stability.mode_kinds import Bounds
+from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames

@@ -1,8 +1,8 @@
 """The modes of a linearised map: eigenvalues z of A over a period P.
 
-    s = ln(z)/P = sigma + i omega,   zeta = -sigma/|s|,   p_k = |v_k w_k| / sum |v_k w_k|
+    s = ln(z)/P = sigma + i omega,   p_k = |v_k w_k| / sum |v_k w_k|
 
-sigma is the growth rate (1/s), zeta the damping ratio. p is the participation of coordinate k, from
+sigma is the growth rate (1/s). p is the participation of coordinate k, from
 the right and left eigenvectors v and w; it does not depend on the units of the coordinates
 (Perez-Arriaga, Verghese, Schweppe, IEEE Trans. Power Apparatus and Systems 101 (1982), 3117). An
 error E of A moves a simple eigenvalue by at most |w||E||v| / |w v| entry by entry, which is taken
@@ -11,6 +11,12 @@ for its uncertainty.
 The argument of z is known up to whole turns only: the phase of a number c that the mode moves,
 unwrapped over the events of the period, is omega P. It is exact as long as c turns by less than
 half a turn between two events.
+
+To the hand that feels it a growing mode is a *drift* where it is slow: below 1 Hz, and by less than
+0.2 1/s, which a person corrects without noticing. Above that an *oscillation* grows, from 40 Hz on
+a *vibration*, which skin and hand no longer feel as motion (flutter and vibration: Talbot,
+Darian-Smith, Kornhuber, Mountcastle, J. Neurophysiology 31 (1968), 301). A *divergence* grows
+faster than a drift, at less than its frequency.
 """
 
 from __future__ import annotations
@@ -29,6 +35,27 @@ FLOOR = 1e-9
 NEAR = 1e-4
 """Largest |z - 1| of a neutral mode, however uncertain z is: one further off may grow."""
 
+VIBRATION = 40.0
+"""Frequency (Hz) from which on a mode is a vibration."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Up to which frequency (Hz) and growth rate (1/s) a growing mode is a drift."""
+
+    hertz: float = 1.0
+    growth: float = 0.2
+
+
+DRIFT = Bounds()
+
+
+def kind(growth: float, hertz: float, bounds: Bounds) -> str:
+    """drift, divergence, oscillation or vibration."""
+    if hertz < bounds.hertz:
+        return "drift" if growth < bounds.growth else "divergence"
+    return "oscillation" if hertz < VIBRATION else "vibration"
+
 
 @dataclass(frozen=True)
 class Mode:
@@ -41,12 +68,6 @@ class Mode:
     omega: float
     participation: Vector
     vector: np.ndarray
-
-    @property
-    def damping(self) -> float:
-        """The damping ratio; 1 and more without oscillation is 1, a growing one is negative."""
-        size = float(np.hypot(self.growth, self.omega))
-        return -self.growth / size if size else 0.0
 
     @property
     def neutral(self) -> bool:

@@ -16,8 +16,7 @@ from hapticlink.analysis.stability.hand_slopes import HandSlopes, hand_slopes
 from hapticlink.analysis.stability.hands import spring_hand
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod
-from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
-from hapticlink.analysis.stability.modes import Mode, modes
+from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.smooth_scene import Joints, linearisable
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector

@@ -21,7 +21,7 @@ from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import in_poses
 from hapticlink.analysis.stability.hands import FREE, HANDS, OWN, OWN_FREE, UNHELD, holds, own_hand
 from hapticlink.analysis.stability.margin_and_remedy import Visited, improvements
-from hapticlink.analysis.stability.mode_kinds import DRIFT, Bounds
+from hapticlink.analysis.stability.modes import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import (
     Pose,
     evenly_spaced,

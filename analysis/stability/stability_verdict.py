@@ -10,7 +10,7 @@ from typing import Any
 from hapticlink.analysis.stability.hand_cases import Case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
-from hapticlink.analysis.stability.mode_kinds import Bounds
+from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.components.specs.hand import Hand
 

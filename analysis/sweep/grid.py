@@ -1,4 +1,4 @@
-"""The points of a sweep: a grid of axes, or a list of runs from a file.
+"""The points of a sweep: a grid of axes, or a list of runs, in Python or as text.
 
 A point is {dotted key: value as text}, as `--set` takes them.
 """
@@ -9,18 +9,24 @@ import csv
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.scene.overrides import text
 from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import flat
 
 Point = dict[str, str]
+Vary = Mapping[str, Iterable[Any]] | Sequence[str]
+"""The values of each key, or texts as `--vary` takes them."""
+Runs = str | Path | Sequence[Mapping[str, Any]]
+"""The options of each run, or a file as `--runs` takes it."""
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?:\.\.({_NUMBER})|:(\d+))?")
@@ -40,19 +46,56 @@ class Axis:
     values: tuple[str, ...]
 
 
-def parse(text: str) -> Axis:
+def points(vary: Vary, runs: Runs) -> list[Point]:
+    """The points of every combination of `vary`, or of `runs`. Raises InputFault unless exactly one
+    of them is given, and for values that cannot be read."""
+    if bool(vary) == bool(runs):
+        raise InputFault("sweep: give either --vary key=values (repeatable) or --runs FILE")
+    if vary:
+        return grid(axes(vary))
+    if isinstance(runs, str | Path):
+        return listed(Path(runs))
+    if not all(isinstance(run, Mapping) for run in runs):
+        raise InputFault("runs: give a mapping of keys to values for each run, or a file")
+    return [{key: text(value, key) for key, value in run.items()} for run in runs]
+
+
+def axes(vary: Vary) -> list[Axis]:
+    """The axes of `vary`. Raises InputFault for values that cannot be read."""
+    if isinstance(vary, str):
+        raise InputFault(f"vary {vary!r}: give a mapping, or a list of key=values")
+    if isinstance(vary, Mapping):
+        return [_axis(key, values) for key, values in vary.items()]
+    if not all(isinstance(values, str) for values in vary):
+        raise InputFault("vary: give a mapping of keys to values, or a list of key=values")
+    return [parse(values) for values in vary]
+
+
+def _axis(key: str, values: Iterable[Any]) -> Axis:
+    if isinstance(values, str):
+        return parse(f"{key}={values}")
+    try:
+        texts = tuple(dict.fromkeys(text(value, key) for value in values))
+    except TypeError:
+        raise InputFault(f"{key}: {values!r} is one value; give a list of them") from None
+    if not texts:
+        raise InputFault(f"{key}: no value; give some, e.g. [1, 2, 3]")
+    return Axis(key, texts)
+
+
+def parse(option: str) -> Axis:
     """The axis of `key=values`, with values and ranges separated by commas.
 
     `a..b` is every whole number from a to b, `a..b..step` has this step, `a..b:n` has n evenly
     spaced points (to 6 digits). Raises InputFault if it cannot be read or is empty.
     """
-    key, equals, values = text.partition("=")
+    key, equals, values = option.partition("=")
     key = key.strip()
     if not equals or not key:
-        raise InputFault(f"--vary {text}: write key=values, e.g. --vary graphics.rate=10..60..10")
-    listed = [value for item in _items(values) for value in _values(item, shortened(text))]
+        raise InputFault(f"--vary {option}: write key=values, e.g. --vary graphics.rate=10..60..10")
+    listed = [value for item in _items(values) for value in _values(item, shortened(option))]
     if not listed:
-        raise InputFault(f"--vary {text}: no value; give some, e.g. {key}=1,2,3")
+        raise InputFault(f"--vary {option}: no value; give some, e.g. {key}=1,2,3")
     return Axis(key, tuple(dict.fromkeys(listed)))
 
 

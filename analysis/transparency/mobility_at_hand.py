@@ -29,13 +29,13 @@ from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import Pose, evenly_spaced, fault_of, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.short_hyperperiod import whole_frames
+from hapticlink.analysis.tune.felt_stiffness import CONSTRAINED, RIGID, mobility
 from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
-from hapticlink.orchestrator.base.signal_names import MOBILITIES
 from hapticlink.orchestrator.base.text_table import aligned
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
@@ -52,10 +52,6 @@ HERTZ = np.geomspace(0.5, 50.0, 41)
 """The frequencies, up to the fastest that a hand is moved at and beyond."""
 SLOW = 2.0
 """The frequency (Hz) of the numbers of a direction."""
-CONSTRAINED = 1e-6
-"""Of the largest scaled mobility, up to which a direction does not move."""
-RIGID = 1e7
-"""Stiffness (N/m) above which nothing gives way."""
 
 
 @dataclass(frozen=True)
@@ -218,14 +214,6 @@ def _direction(along: Vector, column: Complex, i: int, inertia: float) -> Direct
     real = column.real
     angle = np.degrees(np.arccos(np.clip(real[:, i] / np.linalg.norm(real, axis=1), -1.0, 1.0)))
     return Direction(along, inertia, column[:, i], np.linalg.norm(off, axis=1) / inertia, angle)
-
-
-def mobility(place: RestingScene) -> Matrix:
-    """Lambda^-1 (3, 3) at an equilibrium. Raises InputFault where no FMU puts it out."""
-    for port in MOBILITIES:
-        if len(values := place.signal(port)) == 9:
-            return values.reshape(3, 3)
-    raise InputFault(f"no FMU puts out the mobility of the mechanism ({' or '.join(MOBILITIES)})")
 
 
 @dataclass(frozen=True)

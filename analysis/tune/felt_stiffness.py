@@ -33,6 +33,14 @@ CONSTRAINED = 1e-6
 """Of the largest scaled mobility, up to which a direction does not move."""
 
 
+def mobility(place: RestingScene) -> Matrix:
+    """Lambda^-1 (3, 3) at an equilibrium. Raises InputFault where no FMU puts it out."""
+    for port in MOBILITIES:
+        if len(values := place.signal(port)) == 9:
+            return values.reshape(3, 3)
+    raise InputFault(f"no FMU puts out the mobility of the mechanism ({' or '.join(MOBILITIES)})")
+
+
 class Feel:
     """What is felt in a pose along unit wrenches, by name: "constraint", "contact"."""
 
@@ -43,10 +51,8 @@ class Feel:
     def of(cls, place: RestingScene, linkage: Linkage) -> Feel:
         """Raises InputFault where no direction is constrained and nothing touches."""
         found = {}
-        mobilities = (place.signal(signal) for signal in MOBILITIES)
-        mobility = next(values for values in mobilities if len(values)).reshape(3, 3)
         S: Matrix = np.diag([1.0, 1.0, mean_link_length(linkage)])
-        values, vectors = np.linalg.eigh(S @ mobility @ S)
+        values, vectors = np.linalg.eigh(S @ mobility(place) @ S)
         null = [S @ vectors[:, i] for i in range(3) if values[i] < CONSTRAINED * values[-1]]
         if null:
             n = max(null, key=lambda wrench: float(np.hypot(*wrench[:2])))

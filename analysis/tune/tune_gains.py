@@ -16,7 +16,7 @@ is judged at the scene's own rates.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -30,17 +30,20 @@ from hapticlink.analysis.tune.felt_stiffness import Feel
 from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.analysis.tune.stability_limits import FINE, Judge
-from hapticlink.analysis.tune.tunable_scene import near_rates, required
 from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
 MARGIN, POSES = 2.0, 5
+NEAR = {"haptics": (0.75, 1.25), "graphics": (0.5, 2.0)}
+"""Neighbouring rates, as factors."""
 REMEDY = "take a higher graphics.rate or haptics.rate, or a smaller --margin"
 
 STEADY = "begin with smaller gains of controller.teleoperation and controller.topology"
@@ -180,3 +183,28 @@ class _Tuning:
         self, read: Scene
     ) -> AbstractContextManager[tuple[list[Pose], dict[str, RestingScene]]]:
         return at_equilibrium(read, self._resting, self._tell, self._states)
+
+
+def required(read: Scene) -> Linkage:
+    """The linkage of a scene. Raises InputFault where there are no gains to tune, or where they are
+    not felt."""
+    if not (read.linkage and read.controller and read.device and read.hand):
+        raise InputFault(
+            "no gains to tune: a [linkage], [device], [controller] and [hand] are needed"
+        )
+    if read.sensing == "ideal":
+        raise InputFault(
+            "with ideal sensing the motors cancel the hand's wrench along a joint constraint: it "
+            "feels rigid whatever the gains; take --set sensing=encoders"
+        )
+    if read.contacts and not read.controller.contact:
+        raise InputFault("contacts are not sent to the hand: take --set controller.contact=true")
+    return read.linkage
+
+
+def near_rates(read: Scene) -> Iterator[str]:
+    """Options with a neighbouring rate each."""
+    for key, factors in NEAR.items():
+        if (part := getattr(read, key)) is not None:
+            for factor in factors:
+                yield f"{key}.rate={round(float(exact(part.rate)) * factor)}"

@@ -10,8 +10,7 @@ from textwrap import fill
 
 import numpy as np
 
-from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
-from hapticlink.analysis.findings.user_port import SHARE
+from hapticlink.analysis.findings.user_port import NOTICEABLE_J, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import CONTINUOUS, DIRECT, MOBILITY, REFERENCE, mapped
 from studies.mismatch.figures import Panel, Point, lines, short

@@ -26,8 +26,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
-from hapticlink.analysis.findings.user_port import SHARE
+from hapticlink.analysis.findings.user_port import NOTICEABLE_J, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import MOBILITY, of_map
 from studies.mismatch.measure import COUPLING, MARGIN, PEAK, WORK, draw, stable

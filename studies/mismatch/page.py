@@ -9,8 +9,7 @@ from textwrap import fill
 
 import numpy as np
 
-from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
-from hapticlink.analysis.findings.user_port import SHARE
+from hapticlink.analysis.findings.user_port import NOTICEABLE_J, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch import finding_figures, held_out_draws
 from studies.mismatch.cases import SEEDS

@@ -13,7 +13,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.sweep import table
-from hapticlink.analysis.sweep.points import points
+from hapticlink.analysis.sweep.grid import points
 from hapticlink.visualization.figures import sweep_figure
 from tests.shared_fixtures import status
 

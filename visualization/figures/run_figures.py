@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hapticlink.analysis.findings import labels, summary
-from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
 from hapticlink.analysis.findings.tracking import (
@@ -25,7 +24,7 @@ from hapticlink.analysis.findings.tracking import (
     of_block,
     pose_error,
 )
-from hapticlink.analysis.findings.user_port import UserPort
+from hapticlink.analysis.findings.user_port import NOTICEABLE_J, UserPort
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage

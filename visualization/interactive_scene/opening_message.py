@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.analysis.findings.episode_thresholds import NOTICEABLE_J
+from hapticlink.analysis.findings.user_port import NOTICEABLE_J
 from hapticlink.components.dynamics.assembly import start_coordinates
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
 from hapticlink.visualization.mechanism.picture import PORT, Picture

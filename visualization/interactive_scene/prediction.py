@@ -13,7 +13,7 @@ from hapticlink.analysis.stability.frozen_nonlinearities import has_friction
 from hapticlink.analysis.stability.hand_cases import Case, InHands
 from hapticlink.analysis.stability.hands import HANDS
 from hapticlink.analysis.stability.lifted_map import hyperperiod
-from hapticlink.analysis.stability.mode_kinds import DRIFT
+from hapticlink.analysis.stability.modes import DRIFT
 from hapticlink.analysis.stability.resting_scene import resting_system
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.components.specs.hand import SpringHand

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.episode_thresholds import EPISODES
+from hapticlink.analysis.findings.episodes import EPISODES
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Body, Linkage
 

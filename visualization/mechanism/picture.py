@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from hapticlink.analysis.findings.episode_thresholds import FULL_TORQUE, NOTICEABLE_J
+from hapticlink.analysis.findings.episodes import FULL_TORQUE
+from hapticlink.analysis.findings.user_port import NOTICEABLE_J
 from hapticlink.components.device.numeric_torques import torque_function
 from hapticlink.components.device.workspace import link_function
 from hapticlink.components.linkage.poses import pose_function

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import hapticlink as hl
-from hapticlink.analysis.stability.forward_sensitivity import STEP
+from hapticlink.analysis.stability.forward_sensitivity import SMALL, STEP
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linearisation import Linearisation, constant
@@ -28,8 +28,9 @@ class OwnHand:
     modes: list[Mode]
     neutral: list[Mode]
     point: dict[str, float]
-    slopes: dict[str, str]
     kinks: np.ndarray
+    """By direction the largest error of a slope, relative to the largest slope: of order 1 where
+    the map is not differentiable."""
     participation: dict[str, float]
 
     @property
@@ -70,7 +71,6 @@ def own_hand(scene: str | Path | hl.Scene, options: Any = ()) -> OwnHand:
     with in_own_hand(hl.scene(scene, options)) as (place, hand):
         period = place.period({})
         point = dict(zip(map(str, place.map.coordinates), period.point.tolist(), strict=True))
-        slopes = place.map.slopes_by()
         period = period.held({"hand": hand_slopes(hand, place.T)} if hand else {})
         every = [m for m in modes(period.linear, place.map.period) if abs(m.z) > LOST]
         some = [period.traced(mode) for mode in every if not mode.neutral]
@@ -79,7 +79,7 @@ def own_hand(scene: str | Path | hl.Scene, options: Any = ()) -> OwnHand:
             some,
             [mode for mode in every if mode.neutral],
             point,
-            slopes,
-            period.linear.kink,
+            np.abs(period.linear.E).max(axis=0)
+            / np.maximum(np.abs(period.linear.A).max(axis=0), SMALL),
             dict(leading(every[0], period.names(), 6)),
         )

@@ -19,8 +19,7 @@ from hapticlink.analysis.stability.hands import HANDS, OWN, free
 from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.margin_and_remedy import SAFE, improvements
-from hapticlink.analysis.stability.mode_kinds import DRIFT, kind
-from hapticlink.analysis.stability.modes import modes
+from hapticlink.analysis.stability.modes import DRIFT, kind, modes
 from hapticlink.analysis.stability.poses import evenly_spaced, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import linearisable
