@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
@@ -86,24 +86,23 @@ class Measures:
     @cached_property
     def forces(self) -> dict[str, float]:
         """The largest force (N) of each wrench."""
-        found: dict[str, float] = {}
-        for window in self._windows():
-            for name, (_, force, _) in all_wrenches(window).items():
-                if len(force):
-                    found[name] = max(float(force.max()), found.get(name, 0.0))
-        return found
+        return _largest(
+            {name: force for name, (_, force, _) in all_wrenches(window).items() if len(force)}
+            for window in self._windows()
+        )
 
     @cached_property
     def motors(self) -> dict[str, float]:
         """The largest motor torque of each user as a share of the torque limit."""
-        found: dict[str, float] = {}
         devices = all_devices(self._results)
-        for window in self._windows():
-            for user, device in devices.items():
-                if driven := torques(window, device, user):
-                    largest = float(np.abs(driven[1]).max(initial=0.0)) / device.torque_limit
-                    found[user] = max(largest, found.get(user, 0.0))
-        return found
+        return _largest(
+            {
+                user: np.abs(driven[1]) / device.torque_limit
+                for user, device in devices.items()
+                if (driven := torques(window, device, user))
+            }
+            for window in self._windows()
+        )
 
     @cached_property
     def saturations(self) -> list[Episode]:
@@ -113,13 +112,12 @@ class Measures:
     @cached_property
     def closure_m(self) -> float | None:
         """The largest closure error of the mechanism's loops (m)."""
-        found = None
-        for window in self._windows():
-            table = of_block(window, CLOSURE_ERROR)
-            if table is not None and len(table["time"]):
-                error = np.abs(table[CLOSURE_ERROR][window.within(table["time"])])
-                found = max(float(error.max(initial=0.0)), found or 0.0)
-        return found
+        errors = (
+            {"": np.abs(table[CLOSURE_ERROR][window.within(table["time"])])}
+            for window in self._windows()
+            if (table := of_block(window, CLOSURE_ERROR)) and len(table["time"])
+        )
+        return _largest(errors).get("")
 
     @cached_property
     def constrained(self) -> Constrained | None:
@@ -151,6 +149,15 @@ class Measures:
         """The energies of the connections with a hold, in the whole run."""
         record = self._results.record
         return {name: record.meters[name] for name in record.holds if name in record.meters}
+
+
+def _largest(windows: Iterable[Mapping[str, Vector]]) -> dict[str, float]:
+    """By name, the largest of values that are 0 or more."""
+    found: dict[str, float] = {}
+    for window in windows:
+        for name, values in window.items():
+            found[name] = max(float(values.max(initial=0.0)), found.get(name, 0.0))
+    return found
 
 
 def _joined(parts: Vector) -> TrackingError:

@@ -28,7 +28,6 @@ of the samples.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -44,42 +43,17 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.results.tables import Results, Vector
 
-
-class User(NamedTuple):
-    """The signals of a user: poses of the point and the handle, the wrenches on them, and the
-    mechanism's inputs `virtual_mechanism.<inputs>F_hand`, F_drift."""
-
-    point: str
-    handle: str
-    drift: str
-    topology: str
-    motors: str
-    contact: str
-    inputs: str
-
-
-def user(name: str = "") -> User:
-    """The signals of the user at a further point; the first user's name is empty."""
-    point, handle = poses(name)
-    return User(
-        point,
-        handle,
-        drift=signal_of_user(DRIFT_WRENCH, name),
-        topology=signal_of_user(TOPOLOGY_WRENCH, name),
-        motors=signal_of_user(MOTOR_WRENCH, name),
-        contact=signal_of_user(ENVIRONMENT_WRENCH, name),
-        inputs=signal_of_user(f"{MECHANISM}.", name),
-    )
+WRENCHES = {"drift": DRIFT_WRENCH, "topology": TOPOLOGY_WRENCH, "environment": ENVIRONMENT_WRENCH}
+"""By block, its wrench on the handle."""
 
 
 def needed(results: Results, users: Iterable[str]) -> set[str]:
-    """The signals from which the blocks of these users are found, as far as a run has them."""
+    """The signals from which the blocks of these users are found, as far as a run has them; the
+    first user's name is empty."""
     signals: set[str] = set()
-    for signals_of_user in map(user, users):
-        signals |= {
-            *signals_of_user[:-1],
-            *(source for source, _ in _sources(results, signals_of_user)),
-        }
+    for user in users:
+        own = (signal_of_user(wrench, user) for wrench in (*WRENCHES.values(), MOTOR_WRENCH))
+        signals |= {*poses(user), *own, *(source for source, _ in _sources(results, user))}
     return signals
 
 
@@ -100,50 +74,39 @@ def by_block(
             return None
         return works.of(results, signal, position, time)
 
-    for of_user, done in ((user(name), done) for name, done in put_in.items()):
+    for user, done in put_in.items():
+        point, handle = poses(user)
         shaping = shaping - done
-        wrenches = {
-            "drift": of_user.drift,
-            "topology": of_user.topology,
-            "environment": of_user.contact,
-        }
-        for name, signal in wrenches.items():
-            if wrench := on(signal, of_user.handle):
+        for name, signal in WRENCHES.items():
+            if wrench := on(signal_of_user(signal, user), handle):
                 add(name, wrench[1])
                 shaping = shaping - wrench[1]
-        if motors := on(of_user.motors, of_user.handle):
-            add(f"hold of {of_user.motors}", motors[0] - motors[1])
+        driven = signal_of_user(MOTOR_WRENCH, user)
+        if motors := on(driven, handle):
+            add(f"hold of {driven}", motors[0] - motors[1])
             shaping = shaping - (motors[0] - motors[1])
-        if contact := on(of_user.contact, of_user.point):
+        if contact := on(signal_of_user(ENVIRONMENT_WRENCH, user), point):
             add("environment", -contact[1])
             shaping = shaping + contact[1]
-        for name, (held, source) in _into_mechanism(results, works, of_user, time).items():
+        for source, target in _sources(results, user):
+            if not (table_of(results, source) and of_block(results, point, 3)):
+                continue
+            sign = -1.0 if target.endswith("F_drift") else 1.0
+            name = f"{source} -> {target}"
+            held, ideal = works.of(results, source, point, time, sign, name)
             mechanism = mechanism - held
-            if name == of_user.drift:
-                add("drift", source)
-                add(f"hold of {name} on the mechanism", held - source)
+            if source == signal_of_user(DRIFT_WRENCH, user):
+                add("drift", ideal)
+                add(f"hold of {source} on the mechanism", held - ideal)
             else:
                 shaping = shaping + held
     return {"shaping": shaping, **blocks, "mechanism": mechanism}
 
 
-def _into_mechanism(
-    results: Results, works: Works, of_user: User, time: Vector
-) -> dict[str, tuple[Vector, Vector]]:
-    """Held and ideal work (J) on a user's point of what F_hand and F_drift of the mechanism come
-    from, by that signal."""
-    ports = {}
-    for source, target in _sources(results, of_user):
-        if table_of(results, source) and of_block(results, of_user.point, 3):
-            sign = -1.0 if target.endswith("F_drift") else 1.0
-            name = f"{source} -> {target}"
-            ports[source] = works.of(results, source, of_user.point, time, sign, name)
-    return ports
-
-
-def _sources(results: Results, of_user: User) -> Iterator[tuple[str, str]]:
-    """Where F_hand and F_drift of the mechanism come from, and that input."""
+def _sources(results: Results, user: str) -> Iterator[tuple[str, str]]:
+    """Where F_hand and F_drift of the mechanism at a user's point come from, and that input."""
+    inputs = signal_of_user(f"{MECHANISM}.", user)
     for name in results.record.meters:
         source, _, target = name.partition(" -> ")
-        if target in (f"{of_user.inputs}F_hand", f"{of_user.inputs}F_drift"):
+        if target in (f"{inputs}F_hand", f"{inputs}F_drift"):
             yield source, target

@@ -161,16 +161,11 @@ def rest(read: Scene, linkage: Linkage) -> Pose:
     if (speed := float(fastest.max())) > AT_REST:
         joint = rates[:, int(np.argmax(fastest))]
         hertz = np.count_nonzero(np.diff(np.sign(joint))) / 2 / (LATE * LONGEST)
-        moves = (
+        raise InputFault(
             f"the run does not come to rest in {LONGEST:g} s: its joints still move at up to "
-            f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz"
+            f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz; an equilibrium takes damping, or a hand "
+            "that holds it"
         )
-        if not (read.device or read.controller or read.hand or read.fmu):
-            raise InputFault(
-                f"{moves}. The scene is a mechanism alone, without a sampled loop to be judged: "
-                "that takes a [device] and a [controller], or an [[fmu]] such as a virtual wall"
-            )
-        raise InputFault(f"{moves}; an equilibrium takes damping, or a hand that holds it")
     pose = _average(run, linkage, 1.0)
     with_hand = table_of(run, HAND_WRENCH)
     press = (0.0, 0.0, 0.0) if with_hand is None else tuple(with_hand[HAND_WRENCH][-1].tolist())

@@ -33,7 +33,7 @@ from hapticlink.analysis.stability.poses import (
     simulated,
 )
 from hapticlink.analysis.stability.short_hyperperiod import short
-from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
 from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.analysis.stability.workspace_grid import grid_poses
@@ -81,9 +81,9 @@ def stability(
             "a rate that varies is judged in mean square, at the equilibrium of the scene: "
             "--equilibrium, with a hand that holds it"
         )
-    read, rounded = short(read)
     if read.hand is None or replaced(read):
-        return _judged(read, _at_rest, {UNHELD: None}, bounds, progress, rounded)
+        return _judged_at_rest(read, bounds, progress)
+    read, rounded = short(with_quicker_fmus(read))
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
     with interrupt.held(), process_cache.unpacked_once():
@@ -118,11 +118,7 @@ def equilibrium_stability(
     if varies(read):
         with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
             return varying_stability(read)
-    hands: Hands = {UNHELD: None}
-    if read.hand is not None and not replaced(read):
-        hands = {OWN: own_hand(read.hand)}
-    read, rounded = short(read)
-    return _judged(read, _at_rest, hands, bounds, progress, rounded)
+    return _judged_at_rest(read, bounds, progress)
 
 
 def _require_bounds(bounds: Bounds) -> None:
@@ -157,6 +153,23 @@ def _visited(read: Scene, count: int, grid: int) -> tuple[list[Pose], str]:
     if grid:
         poses += grid_poses(run, read, read.linkage, grid)
     return poses, fault_of(run)
+
+
+def _judged_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> Stability:
+    """The verdict where the run comes to rest, in the scene's own hand alone or as it is."""
+    hands: Hands = {UNHELD: None}
+    if read.hand is not None and not replaced(read):
+        hands = {OWN: own_hand(read.hand)}
+    read, rounded = short(with_quicker_fmus(read))
+    try:
+        return _judged(read, _at_rest, hands, bounds, progress, rounded)
+    except InputFault as fault:
+        if read.hand or read.device or read.controller or read.fmu:
+            raise
+        raise InputFault(
+            f"{fault}; the scene is a mechanism alone, without a sampled loop to be judged, which "
+            "takes a [device] and a [controller], or an [[fmu]] such as a virtual wall"
+        ) from None
 
 
 def _at_rest(read: Scene) -> list[Pose]:

@@ -22,7 +22,7 @@ from hapticlink.analysis.stability.margin_and_remedy import SAFE, improvements
 from hapticlink.analysis.stability.modes import DRIFT, kind, modes
 from hapticlink.analysis.stability.poses import evenly_spaced, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
-from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
 from hapticlink.components.specs.hand import ArmHand, SpringHand
 from hapticlink.orchestrator.scene import overrides
 from tests.analysis.stability.own_hand import linearised
@@ -218,3 +218,18 @@ def test_softer_gains_stand_beside_another_remedy() -> None:
     assert len(found) == 1
     assert len(remedies) == 2
     assert found[0].growth < 0.0
+
+
+def test_fmus_are_compiled_for_a_verdict_where_contacts_are_many(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert with_quicker_fmus(hl.scene("push-disc")).packaging == "native"
+    assert with_quicker_fmus(hl.scene("enclosure")).packaging == "python"
+    assert with_quicker_fmus(hl.scene("closed-loop")).packaging == "python"
+    monkeypatch.setenv("HAPTICLINK_CACHE", "off")  # each pose would compile them again
+    assert with_quicker_fmus(hl.scene("push-disc")).packaging == "python"
+
+
+def test_a_mechanism_alone_is_told_that_it_has_no_loop() -> None:
+    with pytest.raises(hl.InputFault, match="a mechanism alone, without a sampled loop"):
+        hl.stability("six-bar")
