@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.findings import friction_speed
-from hapticlink.analysis.findings.deadlines import finding
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.tracking import of_block
@@ -251,7 +250,7 @@ def _contacts(results: Results) -> Iterator[str]:
 
 
 def _real_time(report: Mapping[str, Any]) -> Iterator[str]:
-    yield finding(report)
+    yield deadlines(report)
     if moved := report["moved"]:
         yield (
             f"warning: the schedule was moved by {short(moved)} s in all: the machine was too "
@@ -263,6 +262,18 @@ def _real_time(report: Mapping[str, Any]) -> Iterator[str]:
             yield f"{clock}: {late}, at most by {short(1e3 * samples['largest_lateness'])} ms"
     for fmu, why in report["in_loop"].items():
         yield f"{fmu} ran in the haptic loop: {why}"
+
+
+def deadlines(report: Mapping[str, Any]) -> str:
+    """A sentence of the report of a run in real time (`RealTimeRun.report`), or of one without a
+    clock whose samples arrive as those of another run did."""
+    rate = short(1 / report["period"])
+    if "arrivals" in report:
+        return f"{rate} Hz without a clock; samples arrived as those of {report['arrivals']} did"
+    missed = f"{report['deadlines_missed'] or 'none'} of {report['ticks']} deadlines missed"
+    largest = (1e3 * report[name]["max"] for name in ("step_time", "lateness"))
+    step, late = map(short, largest)
+    return f"{rate} Hz in real time: {missed}; largest step time {step} ms, lateness {late} ms"
 
 
 def _network(fmu: str, exchange: Mapping[str, Any]) -> Iterator[str]:

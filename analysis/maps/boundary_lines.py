@@ -43,7 +43,7 @@ def along(
     """The lines along `axis`, one for each value of the `other` one."""
     for value in other.values if other else ("",):
         point = {**panel, **({other.key: value} if other else {})}
-        yield _line(scene, options, point, axis.key, axis.values, ())
+        yield line(scene, options, point, axis.key, axis.values)
 
 
 def across(
@@ -66,7 +66,7 @@ def across(
         )
         if edges:
             point = {**dict(panel), y.key: value}
-            found.append(_line(scene, options, point, x.key, (), edges))
+            found.append(line(scene, options, point, x.key, edges=edges))
     return found
 
 
@@ -74,14 +74,15 @@ def _keys(row: Row) -> set[str]:
     return set(row) - set(COLUMNS)
 
 
-def _line(
+def line(
     scene: str | Path | Scene,
     options: Sequence[str],
     point: Mapping[str, str],
-    key: str,
-    values: tuple[str, ...],
-    edges: tuple[tuple[str, str], ...],
+    key: str = "",
+    values: tuple[str, ...] = (),
+    edges: tuple[tuple[str, str], ...] = (),
 ) -> Line:
+    """The line of a scene at a point. Raises InputFault where it is refused there."""
     made = job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point)
     if made.scene is None:
         raise InputFault(made.refusal)

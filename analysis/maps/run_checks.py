@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from hashlib import sha256
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.maps.boundary_lines import COLUMNS, DONE, Line, judged
+from hapticlink.analysis.maps.boundary_lines import COLUMNS, DONE, Line, judged, line
 from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep.grid import Point
-from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins, temporary_folders
@@ -58,12 +57,11 @@ def _point(row: Row) -> Point:
 
 
 def jobs(scene: str | Path | Scene, options: Sequence[str], points: Sequence[Point]) -> list[Line]:
+    """The checks of the points at which the scene is not refused."""
     made = []
     for point in points:
-        each = job(scene, [*options, *(f"{k}={v}" for k, v in point.items())], point)
-        if each.scene is not None:
-            own = sha256(f"check {each.key}".encode()).hexdigest()
-            made.append(Line(point, each.scene, own, "", each.plugins))
+        with suppress(InputFault):
+            made.append(line(scene, options, point))
     return made
 
 

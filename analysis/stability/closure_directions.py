@@ -18,9 +18,10 @@ from scipy.linalg import null_space
 
 from hapticlink.analysis.stability.state_vector import Coordinate
 from hapticlink.components.dynamics.closure_jacobian_values import closure_jacobian
+from hapticlink.components.linkage.parameters import COORDINATES
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.signal_names import SHARED
-from hapticlink.orchestrator.scene.scene import Scene
 
 RANK = 1e-6
 """Singular values of W, relative to the largest, that count as 0."""
@@ -28,9 +29,9 @@ RANK = 1e-6
 
 @dataclass(frozen=True)
 class Closures:
-    """The closures of a scene's linkage."""
+    """The closures of a linkage, if there is one."""
 
-    scene: Scene
+    linkage: Linkage | None
 
     def directions(
         self, coordinates: Sequence[Coordinate], free: NDArray[np.intp], point: Vector
@@ -66,18 +67,16 @@ class Closures:
 
     @property
     def _n(self) -> int:
-        linkage = self.scene.linkage
-        return sum(3 if j.type == "free" else 1 for j in linkage.joint) if linkage else 0
+        return sum(COORDINATES[j.type] for j in self.linkage.joint) if self.linkage else 0
 
     @cached_property
     def _jacobian(self) -> Callable[[Vector], Matrix]:
-        assert self.scene.linkage is not None
-        return closure_jacobian(self.scene.linkage)
+        assert self.linkage is not None
+        return closure_jacobian(self.linkage)
 
     def _basis(self, q: Vector | None) -> Matrix | None:
         """A basis of null(W) at q, None where no closure is redundant."""
-        linkage = self.scene.linkage
-        if q is None or linkage is None or not linkage.closed:
+        if q is None or self.linkage is None or not self.linkage.closed:
             return None
         W = self._jacobian(q)
         basis: Matrix = null_space(W, rcond=RANK)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.linear_period import LinearPeriod, linear_period
-from hapticlink.analysis.stability.linearisation import Linearisation
+from hapticlink.analysis.stability.modes import Linearisation
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 

@@ -52,6 +52,7 @@ from hapticlink.orchestrator.plan.operations import (
 )
 from hapticlink.orchestrator.run.instructions import Finish, Instruction
 from hapticlink.orchestrator.run.simulation import Call, Simulation
+from hapticlink.orchestrator.scene.scene import Scene
 
 STEP = 1e-6
 KINK = 1e-3
@@ -101,10 +102,11 @@ class Applied:
 
 
 class ForwardSensitivity:
-    """The slopes of the operations of a simulation; `closures` are those of its mechanism."""
+    """The slopes of the operations of a simulation, within the closures of the scene's linkage."""
 
-    def __init__(self, simulation: Simulation, closures: Closures | None) -> None:
-        self._simulation, self.closures = simulation, closures
+    def __init__(self, simulation: Simulation, scene: Scene | None) -> None:
+        self._simulation, self._scene = simulation, scene
+        self.closures = Closures(scene.linkage if scene else None)
         self._reach: dict[Instruction, Reach | None] = {}
         self._known: dict[Any, list[Slopes]] = {}
         self._graphs: dict[str, GraphSlopes | None] = {}
@@ -250,9 +252,8 @@ class ForwardSensitivity:
             return None
         fmu, system = operation.fmu, self._simulation.system
         description = system.fmu[fmu].description
-        scene = self.closures.scene if self.closures else None
         if fmu not in self._graphs:
-            self._graphs[fmu] = graph_slopes(description, fmu, scene)
+            self._graphs[fmu] = graph_slopes(description, fmu, self._scene)
         graph, state = self._graphs[fmu], doubles(before.fmus[fmu])
         if graph is None:
             return None
@@ -276,8 +277,6 @@ class ForwardSensitivity:
         """The directions in which the numbers z are moved, a row each."""
         coordinates = self._coordinates(key, state, template)
         free = np.array([i for i in read if not discrete(coordinates[i])], dtype=np.intp)
-        if not self.closures:
-            return np.eye(len(z))[free]
         along = [*self.closures.directions(coordinates, free, z)]
         return np.array(along).reshape(-1, len(z))
 

@@ -14,7 +14,6 @@ from itertools import takewhile
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
 from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
@@ -95,7 +94,7 @@ class LiftedMap:
         self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
         self.start = self._state.numbers(self._template)
         free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
-        self._free, self._closures = np.array(free, dtype=np.intp), sensitivity.closures
+        self._free = np.array(free, dtype=np.intp)
 
     def over(self, system: System, window: tuple[int, int]) -> LiftedMap:
         """The map of the same FMUs on the timeline of another `system`, from the first tick of a
@@ -183,10 +182,7 @@ class LiftedMap:
     def directions(self, point: Vector) -> Iterator[Vector]:
         """Orthonormal directions in which the state can be moved from `point`, that of the
         coordinates that are no switches."""
-        if self._closures:
-            yield from self._closures.directions(self.coordinates, self._free, point)
-        else:
-            yield from np.eye(len(point))[self._free]
+        yield from self._sensitivity.closures.directions(self.coordinates, self._free, point)
 
     def _numbers(self) -> Vector:
         found = self._state.now()
@@ -257,6 +253,5 @@ def lifted_map(system: System, scene: Scene | None = None) -> Iterator[LiftedMap
         simulation.step_checks.clear()
         simulation.start()
         without_friction(simulation.holds.values())
-        closures = Closures(scene) if scene else None
-        sensitivity = ForwardSensitivity(simulation, closures)
+        sensitivity = ForwardSensitivity(simulation, scene)
         yield LiftedMap(Plan(system), simulation, sensitivity)

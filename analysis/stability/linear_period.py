@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.stability.forward_sensitivity import Applied
 from hapticlink.analysis.stability.hand_slopes import PORTS, HandSlopes
 from hapticlink.analysis.stability.lifted_map import LiftedMap
-from hapticlink.analysis.stability.linearisation import Linearisation, constant
-from hapticlink.analysis.stability.modes import Mode, with_turns
+from hapticlink.analysis.stability.modes import Linearisation, Mode, constant, with_turns
 from hapticlink.analysis.stability.state_vector import SIGNALS
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.plan.operations import Get, Set, Step

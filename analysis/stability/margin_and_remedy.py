@@ -19,7 +19,7 @@ from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
-from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames
+from hapticlink.analysis.stability.smooth_scene import frame_length, short, whole_frames
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
@@ -137,13 +137,14 @@ class _Search:
         own = frame_length(self._read)
 
         def holds(n: int) -> bool:
-            return stable if n == own else self._growth([self._framed(n)]) < 0.0
+            return (
+                stable
+                if n == own
+                else self._growth([_set_rate("graphics", self._haptic / n)]) < 0.0
+            )
 
         frames = _last(holds, own, SLOWEST)
         return float(self._haptic / frames) if frames else float("inf")
-
-    def _framed(self, n: int) -> str:
-        return _set_rate("graphics", self._haptic / n)
 
     def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
         """Whether all hands are stable with gains scaled, and all that the controller reads some

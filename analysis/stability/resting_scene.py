@@ -4,7 +4,7 @@ other hands, and its compliance with the hand cut off (port_response.py).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.gains import Gains, Scales
-from hapticlink.analysis.stability.hand_slopes import HandSlopes, hand_slopes
+from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import spring_hand
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod
@@ -80,11 +80,6 @@ class RestingScene:
         self.map.set_parameters(parameters)
         self._home = equilibrium(self.map, self._home.point)
         self._known = {}, self._home
-
-    def modes(self, scales: Scales, hands: Mapping[str, HandSlopes]) -> list[Mode]:
-        """The modes with gains scaled by `scales`, in other hands by the FMUs in whose place they
-        are, that of the largest |z| first. Raises InputFault or FmuFault without equilibrium."""
-        return modes(self.period(scales).held(hands).linear, self.map.period)
 
     def stable(self, scales: Scales, hand: float) -> bool:
         """Whether no mode grows, neutral ones and slow drift aside, with gains scaled by `scales`

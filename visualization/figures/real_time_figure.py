@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hapticlink.analysis.findings.deadlines import finding
+from hapticlink.analysis.findings.summary import deadlines
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.figure_axes import titled
 
@@ -27,7 +27,7 @@ def real_time(
     `more` said in its title."""
     report = results.record.real_time
     assert report
-    title = "; ".join(filter(None, (finding(report), more)))
+    title = "; ".join(filter(None, (deadlines(report), more)))
     figure, axes = titled(results, title, "time (ms)", "share of ticks that exceed it")
     histograms = report["histograms"]
     own = {"step time": histograms["step_time"], "lateness": histograms["lateness"]}

@@ -12,8 +12,15 @@ import hapticlink as hl
 from hapticlink.analysis.stability.forward_sensitivity import SMALL, STEP
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.lifted_map import LiftedMap
-from hapticlink.analysis.stability.linearisation import Linearisation, constant
-from hapticlink.analysis.stability.modes import Mode, counted, leading, modes, verdict
+from hapticlink.analysis.stability.modes import (
+    Linearisation,
+    Mode,
+    constant,
+    counted,
+    leading,
+    modes,
+    verdict,
+)
 from hapticlink.analysis.stability.poses import in_own_hand
 
 LOST = 1e-6

@@ -14,8 +14,7 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.forward_sensitivity import KINK
 from hapticlink.analysis.stability.hand_cases import SLIGHT
-from hapticlink.analysis.stability.linearisation import Linearisation
-from hapticlink.analysis.stability.modes import counted, modes, verdict
+from hapticlink.analysis.stability.modes import Linearisation, counted, modes, verdict
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.commands import main
 from tests.analysis.stability.own_hand import own_hand
