@@ -82,9 +82,10 @@ def stability(
         )
     if read.hand is None or replaced(read):
         return _judged_at_rest(read, bounds, progress)
-    read, rounded = short(with_quicker_fmus(read))
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
+    hands = hands_of(read.hand)
+    read, rounded = short(with_quicker_fmus(read))
     with interrupt.held(), process_cache.unpacked_once():
         (progress or _silent)("the scene's own run", 0, poses + 2)
         own, own_fault = _visited(read, poses, grid)
@@ -95,7 +96,7 @@ def stability(
                 raise InputFault(fault)
             return found
 
-        judged = _judged(read, visits, hands_of(read.hand), bounds, progress, rounded)
+        judged = _judged(read, visits, hands, bounds, progress, rounded)
     return replace(judged, run_fault=own_fault)
 
 
