@@ -25,7 +25,7 @@ from hapticlink.orchestrator.results import tables
 from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
 from tests.attack.processes import PATIENCE, Room, own_folder
 from tests.orchestrator import hostile_slave
-from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
+from tests.orchestrator.foreign_fmus import hostile_fmu, hostile_scene
 
 PLACES = ("make", "enter", "leave", "set", "get", "step", "save", "restore", "end", "free")
 STATUSES = (
@@ -45,7 +45,7 @@ ACTS = (
 )
 CUT_SHORT = {("step", "early"), ("step", "middle"), ("step", "never")}
 PACKED = {"C": ACTS, "Python": tuple(hostile_slave.ACTS)}
-FILES = {"C": "hostile.fmu", "Python": "Hostile{fmi}.fmu"}
+FILES = {"C": "hostile", "Python": "Hostile{fmi}"}
 ENDS_THE_PROCESS = (
     "exit", "exit3", "leave", "abort", "null", "stack", "thread", "queue", "alarm", "default",
     "memory",

@@ -20,20 +20,18 @@ from hapticlink.orchestrator.run.execute_plan import Outcome, run
 from hapticlink.orchestrator.scene.records import Iteration, PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Coupling, EnergyPorts, Fmu, System
-from tests.orchestrator import oscillator
+from tests.orchestrator.native_mass import POWER, ROWS, SPRINGS, exact, matrix
 from tests.orchestrator.systems import connected
 
-ROWS = oscillator.ROWS
 HERMITE = [*ROWS, ("one.a", "two.a1")]
 """der(F) of `two` needs the acceleration of `one`."""
-POWER = oscillator.POWER
 
 
 def stiff_exact(
     times: NDArray[np.float64], k_1: float, k_2: float, k_c: float, c_c: float
 ) -> NDArray[np.float64]:
     """Rows x1, x2, of both masses at rest at 1 m in the beginning."""
-    a, start = oscillator.matrix(k_1, k_2, 0.0, k_c, c_c), np.array([1.0, 0.0, 1.0, 0.0])
+    a, start = matrix(k_1, k_2, 0.0, k_c, c_c), np.array([1.0, 0.0, 1.0, 0.0])
     return np.array([(expm(a * t) @ start)[[0, 2]] for t in times])
 
 
@@ -95,8 +93,8 @@ def masses(
     get_after_set: tuple[str, ...] = ("two",),
     substeps: int = 1,
 ) -> System:
-    """The two-mass oscillator."""
-    energy = {"power": POWER, "springs": oscillator.SPRINGS}
+    """The two-mass native_mass."""
+    energy = {"power": POWER, "springs": SPRINGS}
     how = {"hold": hold, "substeps": substeps, "get_after_set": get_after_set}
     return system(fmus, ROWS, coupling, period, steps * period, **how, **energy)
 
@@ -131,10 +129,10 @@ def simulate(made: System, folder: Path) -> tuple[Outcome, Table]:
 
 
 def motion(table: Table) -> NDArray[np.float64]:
-    """Rows x1, v1, x2, v2 of the two-mass oscillator."""
+    """Rows x1, v1, x2, v2 of the two-mass native_mass."""
     return np.stack([table[name] for name in ("one.x", "one.v", "two.x", "two.v")], axis=1)
 
 
 def error(table: Table) -> float:
-    """The largest error of a position of the two-mass oscillator."""
-    return float(np.abs(motion(table) - oscillator.exact(table["time"]))[:, [0, 2]].max())
+    """The largest error of a position of the two-mass native_mass."""
+    return float(np.abs(motion(table) - exact(table["time"]))[:, [0, 2]].max())

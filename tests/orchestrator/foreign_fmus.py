@@ -1,21 +1,25 @@
-"""FMUs of others for tests: pythonfmu's and pythonfmu3's, and one in C that fails on demand."""
+"""FMUs of others for tests: pythonfmu's and pythonfmu3's, and in C, where they fail on demand."""
 
 import os
+import re
 import subprocess
 import sys
+import tempfile
 import uuid
 import zipfile
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fmpy import platform, platform_tuple
+from fmpy import platform, platform_tuple, sharedLibraryExtension
 from pythonfmu.builder import FmuBuilder
 
+from hapticlink.fmus.native import compile_library
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.compiled import compiled
 
+FOLDER = Path(__file__).parent
 SLAVE = """
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
@@ -146,58 +150,74 @@ def with_units(path: Path, **units: str) -> Path:
     return edited(path, change)
 
 
-DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="faults" guid="{guid}">
-<CoSimulation modelIdentifier="faults"/>
+HOSTILE = {
+    "2": """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="hostile" guid="hostile">
+<CoSimulation modelIdentifier="hostile" {flags}/>
 <ModelVariables>
-<ScalarVariable name="mode" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+<ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
 <ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
+<ScalarVariable name="slope" valueReference="2" causality="output"><Real/></ScalarVariable>
 </ModelVariables>
-<ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
+<ModelStructure><Outputs><Unknown index="2"/><Unknown index="3"/></Outputs></ModelStructure>
 </fmiModelDescription>
-"""
-
-
-def c_fmu(folder: Path, guid: str = "{faults}", python: bool = False) -> Path:
-    """The FMU of fault_fmu.c; with `python`, one that holds an interpreter."""
-    description = DESCRIPTION.format(guid=guid)
-    if not python:
-        return _packed(folder, "fault_fmu.c", "faults", platform, description)
-    path = _packed(folder, "fault_fmu.c", "faults", platform, description, "-DPYTHON")
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr("resources/slavemodule.txt", "faults")
-        archive.writestr("resources/faults.py", "")
-    return path
-
-
-STAIR = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="stair" guid="stair">
-<CoSimulation modelIdentifier="stair" {flags}/>
+""",
+    "3": """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="hostile" instantiationToken="hostile">
+<CoSimulation modelIdentifier="hostile" {flags}/>
 <ModelVariables>
-<ScalarVariable name="counter" valueReference="0" causality="output" variability="discrete">
-<Integer/></ScalarVariable>
+<Float64 name="u" valueReference="0" causality="input" start="0"/>
+<Float64 name="y" valueReference="1" causality="output"/>
+<Float64 name="slope" valueReference="2" causality="output"/>
 </ModelVariables>
-<ModelStructure><Outputs><Unknown index="1"/></Outputs></ModelStructure>
+<ModelStructure><Output valueReference="1"/><Output valueReference="2"/></ModelStructure>
 </fmiModelDescription>
-"""
+""",
+}
+HOSTILE_LOG = "HOSTILE_FMU_LOG"
+STATES = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
 
 
-def stair_fmu(folder: Path, **flags: str) -> Path:
-    """The FMU of stair_fmu.c, with capability flags."""
-    said = " ".join(f'{name}="{value}"' for name, value in flags.items())
-    return _packed(folder, "stair_fmu.c", "stair", platform, STAIR.format(flags=said))
+def hostile_fmu(folder: Path, fmi: str = "2", *options: str, **flags: str) -> Path:
+    """The FMU of hostile_fmu.c, with capability flags; it can restore its state. What its instances
+    do is in their names, "<place>_<act>_<step>"."""
+    given = {STATES[fmi]: "true", "canHandleVariableCommunicationStepSize": "true"} | flags
+    description = HOSTILE[fmi].format(flags=attributes(given))
+    where = {"2": platform, "3": platform_tuple}[fmi]
+    options = (f"-DFMI={fmi}", "-pthread", *options)
+    return packed(folder / "hostile.fmu", "hostile_fmu.c", where, description, *options)
 
 
-def _packed(
-    folder: Path, source: str, name: str, where: str, description: str, *options: str
-) -> Path:
+def hostile_scene(folder: Path, name: str, lines: str = "", fmu: str = "hostile") -> Path:
+    """A scene in which the hostile FMU of that name gets the output of another one that behaves
+    well; `lines` are further keys of it, `fmu` is its file."""
+    both = fmu_table(name, fmu, lines) + fmu_table("source", "hostile")
+    return scene(folder, both + wire_table("source.y", f"{name}.u"))
+
+
+def attributes(given: Mapping[str, str]) -> str:
+    return " ".join(f'{name}="{value}"' for name, value in given.items())
+
+
+def packed(path: Path, source: str, where: str, description: str, *options: str) -> Path:
+    """The FMU of a C file of this folder, with one binary."""
     if where == platform_tuple:
-        options = (*options, str(Path(__file__).parent / "fmi3_rest.c"))
-    library, path = compiled(source, folder, name, *options), folder / f"{name}.fmu"
+        options = (*options, str(FOLDER / "fmi3_rest.c"))
+    found = re.search('modelIdentifier="(.*?)"', description)
+    assert found
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
-        archive.write(library, f"binaries/{where}/{library.name}")
+        library = f"binaries/{where}/{found[1]}{sharedLibraryExtension}"
+        archive.writestr(library, compiled(FOLDER / source, *options))
     return path
+
+
+@cache
+def compiled(source: Path, *options: str) -> bytes:
+    """A C file as a shared library, with all its functions exported."""
+    with tempfile.TemporaryDirectory() as room:
+        exported = ["-fvisibility=default", *options]
+        return compile_library(source, Path(room) / "library", options=exported).read_bytes()
 
 
 NUMBERS = (
@@ -208,7 +228,7 @@ NUMBERS = (
 
 def c_fmu3(folder: Path) -> Path:
     """The FMU of types_fmu3.c: input in_<type> and output out_<type> of every number type of FMI
-    3.0, parameters mode and text, a matrix whose size is a structural parameter, the weighted sum
+    3.0, a parameter text, a matrix whose size is a structural parameter, the weighted sum
     of its entries, and a binary input with its echo."""
     rows = []
     for k, kind in enumerate(NUMBERS):
@@ -225,7 +245,6 @@ def c_fmu3(folder: Path) -> Path:
 <fmiModelDescription fmiVersion="3.0" modelName="types" instantiationToken="{{types}}">
 <CoSimulation modelIdentifier="types"/>
 <ModelVariables>{"".join(rows)}
-<Int32 name="mode" valueReference="22" causality="parameter" variability="fixed" start="0"/>
 <String name="text" valueReference="23" causality="parameter" variability="fixed"><Start value=""/>
 </String>
 <UInt64 name="size" valueReference="24" causality="structuralParameter" variability="fixed"
@@ -239,7 +258,7 @@ def c_fmu3(folder: Path) -> Path:
 <ModelStructure>{outputs}<Output valueReference="26"/><Output valueReference="28"/></ModelStructure>
 </fmiModelDescription>
 """
-    return _packed(folder, "types_fmu3.c", "types", platform_tuple, description)
+    return packed(folder / "types.fmu", "types_fmu3.c", platform_tuple, description)
 
 
 EVENTS = """<?xml version="1.0" encoding="UTF-8"?>
@@ -265,7 +284,7 @@ EVENTS = """<?xml version="1.0" encoding="UTF-8"?>
 def event_fmu3(folder: Path, varies: bool = True, token: str = "{events}") -> Path:
     """The FMU of event_fmu3.c, which has event mode; `varies`: it takes steps of any size."""
     description = EVENTS.format(token=token, varies=str(varies).lower())
-    return _packed(folder, "event_fmu3.c", "events", platform_tuple, description)
+    return packed(folder / "events.fmu", "event_fmu3.c", platform_tuple, description)
 
 
 CLOCKED = """<?xml version="1.0" encoding="UTF-8"?>
@@ -302,10 +321,9 @@ def clock_fmu3(folder: Path, shift: float = 0.05, **flags: str) -> Path:
         f'<Int32 name="{name}_count" valueReference="{30 + k}" causality="output" clocks="{k}"/>\n'
         for k, name in enumerate(CLOCKS)
     )
-    said = " ".join(f'{name}="{value}"' for name, value in flags.items())
-    description = CLOCKED.format(flags=said, counts=counts, shift=shift)
+    description = CLOCKED.format(flags=attributes(flags), counts=counts, shift=shift)
     of = platform_tuple, description, f"-DSHIFT={shift}"
-    return _packed(folder, "clock_fmu3.c", "clocks", *of)
+    return packed(folder / "clocks.fmu", "clock_fmu3.c", *of)
 
 
 ISOLATED = "isolate = true\n"

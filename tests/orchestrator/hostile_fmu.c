@@ -1,7 +1,7 @@
-/* A co-simulation FMU that behaves badly on demand, of FMI 2.0 or, with -DFMI=3, FMI 3.0. The name
-   of its instance says how: "<place>_<act>_<step>", of the places and acts below, such as
+/* A co-simulation FMU that fails or behaves badly on demand, of FMI 2.0 or, with -DFMI=3, FMI 3.0. The
+   name of its instance says how: "<place>_<act>_<step>", of the places and acts below, such as
    "step_minus_20"; from that step on, for places that are called in steps. Input u, output y: y is
-   the number of steps plus u. */
+   the number of steps plus u. The file named by HOSTILE_FMU_LOG gets its last calls. */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
@@ -35,6 +35,12 @@ static void says(Model *m, const char *text) {
 #else
     ((Log3)m->log)(m->environment, 3, "error", text);
 #endif
+}
+
+static void logs(const char *call) {
+    const char *path = getenv("HOSTILE_FMU_LOG");
+    FILE *file = path ? fopen(path, "a") : NULL;
+    if (file) fprintf(file, "%s\n", call), fclose(file);
 }
 
 static void *forever(void *nothing) {
@@ -132,7 +138,8 @@ static int acts(Model *m, const char *place) {
     return 0;
 }
 
-static Model *made(const char *name, void *log, void *environment) {
+static Model *made(const char *name, const char *guid, void *log, void *environment) {
+    if (strcmp(guid, "hostile")) return NULL;
     Model *m = calloc(1, sizeof *m);
     sscanf(name, "%15[a-z]_%15[a-z0-9]_%d", m->place, m->act, &m->from);
     snprintf(m->name, sizeof m->name, "%s", name);
@@ -169,9 +176,19 @@ static void outside(const Model *m, double *beyond) {
     if (!strcmp(m->act, "outside") && m->step >= m->from) *beyond = 1e300;
 }
 
-#define UNUSED(name) int name(void) { return 3; }
+static void freed(Model *m) { acts(m, "free"); logs("free"); free(m); }
+static int terminated(Model *m) { logs("terminate"); return acts(m, "end"); }
+
+#ifdef PYTHON /* as in pythonfmu's library: to be called once before the destructor */
+static int released;
+void finalizePythonInterpreter(void) { released++; }
+__attribute__((destructor)) static void unload(void) {
+    logs(released == 1 ? "unloaded after its interpreter" : "unloaded with its interpreter");
+}
+#endif
 
 #if FMI == 2
+#define UNUSED(name) int name(void) { return 3; }
 typedef struct { Log2 logger; void *(*allocate)(size_t, size_t); void (*release)(void *); void *done; void *environment; } Callbacks;
 UNUSED(fmi2SetDebugLogging) UNUSED(fmi2Reset) UNUSED(fmi2GetInteger) UNUSED(fmi2GetBoolean)
 UNUSED(fmi2GetString) UNUSED(fmi2SetInteger) UNUSED(fmi2SetBoolean) UNUSED(fmi2SetString)
@@ -183,13 +200,13 @@ const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
                       const Callbacks *callbacks, int visible, int logging) {
-    return made(name, (void *)callbacks->logger, callbacks->environment);
+    return made(name, guid, (void *)callbacks->logger, callbacks->environment);
 }
-void fmi2FreeInstance(Model *m) { acts(m, "free"); free(m); }
+void fmi2FreeInstance(Model *m) { freed(m); }
 int fmi2SetupExperiment(Model *m, int d, double t, double a, int s, double b) { return initial(m, "setup"); }
 int fmi2EnterInitializationMode(Model *m) { return initial(m, "enter"); }
 int fmi2ExitInitializationMode(Model *m) { return initial(m, "leave"); }
-int fmi2Terminate(Model *m) { return acts(m, "end"); }
+int fmi2Terminate(Model *m) { return terminated(m); }
 int fmi2GetReal(Model *m, const unsigned *vr, size_t n, double *value) {
     outside(m, value + n);
     for (size_t i = 0; i < n; i++) value[i] = vr[i] == 0 ? m->u : vr[i] == 1 ? m->y : m->slope;
@@ -212,40 +229,20 @@ int fmi2SetFMUstate(Model *m, Model *state) {
     return acts(m, "restore");
 }
 int fmi2FreeFMUstate(Model *m, Model **state) { free(*state); *state = NULL; return acts(m, "forget"); }
-int fmi2GetBooleanStatus(Model *m, int kind, int *value) { *value = m->ends; return 0; }
-int fmi2GetRealStatus(Model *m, int kind, double *value) { *value = m->reached; return 0; }
+int fmi2GetBooleanStatus(Model *m, int kind, int *value) { *value = m->ends; return kind == 3 ? 0 : 3; }
+int fmi2GetRealStatus(Model *m, int kind, double *value) { *value = m->reached; return kind == 2 ? 0 : 3; }
 #else
-UNUSED(fmi3ActivateModelPartition) UNUSED(fmi3CompletedIntegratorStep)
-UNUSED(fmi3DeserializeFMUState) UNUSED(fmi3EnterConfigurationMode) UNUSED(fmi3ExitConfigurationMode)
-UNUSED(fmi3EnterContinuousTimeMode) UNUSED(fmi3EnterEventMode) UNUSED(fmi3EnterStepMode)
-UNUSED(fmi3EvaluateDiscreteStates) UNUSED(fmi3GetAdjointDerivative) UNUSED(fmi3GetClock)
-UNUSED(fmi3GetContinuousStateDerivatives) UNUSED(fmi3GetContinuousStates)
-UNUSED(fmi3GetDirectionalDerivative) UNUSED(fmi3GetEventIndicators)
-UNUSED(fmi3GetIntervalDecimal) UNUSED(fmi3GetIntervalFraction)
-UNUSED(fmi3GetNominalsOfContinuousStates) UNUSED(fmi3GetNumberOfContinuousStates)
-UNUSED(fmi3GetNumberOfEventIndicators) UNUSED(fmi3GetNumberOfVariableDependencies)
-UNUSED(fmi3GetOutputDerivatives) UNUSED(fmi3GetShiftDecimal) UNUSED(fmi3GetShiftFraction)
-UNUSED(fmi3GetVariableDependencies)
-UNUSED(fmi3InstantiateModelExchange) UNUSED(fmi3InstantiateScheduledExecution) UNUSED(fmi3Reset)
-UNUSED(fmi3SerializeFMUState) UNUSED(fmi3SerializedFMUStateSize)
-UNUSED(fmi3SetClock) UNUSED(fmi3SetContinuousStates) UNUSED(fmi3SetDebugLogging)
-UNUSED(fmi3SetIntervalDecimal) UNUSED(fmi3SetIntervalFraction)
-UNUSED(fmi3SetShiftDecimal) UNUSED(fmi3SetShiftFraction) UNUSED(fmi3SetTime)
-UNUSED(fmi3UpdateDiscreteStates)
-#define NO_TYPE(kind) UNUSED(fmi3Get##kind) UNUSED(fmi3Set##kind)
-NO_TYPE(Float32) NO_TYPE(Int64) NO_TYPE(Int32) NO_TYPE(Int16) NO_TYPE(Int8) NO_TYPE(UInt64)
-NO_TYPE(UInt32) NO_TYPE(UInt16) NO_TYPE(UInt8) NO_TYPE(Boolean) NO_TYPE(String) NO_TYPE(Binary)
 const char *fmi3GetVersion(void) { return "3.0"; }
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources,
                                   bool visible, bool logging, bool events, bool early,
                                   const unsigned *needed, size_t n, void *environment, void *log,
                                   void *update) {
-    return made(name, log, environment);
+    return made(name, token, log, environment);
 }
-void fmi3FreeInstance(Model *m) { acts(m, "free"); free(m); }
+void fmi3FreeInstance(Model *m) { freed(m); }
 int fmi3EnterInitializationMode(Model *m, bool d, double a, double t, bool s, double b) { return initial(m, "enter"); }
 int fmi3ExitInitializationMode(Model *m) { return initial(m, "leave"); }
-int fmi3Terminate(Model *m) { return acts(m, "end"); }
+int fmi3Terminate(Model *m) { return terminated(m); }
 int fmi3GetFloat64(Model *m, const unsigned *vr, size_t n, double *value, size_t size) {
     outside(m, value + n);
     for (size_t i = 0; i < n; i++) value[i] = vr[i] == 0 ? m->u : vr[i] == 1 ? m->y : m->slope;

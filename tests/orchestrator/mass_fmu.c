@@ -1,7 +1,7 @@
 /* An FMI 2.0 co-simulation FMU of a mass on a spring and a damper, exact for inputs that are
    polynomials up to the cubic:  x'' = p a + q b - k x - c v,  F = sign (p (x - a) + q (v - b)).
 
-   START has the start values. Inputs a, b and d, the derivative of b. Until the time `warm` it follows two such masses joined
+   Its guid has the start values of all numbers. Inputs a, b and d, the derivative of b. Until the time `warm` it follows two such masses joined
    by p, q (side = 1: F drives it, p = 1 as an input's weight; side = 2), x = (0, 1), v = (1, 0) then.
    Beyond |x| = `brittle` a step of more than `fine` s fails: `failure` 0 gives NaN, or its status.
    `offered` 1 gives directional derivatives of a step in step mode, 2 wrong ones, 3 none. */
@@ -52,7 +52,8 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
                       const void *callbacks, int visible, int logging) {
     Model *m = calloc(1, sizeof(Model));
-    memcpy(m->r, (double[REALS]){START}, sizeof(m->r));
+    char *at = (char *)guid;
+    for (int i = 0; i < REALS; i++, at++) m->r[i] = strtod(at, &at);
     return m;
 }
 void fmi2FreeInstance(void *c) { free(c); }

@@ -1,14 +1,52 @@
-"""The two masses of `oscillator` as compiled FMUs that take inputs varying within a step."""
+"""The two-mass oscillator split in two exact subsystems, so that only coupling error remains: its
+solution, and compiled FMUs of the two, which take inputs varying within a step.
 
-import zipfile
+m x1'' = -k x1 - c v1 + F,   m x2'' = -k x2 - c v2 - F,   F = k_c (x2 - x1) + c_c (v2 - v1)
+with m = 1, k = k_c = 100, c = c_c = 1, x = (0, 1), v = (1, 0) at WARM. `one` takes F, `two` x1, v1.
+Until WARM both follow the exact solution of the whole, so that every hold has its history.
+"""
+
 from collections.abc import Mapping
 from pathlib import Path
 
-from fmpy import platform, sharedLibraryExtension
+import numpy as np
+from fmpy import platform
+from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from hapticlink.orchestrator.fmi.description import Description, describe
-from tests.orchestrator import oscillator
-from tests.orchestrator.compiled import compiled
+from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
+from tests.orchestrator.foreign_fmus import attributes, packed
+
+K, C, K_C, C_C = 100.0, 1.0, 100.0, 1.0
+START = np.array([0.0, 1.0, 1.0, 0.0])
+"""x1, v1, x2, v2 at WARM."""
+WARM = 0.06
+
+
+def matrix(k_1: float, k_2: float, c: float, k_c: float, c_c: float) -> NDArray[np.float64]:
+    """Of (x1, v1, x2, v2): masses of 1 kg on k_1 and k_2 and c, joined by k_c and c_c."""
+    one = [-k_1 - k_c, -c - c_c, k_c, c_c]
+    two = [k_c, c_c, -k_2 - k_c, -c - c_c]
+    return np.array([[0.0, 1.0, 0.0, 0.0], one, [0.0, 0.0, 0.0, 1.0], two])
+
+
+A = matrix(K, K, C, K_C, C_C)
+
+
+def exact(times: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.array([expm(A * (t - WARM)) @ START for t in times])
+
+
+ROWS = [("two.F", "one.F"), ("one.x", "two.x1"), ("one.v", "two.v1")]
+
+POWER = (PowerPort(effort="one.F", displacement="one.x"),)
+SPRINGS = (
+    SetSpring(
+        set_position="two.x1", position="two.x", set_velocity="two.v1",
+        stiffness=(K_C,), damping=(C_C,),
+    ),
+)  # fmt: skip
 
 REALS = (
     "a", "b", "d", "x", "v", "acc", "F", "dF", "k", "c", "p", "q", "side", "warm", "sign",
@@ -29,8 +67,7 @@ OUTPUTS = {
 DERIVATIVE_OF = {"v": "x", "a": "v"}
 FEEDS = {"a": ["F"], "F": ["x1", "v1"], "der(F)": ["x1", "v1", "a1"]}
 """What an output depends on directly."""
-K, C, K_C, C_C = oscillator.K, oscillator.C, oscillator.K_C, oscillator.C_C
-COMMON = {"warm": oscillator.WARM, "sign": 1.0, "offered": 1.0}
+COMMON = {"warm": WARM, "sign": 1.0, "offered": 1.0}
 OWN = {
     "one": {"k": K, "c": C, "p": 1.0, "q": 0.0, "side": 1.0, **COMMON},
     "two": {"k": K + K_C, "c": C + C_C, "p": K_C, "q": C_C, "side": 2.0, **COMMON},
@@ -47,12 +84,8 @@ def native(
     """`one` takes a force, `two` a motion, with parameters that differ from the oscillator's in
     `values`."""
     start = {**dict.fromkeys(REALS, 0.0), **OWN[name], **values}
-    path, numbers = folder / f"{name}.fmu", ",".join(map(repr, start.values()))
-    library = compiled("mass_fmu.c", folder, name, f"-DSTART={numbers}")
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", _description(name, flags, nominal or {}, start))
-        archive.write(library, f"binaries/{platform}/mass{sharedLibraryExtension}")
-    return describe(path)
+    description = _description(name, flags, nominal or {}, start)
+    return describe(packed(folder / f"{name}.fmu", "mass_fmu.c", platform, description))
 
 
 def held(folder: Path) -> dict[str, Description]:
@@ -104,9 +137,9 @@ def _description(
         f'{" ".join(str(places[u]) for u in FEEDS.get(y, []))}"/>'
         for y in OUTPUTS[name].values()
     )
-    capable = " ".join(f'{flag}="true"' for flag in flags)
+    capable, numbers = attributes(dict.fromkeys(flags, "true")), ",".join(map(repr, start.values()))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="mass"
+<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{numbers}"
  variableNamingConvention="structured">
 <CoSimulation modelIdentifier="mass" {capable}/>
 <ModelVariables>{"".join(rows)}</ModelVariables>

@@ -31,15 +31,13 @@ pytestmark = needs_compiler
 DISCARD, ERROR, FATAL, IS_TERMINATED = 2, 3, 4, 3
 
 MASS = Path(foreign_fmus.__file__).with_name("mass_fmu.c").read_text()
-STAIR = Path(foreign_fmus.__file__).with_name("stair_fmu.c").read_text()
+HOSTILE = Path(foreign_fmus.__file__).with_name("hostile_fmu.c").read_text()
 
 
 def mass_fmus(folder: Path) -> None:
-    """The two masses of `native_mass`, with their start values and the source inside."""
-    for name, description in native_mass.held(folder).items():
-        start = {**dict.fromkeys(native_mass.REALS, 0.0), **native_mass.OWN[name]}
-        numbers = ",".join(map(repr, start.values()))
-        listing(description.path, {"mass.c": f"#define START {numbers}\n{MASS}"})
+    """The two masses of `native_mass`, with the source inside."""
+    for description in native_mass.held(folder).values():
+        listing(description.path, {"mass.c": MASS})
 
 
 def scene(folder: Path, *tables: str, duration: float = 1.0, rate: int = 64) -> str:
@@ -154,17 +152,15 @@ def test_it_runs_in_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         )
 
 
-def stair(folder: Path, rate: float, duration: float) -> str:
-    listing(foreign_fmus.stair_fmu(folder), {"stair.c": STAIR})
-    return scene(folder, fmu("stair", "stair", f"rate = {rate}\n"), duration=duration, rate=8)
-
-
-@pytest.mark.parametrize(("rate", "end"), [(1, 9.0), (0.25, 8.0)])
+@pytest.mark.parametrize(
+    ("act", "rate", "end"), [("step_finish_9", 1, 9.0), ("step_middle_3", 0.25, 8.0)]
+)
 def test_an_fmu_that_ends_the_simulation_ends_the_program(
-    rate: float, end: float, tmp_path: Path
+    act: str, rate: float, end: float, tmp_path: Path
 ) -> None:
     """At the end of its step, and within it."""
-    path = stair(tmp_path, rate, 16.0)
+    listing(foreign_fmus.hostile_fmu(tmp_path), {"hostile.c": HOSTILE})
+    path = scene(tmp_path, fmu(act, "hostile", f"rate = {rate}\n"), duration=16.0, rate=8)
     experiment = simulate(path, tmp_path / "run")
     assert experiment.outcome.end_time == end
     with session(program(path)) as opened:
@@ -178,7 +174,7 @@ def test_an_fmu_that_ends_the_simulation_ends_the_program(
         over = ctypes.c_int()
         slave.fmi2GetBooleanStatus(slave.component, IS_TERMINATED, ctypes.byref(over))
         assert over.value
-        assert "stair" in opened.messages[-1]
+        assert act in opened.messages[-1]
 
 
 @pytest.mark.parametrize(
@@ -222,8 +218,8 @@ REFUSED = {
     "it lists sources/other.c, which is not in it": {"other.c": None},
     "'mass.cpp' of its sources is no C file": {"mass.cpp": MASS},
     "of its sources, one_0_000.c does not compile": {"mass.c": MASS.replace("double", "dabble", 1)},
-    "its sources do not define fmi2GetBoolean, ": {"mass.c": "#define START 0\n" + re.sub(
-        r"UNUSED\(fmi2[GS]etBoolean\)", "", MASS)},
+    "its sources do not define fmi2GetBoolean, ": {
+        "mass.c": re.sub(r"UNUSED\(fmi2[GS]etBoolean\)", "", MASS)},
 }  # fmt: skip
 
 

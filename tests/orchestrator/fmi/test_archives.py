@@ -12,7 +12,9 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read
-from tests.orchestrator.foreign_fmus import DESCRIPTION
+from tests.orchestrator.foreign_fmus import HOSTILE
+
+DESCRIPTION = HOSTILE["2"].format(flags="")
 
 LAUGHS = """<?xml version="1.0"?>
 <!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">
@@ -90,17 +92,17 @@ REFERENCES = [2**32, 2**32 + 1, -1, 2**64]
         (lambda p: fmu(p, **{"a/C:evil": "x"}), "not a path with forward slashes"),
         (link, "is a symbolic link"),
         (lambda p: fmu(p), "no binary for this platform .* only for none"),
-        (lambda p: fmu(p, **{"binaries/win95/faults.dll": "x"}), "only for win95"),
+        (lambda p: fmu(p, **{"binaries/win95/hostile.dll": "x"}), "only for win95"),
         (changed('"2.0"', '"1.0"'), "FMI version 1.0"),
         (changed("CoSimulation ", "ModelExchange "), "co-simulation"),
         (changed('index="2"', 'index="9"'), "cannot be used"),
         (changed('start="0"', 'start="zero"'), "cannot be used"),
-        *((changed('r="faults"/', f'r="{name}"/'), "is no name of a library") for name in OUTSIDE),
+        *((changed('r="hostile"', f'r="{name}"'), "is no name of a library") for name in OUTSIDE),
         *((changed('name="y"', f'name="{name}"'), "printable characters") for name in NO_LINES),
         *((changed('Reference="1"', f'Reference="{number}"'),
            f"'y': value reference {number} is not from 0 to") for number in REFERENCES),
         # They would be one column, and all columns after it those of their neighbours.
-        (changed('name="mode"', 'name="y"'), "'y': 2 variables have this name"),
+        (changed('name="u"', 'name="y"'), "'y': 2 variables have this name"),
     ],
 )  # fmt: skip
 def test_malformed_fmus(tmp_path, make, message):

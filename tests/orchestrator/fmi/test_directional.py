@@ -15,9 +15,9 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.system.system import System
-from tests.orchestrator.compiled import compiled
-from tests.orchestrator.coupled import NEWTON, ROWS, simulate, system
-from tests.orchestrator.native_mass import FLAGS, STIFF, native, stiff
+from tests.orchestrator.coupled import NEWTON, simulate, system
+from tests.orchestrator.foreign_fmus import compiled
+from tests.orchestrator.native_mass import FLAGS, ROWS, STIFF, native, stiff
 from tests.orchestrator.systems import with_coupling
 
 STEP, WRONG, FAILING = 1.0, 2.0, 3.0
@@ -128,8 +128,9 @@ int fmi3GetDirectionalDerivative(void *c, const unsigned *unknown, size_t nu, co
 
 def test_fmi3_arrays_are_derived_whole(tmp_path):
     """Of single entries of arrays, in any order; the arrays' sizes are what the standard asks."""
-    (tmp_path / "linear.c").write_text(LINEAR)
-    library = compiled(tmp_path / "linear.c", tmp_path, "linear")
+    source, library = tmp_path / "linear.c", tmp_path / "linear.so"
+    source.write_text(LINEAR)
+    library.write_bytes(compiled(source))
     ports = {"u": (5, 3), "w": (6, 1)}, {"y": (7, 2), "z": (8, 1)}
     scalars = {
         (name, i): Scalar(f"{name}[{i + 1}]", ref, "Float64", causality, None, entry=i)

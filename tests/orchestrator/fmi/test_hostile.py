@@ -12,13 +12,20 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi import messages
 from hapticlink.orchestrator.results import tables
 from hapticlink.orchestrator.run.compiled.library import CHOICE
-from tests.orchestrator.foreign_fmus import ISOLATED, RUN, process
-from tests.orchestrator.hostile_fmus import hostile_fmu, hostile_scene
+from tests.orchestrator.foreign_fmus import (
+    HOSTILE_LOG,
+    ISOLATED,
+    RUN,
+    hostile_fmu,
+    hostile_scene,
+    process,
+)
 from tests.orchestrator.hostile_slave import hostile_slave
 from tests.orchestrator.run.test_interrupt import waited_for
-from tests.shared_fixtures import LOOPS
+from tests.shared_fixtures import LOOPS, sets, status
 
 pytest.importorskip("resource")  # the FMU needs POSIX
 
@@ -67,7 +74,7 @@ def test_a_change_of_the_current_directory_is_undone_and_told(
     hostile_fmu(tmp_path, fmi)
     hostile_scene(tmp_path, name := f"{place}_{where}_7")
     monkeypatch.chdir(tmp_path)
-    run = hl.run("hostile.toml", out="out", figures=False)
+    run = hl.run("scene.toml", out="out", figures=False)
     assert run.fault is None
     assert Path.cwd() == tmp_path
     to = "/" if where == "root" else "a folder that was removed"
@@ -112,27 +119,63 @@ def test_another_rounding_mode_is_restored_and_told(tmp_path, loop, fmi, place, 
     assert 2.0**-1074 > 0.0
 
 
+EARLY = {
+    **{(fmi, act): 20 / 64 for fmi in "23" for act in ("finish", "beyond")},
+    **{(fmi, act): 19 / 64 for fmi in "23" for act in ("middle", "never")},  # never: at NaN
+    ("3", "early"): 19 / 64,
+}
+"""The end of a run (s) by version and act."""
+
+
 @pytest.mark.parametrize(
-    ("fmi", "act", "end"),
+    ("fmi", "loop", "isolate", "act"),
     [
-        *((fmi, act, 20 / 64) for fmi in "23" for act in ("finish", "beyond")),
-        *((fmi, act, 19 / 64) for fmi in "23" for act in ("middle", "never")),  # never: at NaN
-        ("3", "early", 19 / 64),
+        *((fmi, loop, "", act) for loop in LOOPS for fmi, act in EARLY),
+        *((fmi, LOOPS[-1], ISOLATED, act) for fmi in "23" for act in ("finish", "middle")),
     ],
 )
-def test_a_step_that_ends_early_ends_the_run_at_the_last_whole_step(tmp_path, loop, fmi, act, end):
-    """As it requests, or unasked, which is not allowed to it (FMI 3.0, section 4.2.1)."""
+def test_a_step_that_ends_early_ends_the_run_at_the_last_whole_step(
+    tmp_path, fmi, loop, isolate, act, monkeypatch
+):
+    """As it requests, which is no fault, or unasked, which is not allowed to it (FMI 3.0, section
+    4.2.1); the rows of all FMUs end there."""
+    log, name, end = tmp_path / "log", f"step_{act}_20", EARLY[fmi, act]
+    monkeypatch.setenv(HOSTILE_LOG, str(log))
+    monkeypatch.setenv(CHOICE, loop)
     hostile_fmu(tmp_path, fmi)
-    outcome = simulate(hostile_scene(tmp_path, f"step_{act}_20"), tmp_path / "out").outcome
-    assert (outcome.reason, outcome.end_time) == ("fault" if act == "early" else "terminated", end)
-    early = "fmi3DoStep returned early, at 0.304688 s, unasked"
-    assert (early in str(outcome.fault)) == (act == "early")
+    coupling = "coupling=jacobi" if fmi == "3" else "coupling=gauss-seidel"
+    ended = simulate(hostile_scene(tmp_path, name, isolate), tmp_path / "out", [coupling])
+    outcome, rows = ended.outcome, ended.results.haptics
+    assert outcome.end_time == end
+    assert rows["source.y"].tolist() == (rows["time"] * 64).tolist() == [*range(int(end * 64) + 1)]
+    if act == "early":
+        assert outcome.reason == "fault"
+        assert "fmi3DoStep returned early, at 0.304688 s, unasked" in str(outcome.fault)
+        return
+    assert (outcome.reason, outcome.fault) == ("terminated", None)
+    assert ended.results.run["end"] == {"reason": "terminated", "time": end, "asked": outcome.asked}
+    within = {"middle": f"{name} asks to end the simulation at 0.304688 s, within its step"}
+    if act in ("finish", "middle"):
+        assert outcome.asked == within.get(act, f"{name} has asked to end the simulation")
+    assert log.read_text().splitlines() == ["terminate", "free"] * 2
+
+
+def test_a_retried_step_that_asks_for_the_end_is_no_discard(tmp_path, capsys):
+    """The command says who asked."""
+    hostile_fmu(tmp_path)
+    path = hostile_scene(tmp_path, "step_finish_20")
+    options = ("--no-figures", "--out", tmp_path / "out", *sets(["faults.discard=retry"]))
+    assert status("run", path, *options) == 0
+    told = capsys.readouterr()
+    assert "scene: ended: step_finish_20 has asked to end the simulation, at 0.3125 s" in told.out
+    assert not told.err
+    assert tables.load(tmp_path / "out").haptics["step_finish_20.slope"][-1] > 0
 
 
 def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path):
     streams, limit, errors = (sys.stdout, sys.stderr), sys.getrecursionlimit(), np.geterr()
     hostile_fmu(tmp_path)
-    file = hostile_slave(tmp_path, "2").name
+    file = hostile_slave(tmp_path, "2").stem
     for act in ("streams", "recursion", "seterr"):
         scene = hostile_scene(tmp_path, f"step_{act}_20", fmu=file)
         assert simulate(scene, tmp_path / "out").outcome.reason == "duration"
@@ -189,3 +232,18 @@ def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path):
         _, said = tool.communicate(timeout=20)
     assert tool.returncode == 1
     assert "interrupted" in said
+
+
+def test_the_newest_messages_are_kept_and_no_novel():
+    """Log messages of an FMU are kept up to their bounds."""
+    key = messages.opened()
+    for i in range(20_000):
+        messages.keep(key, 2, b"%d " % i + b"x" * 10_000)
+    messages.keep(key, 0, b"all is well")
+    messages.keep(key, -1, b"20000 is no status that FMI defines")
+    kept = messages.newest(key)
+    messages.closed(key)
+    assert [said.split()[0] for said in kept] == [str(i) for i in range(19_996, 20_001)]
+    assert {len(said) for said in kept[:-1]} == {messages.MAX_LENGTH}
+    messages.keep(key, 3, b"after the end")
+    assert messages.newest(key) == []

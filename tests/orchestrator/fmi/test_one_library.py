@@ -11,7 +11,7 @@ from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.process_cache import described
 from tests.orchestrator import coupled
-from tests.orchestrator.foreign_fmus import c_fmu
+from tests.orchestrator.foreign_fmus import hostile_fmu
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -46,7 +46,7 @@ def test_instances_of_our_file_share_a_folder_until_the_last_is_closed(
 
 
 def test_instances_of_a_file_of_others_have_a_library_each(tmp_path, own_temporary_folder):
-    description = describe(c_fmu(tmp_path))
+    description = describe(hostile_fmu(tmp_path))
     with ExitStack() as stack:
         for i in range(2):
             outputs = np.zeros(len(description.outputs))

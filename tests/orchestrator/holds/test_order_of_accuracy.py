@@ -13,8 +13,7 @@ import pytest
 
 from hapticlink.orchestrator.fmi.description import Description
 from tests.orchestrator import coupled
-from tests.orchestrator.native_mass import held, native
-from tests.orchestrator.oscillator import WARM
+from tests.orchestrator.native_mass import WARM, held, native
 
 Fmus = Mapping[str, Description]
 Hold = str | Mapping[str, str]
@@ -117,14 +116,7 @@ def growth(
     ("inputs", "hold", "substeps", "coupling", "get_after_set", "limit"),
     [
         ("constant", "zoh", 1, "jacobi", ("two",), ".0404"),
-        (
-            "constant",
-            "zoh",
-            1,
-            "jacobi",
-            (),
-            ".0250",
-        ),  # get all, set all, step all, as FMI wants it
+        ("constant", "zoh", 1, "jacobi", (), ".0250"),  # get all, set all, step all, as FMI has it
         ("constant", "foh", 8, "jacobi", ("two",), ".0630"),
         ("interpolating", "foh", 1, "jacobi", ("two",), ".0630"),
         ("constant", "second-order", 16, "jacobi", ("two",), ".0765"),

@@ -17,8 +17,8 @@ from tests.orchestrator.foreign_fmus import (
     COMMAND,
     ISOLATED,
     RUN,
-    c_fmu,
     fmu_table,
+    hostile_fmu,
     process,
     python_fmu,
     scene,
@@ -82,8 +82,8 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
 def test_memory_does_not_grow_with_the_run(tmp_path):
     """Two more minutes at 4096 Hz are 12 MB of rows; the largest memory of the process grows by a
     fraction of that."""
-    c_fmu(tmp_path)
-    path, peaks = scene(tmp_path, fmu_table("one", "faults"), rate=4096), []
+    hostile_fmu(tmp_path)
+    path, peaks = scene(tmp_path, fmu_table("one", "hostile"), rate=4096), []
     for seconds in (60, 180):
         ended = simulate(str(path), tmp_path / "out", [f"duration={seconds}"])
         peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB

@@ -19,14 +19,7 @@ from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled
-from tests.orchestrator.foreign_fmus import (
-    ISOLATED,
-    c_fmu,
-    fmu_table,
-    python_fmu,
-    scene,
-    wire_table,
-)
+from tests.orchestrator.foreign_fmus import ISOLATED, fmu_table, python_fmu, scene, wire_table
 from tests.orchestrator.native_mass import held
 from tests.orchestrator.results.records import tables_of
 
@@ -163,14 +156,6 @@ def test_exceptions_that_a_python_fmu_leaves_behind(tmp_path, monkeypatch, error
     python_fmu(tmp_path, "Leaves", LEFT[error])
     run, _ = both(str(scene(tmp_path, fmu_table("one", "Leaves"))), tmp_path, monkeypatch)
     assert error in run["fault"]["message"]
-
-
-@pytest.mark.parametrize("mode", range(1, 5))
-def test_every_status_of_a_step(tmp_path, monkeypatch, mode):
-    c_fmu(tmp_path)
-    text = fmu_table("one", "faults", f"start.mode = {mode}\n")
-    run, _ = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
-    assert (run["fault"] is None) == (mode == 1)
 
 
 REPEATED: dict[str, dict[str, Any]] = {

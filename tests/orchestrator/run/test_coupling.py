@@ -27,8 +27,6 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.coupled import (
     HERMITE,
-    POWER,
-    ROWS,
     described,
     error,
     gain,
@@ -39,7 +37,7 @@ from tests.orchestrator.coupled import (
 )
 from tests.orchestrator.coupled import order as observed_order
 from tests.orchestrator.foreign_fmus import edited
-from tests.orchestrator.native_mass import STIFF, held, native, stiff
+from tests.orchestrator.native_mass import POWER, ROWS, STIFF, held, native, stiff
 
 Fmus = Mapping[str, Description]
 UNTIL = Fraction("1.06")

@@ -12,10 +12,18 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.foreign_fmus import c_fmu, edited_entries, fmu_table, run, scene, slave
+from tests.orchestrator.foreign_fmus import (
+    edited,
+    edited_entries,
+    fmu_table,
+    hostile_fmu,
+    run,
+    scene,
+    slave,
+)
 from tests.shared_fixtures import status
 
-ONE = fmu_table("one", "faults")
+ONE = fmu_table("one", "hostile")
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -24,7 +32,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def flipped(folder: Path) -> None:
     """A byte in the middle of the binary, which no directory of the archive knows."""
-    path = c_fmu(folder)
+    path = hostile_fmu(folder)
     content = bytearray(path.read_bytes())
     with zipfile.ZipFile(path) as archive:
         entry = max(archive.infolist(), key=lambda e: e.file_size)
@@ -33,11 +41,15 @@ def flipped(folder: Path) -> None:
 
 
 def nan_at_the_start(folder: Path) -> None:
-    slave(folder, "Never", ("output", {"y": math.nan})).replace(folder / "faults.fmu")
+    slave(folder, "Never", ("output", {"y": math.nan})).replace(folder / "hostile.fmu")
+
+
+def of_another_guid(folder: Path) -> None:
+    edited(hostile_fmu(folder), lambda text: text.replace('guid="hostile"', 'guid="another"'))
 
 
 def elsewhere(folder: Path) -> None:
-    edited_entries(c_fmu(folder), lambda entries: {
+    edited_entries(hostile_fmu(folder), lambda entries: {
         name.replace("binaries/", "binaries/other-"): each for name, each in entries.items()
     })  # fmt: skip
 
@@ -47,13 +59,13 @@ def elsewhere(folder: Path) -> None:
     [
         (flipped, 2, "has another checksum"),
         (elsewhere, 2, "no binary for this platform"),
-        (lambda folder: c_fmu(folder, guid="{another}"), 1, "its guid may not be that"),
+        (of_another_guid, 1, "its guid may not be that"),
         (nan_at_the_start, 1, "output y is nan at t = 0 s"),
     ],
     ids=["damaged entry", "other platform", "other guid", "fault before the first row"],
 )
 def test_what_fails_before_its_first_row_takes_nothing(tmp_path, make, exit_status, said, capsys):
-    c_fmu(tmp_path)
+    hostile_fmu(tmp_path)
     path, out = scene(tmp_path, ONE), tmp_path / "out"
     assert status("run", path, "--no-figures", "--out", out) == 0
     before = files(out)
@@ -74,7 +86,7 @@ def test_without_an_earlier_row_the_fault_stands_in_run_json(tmp_path):
 
 
 def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path):
-    c_fmu(tmp_path)
+    hostile_fmu(tmp_path)
     run(tmp_path, ONE)
     nan_at_the_start(tmp_path)
     experiment, found = run(tmp_path, ONE)
@@ -86,7 +98,7 @@ def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path):
 
 def test_json_of_a_run_without_rows_tells_its_fault(tmp_path, capsys):
     """Its folder keeps those of the earlier run, and with them an earlier run.json."""
-    c_fmu(tmp_path)
+    hostile_fmu(tmp_path)
     path, out = scene(tmp_path, ONE), tmp_path / "out"
     assert status("run", path, "--no-figures", "--out", out, "--quiet") == 0
     nan_at_the_start(tmp_path)
@@ -99,7 +111,7 @@ def test_json_of_a_run_without_rows_tells_its_fault(tmp_path, capsys):
 def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path):
     """No file may grow beyond 16 kB: the FMU is unpacked, the first row is written, and run.json,
     which keeps room for its end, does not fit."""
-    c_fmu(tmp_path)
+    hostile_fmu(tmp_path)
     path, out = scene(tmp_path, ONE), tmp_path / "out"
     simulate(str(path), out)
     before = files(out)

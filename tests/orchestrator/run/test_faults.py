@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -18,16 +19,17 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.foreign_fmus import (
     COMMAND,
+    HOSTILE_LOG,
     ISOLATED,
     RUN,
     SLAVE,
-    c_fmu,
-    c_fmu3,
     edited_entries,
     fault,
     fmu_table,
+    hostile_fmu,
     process,
     python_fmu,
     python_fmu_of,
@@ -40,6 +42,7 @@ from tests.orchestrator.foreign_fmus import (
 from tests.orchestrator.results.records import tables_of
 from tests.orchestrator.run.test_interrupt import waited_for
 from tests.plugins import hapticlink, server
+from tests.shared_fixtures import LOOPS
 
 resource = pytest.importorskip("resource")  # these are the signals and limits of POSIX
 
@@ -125,38 +128,39 @@ def test_an_exception_in_a_python_fmu(tmp_path, isolate):
 
 
 @pytest.mark.parametrize(
-    ("fmi", "isolate"),
-    [("2", ""), ("3", ""), ("2", ISOLATED)],  # a worker is the same for every version of FMI
-)
-@pytest.mark.parametrize(
-    ("mode", "named", "calls"),
+    ("fmi", "isolate", "loop"),
     [
-        (1, None, ["terminate", "free"]),
-        (2, "discard", ["terminate", "free"]),
-        (3, "error", ["free"]),
-        (4, "fatal", []),
+        *((fmi, "", loop) for fmi in "23" for loop in LOOPS),
+        ("2", ISOLATED, LOOPS[-1]),  # a worker is the same for every version of FMI
     ],
 )
-def test_every_status(tmp_path, fmi, mode, named, calls, isolate, monkeypatch):
+@pytest.mark.parametrize(
+    ("act", "calls"),
+    [
+        ("warning", ["terminate", "free"]),
+        ("discard", ["terminate", "free"]),
+        ("error", ["free"]),
+        ("fatal", []),
+    ],
+)
+def test_every_status(tmp_path, fmi, act, calls, isolate, loop, monkeypatch):
     """What is called after a fault: FMI 2.0.5 sections 2.1.3 and 4.2.4, FMI 3.0 section 2.3.1.
     After an error only freeing is allowed, after a fatal error nothing; a discarded step leaves the
     FMU as it was, and a warning is no fault."""
-    log = tmp_path / "log"
-    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
-    {"2": c_fmu, "3": c_fmu3}[fmi](tmp_path)
+    log, name = tmp_path / "log", f"step_{act}_4"
+    monkeypatch.setenv(HOSTILE_LOG, str(log))
+    monkeypatch.setenv(CHOICE, loop)
+    hostile_fmu(tmp_path, fmi)
     python_fmu(tmp_path, "Other")
-    name, y = {"2": ("faults", "one.y"), "3": ("types", "one.out_Int8")}[fmi]
-    start = f"start.mode = {mode}\n" + "start.in_Int8 = 7\n" * (fmi == "3")
-    experiment, found = run(tmp_path, fmu_table("one", name, isolate + start) + OTHER)
-    said = log.read_text().splitlines() if log.exists() else []
-    assert [line for line in said if "unloaded" not in line] == calls
-    if named is None:
+    experiment, found = run(tmp_path, fmu_table(name, "hostile", isolate) + OTHER)
+    assert (log.read_text().splitlines() if log.exists() else []) == calls
+    if act == "warning":
         assert experiment.outcome.fault is None
         assert len(found.haptics["time"]) == 33
         return
-    told = f"one: fmi{fmi}DoStep returned {named} at t = 0.046875 s"
+    told = f"{name}: fmi{fmi}DoStep returned {act} at t = 0.046875 s"
     assert str(experiment.outcome.fault) == told
-    assert found.haptics[y].tolist() == ([0, 1, 2, 3] if fmi == "2" else [0, 7, 7, 7])
+    assert found.haptics[f"{name}.y"].tolist() == [0, 1, 2, 3]
     assert found.run["fault"]["kind"] == "FmuFault"
 
 
@@ -173,18 +177,16 @@ def test_every_status(tmp_path, fmi, mode, named, calls, isolate, monkeypatch):
     ],
 )
 def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(tmp_path, body, how):
-    start, native = "", body == "native"
-    if native:
-        c_fmu(tmp_path).rename(tmp_path / "Dies.fmu")
-        start = "start.mode = 6\n"
-    else:
-        python_fmu(tmp_path, "Dies", body)
+    native = body == "native"
+    name, fmu = ("step_loop_4", "hostile") if native else ("one", "Dies")
+    hostile_fmu(tmp_path)
+    python_fmu(tmp_path, "Dies", body)
     ended = tmp_path / "ended"
     python_fmu(tmp_path, "Other", end=f"open({str(ended)!r}, 'w').close()")
-    text = fmu_table("one", "Dies", ISOLATED + start) + OTHER
+    text = fmu_table(name, fmu, ISOLATED) + OTHER
     experiment, found = run(tmp_path, text, "faults.timeout=2")
     message = str(experiment.outcome.fault)
-    assert message.startswith(f"one: {how}")
+    assert message.startswith(f"{name}: {how}")
     steps = 3 if native else 13
     assert message.endswith(f"at t = {steps / 64} s")
     np.testing.assert_array_equal(found.haptics["time"], np.arange(steps + 1) / 64)
@@ -220,10 +222,13 @@ def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path):
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_a_python_fmu_lets_go_of_its_interpreter_before_the_process_ends(tmp_path, isolate):
-    c_fmu(tmp_path, python=True)
-    path = scene(tmp_path, fmu_table("one", "faults", isolate))
+    """Of an FMU that holds one, as pythonfmu's library does."""
+    with zipfile.ZipFile(hostile_fmu(tmp_path, "2", "-DPYTHON"), "a") as archive:
+        archive.writestr("resources/slavemodule.txt", "one")
+        archive.writestr("resources/one.py", "")
+    path = scene(tmp_path, fmu_table("one", "hostile", isolate))
     log = tmp_path / "log"
-    assert process(path, tmp_path / "out", FAULT_FMU_LOG=str(log)).returncode == 0
+    assert process(path, tmp_path / "out", **{HOSTILE_LOG: str(log)}).returncode == 0
     assert log.read_text().splitlines() == ["terminate", "free", "unloaded after its interpreter"]
 
 

@@ -1,12 +1,8 @@
 """A handle that meets a virtual wall at speed: the impulse of the sampled penalty and its rebound.
 
-A spring K that is held over T lags by T/2, which is a damping of -K T/2. Over half a period of
-w = sqrt(K/m) the speed grows by
-
-    e = exp(pi w T/4)  for small w T, at any speed;   sum F T = -m v (1 + e)
+A spring K that is held over T lags by T/2, which is a damping of -K T/2: the speed grows by e, and
+sum F T = -m v (1 + e).
 """
-
-import math
 
 import numpy as np
 import pytest
@@ -51,14 +47,6 @@ def test_impulse_and_rebound_of_a_sampled_wall(K, v):
     assert e > 1.0  # it sends the handle back faster
     assert -speeds[-1] == pytest.approx(-rebound(K, v, 0.01 * v), rel=1e-9)
     assert -np.sum(F) * T == pytest.approx(MASS * v * (1 + e), rel=1e-9)
-
-
-@pytest.mark.parametrize("K", [100.0, 300.0, 1000.0])
-def test_mean_rebound_over_the_phases_of_the_first_sample(K):
-    wT = math.sqrt(K / MASS) * T
-    phases = (np.arange(200) + 0.5) / 200
-    speeds = np.array([-rebound(K, 1.0, 0.01 + phase * T) for phase in phases])
-    assert np.mean(speeds) == pytest.approx(math.exp(math.pi / 4 * wT), rel=0.1 * wT**2)
 
 
 def test_a_damper_takes_what_the_samples_generate():

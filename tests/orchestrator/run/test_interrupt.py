@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
-from tests.orchestrator.foreign_fmus import ISOLATED, RUN, c_fmu, fmu_table, python_fmu, scene
+from tests.orchestrator.foreign_fmus import ISOLATED, RUN, fmu_table, hostile_fmu, python_fmu, scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
@@ -97,17 +97,17 @@ def rows_of(folder: Path) -> int:
 
 
 @pytest.mark.parametrize(
-    ("name", "more", "number"),
+    ("name", "fmu", "more", "number"),
     [
-        ("Hangs", ISOLATED, signal.SIGTERM),
-        ("Hangs", "", signal.SIGINT),
-        ("faults", "start.mode = 6\n", signal.SIGTERM),
+        ("one", "Hangs", ISOLATED, signal.SIGTERM),
+        ("one", "Hangs", "", signal.SIGINT),
+        ("step_loop_4", "hostile", "", signal.SIGTERM),
     ],
 )
-def test_a_second_signal_ends_an_fmu_that_hangs(tmp_path, name, more, number):
-    c_fmu(tmp_path)
+def test_a_second_signal_ends_an_fmu_that_hangs(tmp_path, name, fmu, more, number):
+    hostile_fmu(tmp_path)
     python_fmu(tmp_path, "Hangs", "while self.steps == 4: pass")
-    out, text = tmp_path / "out", fmu_table("one", name, more) + PATIENT
+    out, text = tmp_path / "out", fmu_table(name, fmu, more) + PATIENT
     path = scene(tmp_path, text, duration=100)
     with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.PIPE) as running:
         waited_for(lambda: rows_of(out) == 4)

@@ -4,9 +4,9 @@ import pytest
 
 from tests.orchestrator.foreign_fmus import (
     ISOLATED,
-    c_fmu,
     fault,
     fmu_table,
+    hostile_fmu,
     python_fmu,
     ran,
     run,
@@ -48,24 +48,24 @@ def test_of_two_that_fail_the_first_of_the_plan_is_told(tmp_path, isolate):
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_outputs_that_cannot_be_read_are_a_fault_when_they_are_due(tmp_path, isolate):
-    c_fmu(tmp_path)
+    hostile_fmu(tmp_path)
     python_fmu(tmp_path, "Goes")
-    slow = fmu_table("one", "faults", f"{isolate}start.mode = 8\nrate = 8\n")
+    slow = fmu_table("get_error_3", "hostile", f"{isolate}rate = 8\n")
     experiment, found = run(tmp_path, slow + fmu_table("two", "Goes", isolate))
-    said = "one: fmi2GetReal returned error at t = 0.375 s"
+    said = "get_error_3: fmi2GetReal returned error at t = 0.375 s"
     assert str(experiment.outcome.fault) == said
-    assert found.tables["8hz"]["one.y"].tolist() == [0, 1, 2]
+    assert found.tables["8hz"]["get_error_3.y"].tolist() == [0, 1, 2]
     assert found.haptics["two.y"].tolist() == found.haptics["time"].tolist()
     assert found.haptics["time"][-1] == 23 / 64  # those of 0.375 s come after the read
 
 
 def test_one_that_dies_leaves_the_others_a_clean_end(tmp_path):
     """They have been sent their steps when it dies."""
-    c_fmu(tmp_path)
+    hostile_fmu(tmp_path)
     ended = tmp_path / "ended"
     said = f"__import__('atexit').register(open, {str(ended)!r}, 'w') if self.steps == 1 else None"
     python_fmu(tmp_path, "Other", f"{said}; __import__('time').sleep(0.05)")
-    text = fmu_table("one", "faults", ISOLATED + "start.mode = 5\n")
+    text = fmu_table("step_abort_4", "hostile", ISOLATED)
     said = fault(tmp_path, text + fmu_table("two", "Other", ISOLATED))
-    assert said == "one: its process ended by SIGABRT at t = 0.046875 s"
+    assert said == "step_abort_4: its process ended by SIGABRT at t = 0.046875 s"
     assert ended.exists()  # by a process that was not killed

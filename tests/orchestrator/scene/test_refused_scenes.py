@@ -1,13 +1,14 @@
 """What a scene, or an option for it, is refused for, in its own words and at its place: one row
-(options, message) each. Faults of a system, of its FMUs and connections, are in
-system/test_refused_systems.py; several faults of one file, with their lines, in test_scene.py."""
+(options, message) each. The later rows of a scene are faults of its system: connections and holds,
+coupling, what happens at given times. Several faults of one file, with their lines, are in
+test_scene.py."""
 
 import pytest
 
-from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene import read_and_check
 from tests.orchestrator.scene.test_scene import GOOD
+from tests.orchestrator.systems import system_of
 
 ARM = GOOD[: GOOD.index("wrench")] + (
     'type = "arm"\nmass = [1.0, 1.0, 0.002]\ntarget = [[0.0, 0.0, 0.0, 0.0]]\n'
@@ -17,6 +18,11 @@ DRIVE = "linkage.joint.pivot.drive={type='pd',effort=1,table=[[0,0]],stiffness=1
 FOUR = "[[0,0],[1,0],[0.1,0.1],[0,1]]"
 OUT = "is out of range: give a"
 THREE = "should be three numbers"
+NO_POWER = "no connection across rates carries power"
+NOTHING = "is no connection of this scene; did you mean 'controller.P_c'?"
+X_D = '"controller.x_D"'
+ITERATED = f"coupling=iterated; at=[{{time=0.1, freeze=[{X_D}]}}]"
+LATE = "hold=pspm; delays.controller.x_D=0.004"
 REFUSED = {
     "the scene of test_scene.py": [
         ("duration=0.001", "0.001 s is less than a haptic period, 1/(512 Hz)"),
@@ -97,6 +103,43 @@ REFUSED = {
         ("iteration.tolerance=-1.0", "iteration.tolerance"),
         ("step_control={ tolerance = 1.0 }", "with a higher rate or `substeps`"),
         ("record.signals=some", '"all", "connected" or "none" or a list'),
+        ("hold=passive", NO_POWER),
+        ("hold=nepce", NO_POWER),
+        ("hold=pspm", "no held connection sets a spring"),
+        ("hold=pspm", "closed-loop-direct"),  # where it does
+        ("holds.virtual_environment.P_c=passive", "not a declared power connection"),
+        ("holds.virtual_environment.P_c=foh-derivative", "does not put out the derivative of P_c"),
+        ("holds.controller.nothing=foh", "is no connection of this scene"),
+        ('holds."controller.P_d"=lead', NOTHING),
+        ("delays.controller.P_d=0.1", NOTHING),
+        ("holds.zzz=lead", "there are hand.F -> haptic_device.F_hand, "),
+        ("substeps.hand=4", "is no plant of this scene"),
+        ("get_after_set=['hand']", "is no plant of this scene"),
+        ('kinds."virtual_mechanism.x"=projector', "x has 3 entries, and a projector"),
+        ("kinds.virtual_mechanism.x=rotation",
+         "'rotation' should be 'projector', 'semidefinite', 'angle', 'table' or 'none'"),
+        ('record.signals=["virtual_mechanism.xx"]', "did you mean 'virtual_mechanism.x'?"),
+        ("duration=1e5; graphics.rate={ min = 20, max = 60 }", "graphics.rate: up to 5688888 p"),
+        (ITERATED, "steps are repeated"),
+        ("at=[{time=0.1}]", "nothing happens then"),
+        *((f"at=[{{time=0.1, {what}}}]", message) for what, message in (
+            ('set={"hand.wrench"=[0.0]}', "1 values for the 3"),
+            ('set={"hand.wrenc"=[0.0]}', "no input or parameter 'wrenc'"),
+            (f"set={{{X_D}=[0.0, 0.0, 0.0]}}", "take override"),
+            ('set={"haptic_device.x_start"=[0.0, 0.0, 0.0]}', "x_start"),
+            ('set={"graphics.rate"=1000}', "give a rate"),
+            ('override={"controller.k_j"=0.0}', "take set"),
+            ('override={"virtual_mechanism.F_hand"=[0.0, 0.0, 0.0]}', "carries power"),
+            ('freeze=["nobody.x"]', "no FMU 'nobody'"),
+            (f"until=0.05, freeze=[{X_D}]", "is not after"),
+            (f"noise={{{X_D}=0.0}}", "noise"),
+        )),
+    ],
+    "closed-loop-direct": [
+        ("holds.virtual_mechanism.F_drift=pspm", "sets no spring"),
+        ("holds.controller.x_S=pspm", "controller.v_S sets the same spring"),
+        ("holds.controller.v_S=pspm", "controller.x_S sets the same spring"),
+        (LATE, "near end of its spring must be read unheld"),
     ],
     "four-bar": [
         (f"{'a.' * 300}a=1", "a key of 301 names"),
@@ -143,6 +186,9 @@ REFUSED = {
         (f"{LIMITS}, upper=-1.0}}", "-1.0 is not above `lower` = 1.0"),
         (f"{LIMITS}, restitution=0.5, damping=0.1}}", "`damping` or `restitution`, not both"),
         (f"{LIMITS}, restitution=0.0}}", "give a number >= 0.01"),
+        ("coupling=iterated", "'iterated' repeats the steps of connected plants"),
+        ("linkage.joint.0.friction_speed=1e-6; duration=0.01", "virtual_mechanism: the "
+         "`friction_speed` or `friction_deflection` of a joint is too fast for steps of 0.00"),
     ],
     "single-body": [
         ("linkage.joint.float.limits={stiffness=9.0, lower=1.0}",
@@ -165,9 +211,16 @@ REFUSED = {
 SEVERAL = (
     "graphics.rate=[0.5, 0.2]", "hand.type=spring", "graphics.stiffness=[-1,-1,-1]",
     "controller.damping=[-1,-1,-1]", "contacts={friction=0.3, stiffness=0.0}",
-    "contacts.enclosure=[]", "linkage.body.disc.name=block",
+    "contacts.enclosure=[]", "linkage.body.disc.name=block", ITERATED, LATE,
 )  # fmt: skip
 """These make further faults."""
+IN_THE_FILE = (
+    "device.distal_length=0.005", "linkage.joint.pivot.parent=bar", "hand.type=spring",
+    "haptics.rate=5e-324", "\udcff=1", "contacts.disc.pin.name=block", "mechanism_at=graphics",
+    "linkage.body.disc.name=block", "linkage.body.block.center=[0.01, 0.0]",
+    "linkage.joint.0.friction_speed=1e-6; duration=0.01",
+)  # fmt: skip
+"""The faults of these are not told at the option."""
 TEXTS = {"the scene of test_scene.py": GOOD, "an arm": ARM}
 
 
@@ -175,7 +228,7 @@ def refused(scene: object, *options: str) -> str:
     """What is said of a scene: one of TEXTS, or by its name or path."""
     text = TEXTS.get(str(scene))
     with pytest.raises(InputFault) as fault:
-        read_and_check.read(text, options) if text else open_scene.load(str(scene), options)
+        read_and_check.read(text, options) if text else system_of(scene, *options)
     assert fault.value.exit_status == 2
     return str(fault.value)
 
@@ -189,6 +242,7 @@ def test_what_is_refused(scene, options, message):
     said = refused(scene, *options.split("; "))
     assert message in said
     assert (" faults\n" in said) == (options in SEVERAL)
+    assert ("--set" in said) == (options not in IN_THE_FILE)
     assert len(said) < 1000
 
 

@@ -156,7 +156,7 @@ def test_bytes_are_passed_on_by_a_line(tmp_path, monkeypatch):
     """The start value of one FMU reaches the other."""
     c_fmu3(tmp_path)
     log = tmp_path / "log"
-    monkeypatch.setenv("FAULT_FMU_LOG", str(log))
+    monkeypatch.setenv("TYPES_FMU_LOG", str(log))
     two = fmu_table("a", "types", 'start.blob = "00ff"\n') + fmu_table("b", "types")
     path = hl.export(scene(tmp_path, two + wire_table("a.echo", "b.blob")), out=tmp_path / "x.ssp")
     log.write_text("")
