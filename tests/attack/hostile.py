@@ -25,7 +25,8 @@ from hapticlink.orchestrator.results import tables
 from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
 from tests.attack.processes import PATIENCE, Room, own_folder
 from tests.orchestrator import hostile_slave
-from tests.orchestrator.foreign_fmus import hostile_fmu, hostile_scene
+from tests.orchestrator.c_fmus import hostile_fmu
+from tests.orchestrator.foreign_scenes import hostile_scene
 
 PLACES = ("make", "enter", "leave", "set", "get", "step", "save", "restore", "end", "free")
 STATUSES = (

@@ -20,6 +20,7 @@ from hapticlink.orchestrator.run.execute_plan import Outcome, run
 from hapticlink.orchestrator.scene.records import Iteration, PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Coupling, EnergyPorts, Fmu, System
+from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.native_mass import POWER, ROWS, SPRINGS, exact, matrix
 from tests.orchestrator.systems import connected
 
@@ -128,6 +129,13 @@ def simulate(made: System, folder: Path) -> tuple[Outcome, Table]:
     return run(Plan(made), RunFolder(folder)), read_table(folder / "haptics.csv")
 
 
+def rows(made: System, folder: Path) -> Table:
+    """Of a run without a fault."""
+    outcome, table = simulate(made, folder)
+    assert outcome.fault is None
+    return table
+
+
 def motion(table: Table) -> NDArray[np.float64]:
     """Rows x1, v1, x2, v2 of the two-mass native_mass."""
     return np.stack([table[name] for name in ("one.x", "one.v", "two.x", "two.v")], axis=1)
@@ -136,3 +144,14 @@ def motion(table: Table) -> NDArray[np.float64]:
 def error(table: Table) -> float:
     """The largest error of a position of the two-mass native_mass."""
     return float(np.abs(motion(table) - exact(table["time"]))[:, [0, 2]].max())
+
+
+def scene_of(
+    fmus: Mapping[str, Description], settings: str, one: str = "", force: str = ""
+) -> Path:
+    """A scene file of both masses beside their FMUs, with further lines of its own, of the table of
+    `one` and of the connection of the force."""
+    text = settings + fmu_table("one", "one", one) + fmu_table("two", "two")
+    text += wire_table("two.F", "one.F", force)
+    text += wire_table("one.x", "two.x1") + wire_table("one.v", "two.v1")
+    return scene(fmus["one"].path.parent, text, 100)

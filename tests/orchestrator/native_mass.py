@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
-from tests.orchestrator.foreign_fmus import attributes, packed
+from tests.orchestrator.c_fmus import attributes, packed
 
 K, C, K_C, C_C = 100.0, 1.0, 100.0, 1.0
 START = np.array([0.0, 1.0, 1.0, 0.0])

@@ -94,7 +94,7 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
                                   bool visible, bool logging, bool events, bool early,
                                   const unsigned *required, size_t count, void *environment,
                                   void *log, void *update) {
-    Model *m = strcmp(token, "{types}") ? NULL : calloc(1, sizeof(Model));
+    Model *m = strcmp(token, "types") ? NULL : calloc(1, sizeof(Model));
     if (m) m->size = 2;
     return m;
 }

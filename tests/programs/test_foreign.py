@@ -20,7 +20,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.programs.build import build_program, program_files
 from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
-from tests.orchestrator import foreign_fmus, native_mass
+from tests.orchestrator import c_fmus, foreign_scenes, native_mass
 from tests.programs import test_page_program
 from tests.programs.built import needs_compiler, program
 from tests.programs.comparison import differing, outputs, run
@@ -30,8 +30,8 @@ pytestmark = needs_compiler
 
 DISCARD, ERROR, FATAL, IS_TERMINATED = 2, 3, 4, 3
 
-MASS = Path(foreign_fmus.__file__).with_name("mass_fmu.c").read_text()
-HOSTILE = Path(foreign_fmus.__file__).with_name("hostile_fmu.c").read_text()
+MASS = Path(c_fmus.__file__).with_name("mass_fmu.c").read_text()
+HOSTILE = Path(c_fmus.__file__).with_name("hostile_fmu.c").read_text()
 
 
 def mass_fmus(folder: Path) -> None:
@@ -41,14 +41,14 @@ def mass_fmus(folder: Path) -> None:
 
 
 def scene(folder: Path, *tables: str, duration: float = 1.0, rate: int = 64) -> str:
-    return str(foreign_fmus.scene(folder, "\n".join(tables), rate, duration))
+    return str(foreign_scenes.scene(folder, "\n".join(tables), rate, duration))
 
 
 def fmu(name: str, file: str, more: str = "") -> str:
     return f'[[fmu]]\nname = "{name}"\npath = "{file}.fmu"\n{more}'
 
 
-wire = foreign_fmus.wire_table
+wire = foreign_scenes.wire_table
 
 
 def agree(path: str, options: tuple[str, ...], folder: Path) -> None:
@@ -159,7 +159,7 @@ def test_an_fmu_that_ends_the_simulation_ends_the_program(
     act: str, rate: float, end: float, tmp_path: Path
 ) -> None:
     """At the end of its step, and within it."""
-    listing(foreign_fmus.hostile_fmu(tmp_path), {"hostile.c": HOSTILE})
+    listing(c_fmus.hostile_fmu(tmp_path), {"hostile.c": HOSTILE})
     path = scene(tmp_path, fmu(act, "hostile", f"rate = {rate}\n"), duration=16.0, rate=8)
     experiment = simulate(path, tmp_path / "run")
     assert experiment.outcome.end_time == end
@@ -236,7 +236,7 @@ def test_what_cannot_be_compiled_in_is_refused_with_the_reason(reason: str, tmp_
 
 
 def test_an_fmu_of_fmi_3_is_refused(tmp_path: Path) -> None:
-    path = foreign_fmus.c_fmu3(tmp_path)
+    path = c_fmus.c_fmu3(tmp_path)
     loaded = open_scene.load(scene(tmp_path, fmu("types", path.stem)))
     with pytest.raises(
         InputFault, match=r"it is of FMI 3.0; only those of FMI 2.0 are compiled in"

@@ -12,9 +12,10 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read
-from tests.orchestrator.foreign_fmus import HOSTILE
+from tests.orchestrator.c_fmus import HOSTILE, description3
+from tests.orchestrator.ssp.ssps import HEAD, UNTIMED, component
 
-DESCRIPTION = HOSTILE["2"].format(flags="")
+DESCRIPTION = HOSTILE.format(flags="")
 
 LAUGHS = """<?xml version="1.0"?>
 <!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">
@@ -53,10 +54,8 @@ def flipped(path: Path) -> Path:
     return path
 
 
-HUGE = """<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="m">
-<CoSimulation modelIdentifier="faults"/><ModelVariables>
-<Float64 name="x" valueReference="1" causality="output"><Dimension start="100000000000"/></Float64>
-</ModelVariables><ModelStructure/></fmiModelDescription>"""
+HUGE = description3("huge", """<Float64 name="x" valueReference="1" causality="output">
+<Dimension start="100000000000"/></Float64>""", ())  # fmt: skip
 """A kilobyte of XML that declares more entries than memory holds."""
 
 
@@ -133,14 +132,8 @@ def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path):
         describe(path)
 
 
-SSD = """<?xml version="1.0" encoding="UTF-8"?>
-<ssd:SystemStructureDescription version="1.0" name="two"
- xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
- xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
- xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">
-<ssd:System name="top"><ssd:Elements>
-<ssd:Component name="a" source="resources/a.fmu"/>
-</ssd:Elements></ssd:System></ssd:SystemStructureDescription>"""
+ONE = f"<ssd:Elements>{component('a', 'a')}</ssd:Elements>"
+SSD = f'{HEAD}<ssd:System name="top">{ONE}</ssd:System>{UNTIMED}'
 
 
 @pytest.mark.parametrize(

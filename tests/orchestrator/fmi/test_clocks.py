@@ -5,18 +5,9 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.base.errors import SceneFault
-from tests.orchestrator.foreign_fmus import (
-    ISOLATED,
-    clock_fmu3,
-    edited,
-    event_fmu3,
-    fault,
-    fmu_table,
-    python_fmu,
-    ran,
-    run,
-    wire_table,
-)
+from tests.orchestrator.c_fmus import clock_fmu3, event_fmu3
+from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, run, wire_table
 
 ONE = fmu_table("one", "clocks")
 

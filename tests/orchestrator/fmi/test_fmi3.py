@@ -7,19 +7,9 @@ import pytest
 
 from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.fmi.description import describe
-from tests.orchestrator.foreign_fmus import (
-    ISOLATED,
-    NUMBERS,
-    c_fmu3,
-    edited,
-    fault,
-    fmu_table,
-    python_fmu,
-    ran,
-    run,
-    slave,
-    wire_table,
-)
+from tests.orchestrator.c_fmus import NUMBERS, c_fmu3
+from tests.orchestrator.foreign_fmus import edited, python_fmu, slave
+from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, run, wire_table
 
 ONE = fmu_table("one", "types")
 EXTREMES = {
@@ -29,11 +19,16 @@ EXTREMES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_start_values_of_every_type(tmp_path, isolate, monkeypatch):
+@pytest.fixture(autouse=True)
+def log(tmp_path, monkeypatch):
+    """What the FMU gets as texts and blobs."""
     c_fmu3(tmp_path)
-    log = tmp_path / "log"
-    monkeypatch.setenv("TYPES_FMU_LOG", str(log))
+    monkeypatch.setenv("TYPES_FMU_LOG", str(tmp_path / "log"))
+    return tmp_path / "log"
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_start_values_of_every_type(tmp_path, isolate, log):
     starts = "".join(f"start.in_{k} = {str(v).lower()}\n" for k, v in EXTREMES.items())
     starts += 'start.text = "Grüße"\nstart.blob = "00ff10"\n'
     found = ran(tmp_path, ONE + isolate + starts).haptics
@@ -60,12 +55,11 @@ def test_which_output_is_the_derivative_of_which(tmp_path):
     def kind(name):
         return "Float32" if name == "slope" else "Float64"
 
-    found = describe(edited(c_fmu3(tmp_path), change))
+    found = describe(edited(tmp_path / "types.fmu", change))
     assert found.derivatives == {"out_Float64[1]": "slope[1]", "out_Float64[2]": "slope[2]"}
 
 
 def test_connections_to_every_type_round_to_whole_numbers(tmp_path):
-    c_fmu3(tmp_path)
     python_fmu(tmp_path, "Gives", "self.y = 2.6 - self.steps * 0.25")
     wires = "".join(wire_table("gives.y", f"one.in_{k}") for k in NUMBERS)
     found = ran(tmp_path, fmu_table("gives", "Gives") + ONE + wires, "duration=0.125")
@@ -87,7 +81,6 @@ def test_connections_to_every_type_round_to_whole_numbers(tmp_path):
     ],
 )
 def test_a_number_that_its_type_cannot_hold_is_a_fault(tmp_path, kind, value, limits, isolate):
-    c_fmu3(tmp_path)
     python_fmu(tmp_path, "Gives", f"self.y = {value!r} if self.steps == 3 else 1.0")
     wire = wire_table("gives.y", f"one.in_{kind}")
     experiment, found = run(tmp_path, fmu_table("gives", "Gives") + ONE + isolate + wire)
@@ -99,7 +92,6 @@ def test_a_number_that_its_type_cannot_hold_is_a_fault(tmp_path, kind, value, li
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_whole_numbers_beyond_2_53_start_exactly(tmp_path, isolate):
     """The largest whole numbers of both wide types that a double holds."""
-    c_fmu3(tmp_path)
     exact = {"UInt64": 2**64 - 2048, "Int64": -(2**63)}
     starts = "".join(f"start.in_{k} = {v}\n" for k, v in exact.items())
     found = ran(tmp_path, ONE + isolate + starts).haptics
@@ -121,7 +113,6 @@ def test_whole_numbers_beyond_2_53_start_exactly(tmp_path, isolate):
     ],
 )
 def test_start_values_that_cannot_be(tmp_path, isolate, starts, message):
-    c_fmu3(tmp_path)
     assert message in fault(tmp_path, f"{ONE}{isolate}{starts}\n")
 
 
@@ -131,7 +122,6 @@ def test_start_values_that_cannot_be(tmp_path, isolate, starts, message):
 )
 def test_a_structural_parameter_sizes_a_matrix_given_by_rows(tmp_path, isolate, array):
     """Set in configuration mode (the FMU refuses it elsewhere); sum of i times entry i."""
-    c_fmu3(tmp_path)
     found = ran(tmp_path, f"{ONE}{isolate}start.size = 3\nstart.array = {array}\n")
     expected = sum((i + 1) * v for i, v in enumerate([1, 2, 3, 4, 5, 6, 7, 8, 10]))
     np.testing.assert_array_equal(found.haptics["one.sum"], expected)
@@ -149,7 +139,6 @@ def test_a_structural_parameter_sizes_a_matrix_given_by_rows(tmp_path, isolate, 
     ],
 )
 def test_what_fits_no_array_or_binary_is_refused(tmp_path, starts, message):
-    c_fmu3(tmp_path)
     with pytest.raises(SceneFault, match=message):
         run(tmp_path, ONE + starts)
 
@@ -164,16 +153,12 @@ def test_what_fits_no_array_or_binary_is_refused(tmp_path, starts, message):
     ],
 )
 def test_a_text_is_connected_to_one_of_its_type(tmp_path, source, target, kind):
-    c_fmu3(tmp_path)
     with pytest.raises(SceneFault, match=f"{kind}: .* output is connected to a .* input only"):
         run(tmp_path, ONE + fmu_table("two", "types") + wire_table(source, target))
 
 
-def test_bytes_are_passed_on(tmp_path, monkeypatch):
+def test_bytes_are_passed_on(tmp_path, log):
     """Zeros among them too."""
-    c_fmu3(tmp_path)
-    log = tmp_path / "log"
-    monkeypatch.setenv("TYPES_FMU_LOG", str(log))
     two = fmu_table("two", "types") + wire_table("one.echo", "two.blob")
     found = ran(tmp_path, f'{ONE}start.blob = "00ff10"\n{two}')
     first, *others = [line for line in log.read_text().splitlines() if line.startswith("blob")]

@@ -8,25 +8,15 @@ import numpy as np
 import pytest
 import pythonfmu
 from pythonfmu.builder import FmuBuilder
+from scipy.linalg import expm
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
-from tests.orchestrator.foreign_fmus import (
-    ISOLATED,
-    PAIR,
-    edited,
-    fmu_table,
-    python_fmu,
-    ran,
-    run,
-    scene,
-    slave,
-    wire_table,
-    with_units,
-)
+from tests.orchestrator.foreign_fmus import edited, python_fmu, slave, with_units
+from tests.orchestrator.foreign_scenes import ISOLATED, PAIR, fmu_table, ran, run, scene, wire_table
 from tests.shared_fixtures import BAR
 
 SHIPPED = Path(pythonfmu.__file__).parent / "tests" / "slaves"
@@ -327,3 +317,53 @@ def test_what_is_no_angle_is_not_unwrapped(tmp_path):
     python_fmu(tmp_path, "Fast")
     with pytest.raises(SceneFault, match="in m, which is no angle"):
         run(tmp_path, TURNING)
+
+
+# --- connections to parameters: tunable ones act at each communication point, fixed ones once ---
+
+GAIN = PAIR.replace("takes.u", "takes.gain")
+
+
+@pytest.fixture
+def gives_and_takes(tmp_path):
+    python_fmu(tmp_path, "Gives", "self.y = 100.0 + 400.0 * (time + size)")
+    python_fmu(tmp_path, "Takes", "self.y = self.gain")
+    return tmp_path
+
+
+def test_a_tunable_parameter_is_set_at_each_communication_point(gives_and_takes):
+    results = simulate(str(scene(gives_and_takes, GAIN)), gives_and_takes / "out").results
+    given = results.haptics["gives.y"]
+    np.testing.assert_array_equal(results.haptics["takes.y"][1:], given[:-1])
+    assert given[-1] == 100.0 + 400.0 * 0.5
+    assert results.run["delays"]["gives.y -> takes.gain"]["max"] == 0.0
+
+
+def test_a_fixed_parameter_is_set_once(gives_and_takes):
+    edited(gives_and_takes / "Takes.fmu", lambda text: text.replace('"tunable"', '"fixed"'))
+    results = simulate(str(scene(gives_and_takes, GAIN)), gives_and_takes / "out").results
+    np.testing.assert_array_equal(results.haptics["takes.y"], 0.0)
+
+
+MASS = """
+linkage.operational_point.body = "mass"
+linkage.body = [{ name = "mass", mass = 2.0, inertia = 1.0 }]
+linkage.joint = [
+    { name = "slide", type = "prismatic", child = "mass", axis = 0.0, stiffness = 1.0 },
+]
+linkage.start = { slide = 0.3 }
+connection = [{ from = "gives.y", to = "virtual_mechanism.slide.stiffness" }]
+fmu = [{ name = "gives", path = "Gives.fmu", rate = "haptics" }]
+"""
+
+
+@pytest.mark.parametrize("packaging", ["python", "native"])
+def test_a_spring_that_stiffens_in_steps(gives_and_takes, packaging):
+    """m x'' = -k(t_k) x over each step, in closed form."""
+    path = scene(gives_and_takes, f'packaging = "{packaging}"' + MASS, rate=512)
+    table = simulate(str(path), gives_and_takes / "out").results.haptics
+    state, found = np.array([0.3, 0.0]), []
+    for k in table["gives.y"]:
+        found.append(state[0])
+        state = expm(np.array([[0.0, 1.0], [-k / 2.0, 0.0]]) / 512) @ state
+    np.testing.assert_allclose(table["virtual_mechanism.q[1]"], found, atol=1e-8)

@@ -11,7 +11,7 @@ from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.process_cache import described
 from tests.orchestrator import coupled
-from tests.orchestrator.foreign_fmus import hostile_fmu
+from tests.orchestrator.c_fmus import hostile_fmu
 
 
 @pytest.fixture(scope="module", autouse=True)

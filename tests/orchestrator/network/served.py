@@ -6,10 +6,12 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import sleep
+
+from tests.orchestrator.foreign_scenes import COMMAND
 
 ROOT = Path(__file__).parents[3]
 
@@ -23,7 +25,7 @@ def free_address() -> str:
 
 def command(*arguments: object) -> list[str]:
     """A command of hapticlink."""
-    return [sys.executable, "-m", "hapticlink", *map(str, arguments)]
+    return [*COMMAND, *map(str, arguments)]
 
 
 @contextmanager
@@ -47,9 +49,7 @@ def server(
     at, log = at or free_address(), folder / "serve.log"
     arguments = ("serve", scene, "--listen", at, "--key", folder / "key", *options)
     with process([*before, *command(*arguments)], log, folder) as running:
-        while "serves at" not in log.read_text():
-            assert running.poll() is None, log.read_text()
-            sleep(0.05)
+        until(lambda: "serves at" in log.read_text(), running, log)
         yield at
 
 
@@ -73,3 +73,10 @@ def processes_of(folder: Path) -> list[int]:
         except OSError:  # it has ended
             pass
     return found
+
+
+def until(come: Callable[[], object], running: subprocess.Popen[bytes], log: Path) -> None:
+    """Waits for a process that writes to `log`."""
+    while not come():
+        assert running.poll() is None, log.read_text()
+        sleep(0.05)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic_ns
 from typing import Any
@@ -16,7 +17,8 @@ from hapticlink.orchestrator.network import served_part, server
 from hapticlink.orchestrator.network.messages import Answer, Request, answer_of
 from hapticlink.orchestrator.network.server import Server
 from hapticlink.orchestrator.system.build_system import built
-from tests.orchestrator.foreign_fmus import python_fmu, scene
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import fmu_table, scene
 
 pytest.importorskip("msgpack")
 ONE, TWO = bytes(16), bytes(15) + b"2"
@@ -57,17 +59,24 @@ class Run:
         return list(struct.unpack("<2d", answer.content[0]))
 
 
-@pytest.fixture
-def run(tmp_path: Path) -> Iterator[Run]:
-    """The first run of a server of an FMU that adds u to the time."""
-    python_fmu(tmp_path, "Slow", "self.y = self.u + time + size")
-    read = open_scene.load(scene(tmp_path, '[[fmu]]\nname = "slow"\npath = "Slow.fmu"\n'), ())
+@contextmanager
+def serving(folder: Path, body: str) -> Iterator[Run]:
+    """The first run of a server of an FMU."""
+    python_fmu(folder, "Slow", body)
+    read = open_scene.load(scene(folder, fmu_table("slow", "Slow")), ())
     with built(read) as system:
         fmu = system.fmu["slow"]
         identity = served_part.identity(read, fmu)
-        serving = Server({"slow": (fmu, identity)}, read.faults, lambda text: None)
-        yield Run(serving, ONE, identity)
-        serving.close()
+        of = Server({"slow": (fmu, identity)}, read.faults, lambda text: None)
+        yield Run(of, ONE, identity)
+        of.close()
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Iterator[Run]:
+    """Of an FMU that adds u to the time."""
+    with serving(tmp_path, "self.y = self.u + time + size") as first:
+        yield first
 
 
 def test_calls_are_carried_out_once_each(run: Run) -> None:
@@ -131,13 +140,8 @@ def test_a_second_run_has_to_wait(run: Run, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_fault_of_the_fmu_is_the_answer(tmp_path: Path) -> None:
-    python_fmu(tmp_path, "Slow", "raise ValueError('three')")
-    read = open_scene.load(scene(tmp_path, '[[fmu]]\nname = "slow"\npath = "Slow.fmu"\n'), ())
-    with built(read) as system:
-        identity = served_part.identity(read, system.fmu["slow"])
-        serving = Server({"slow": (system.fmu["slow"], identity)}, read.faults, lambda text: None)
-        answer = Run(serving, ONE, identity).started().call("step", 0.0, 0.25, 0.25)
-        serving.close()
+    with serving(tmp_path, "raise ValueError('three')") as run:
+        answer = run.started().call("step", 0.0, 0.25, 0.25)
     assert answer.kind == "fault"
     assert "three" in str(answer.content)
 

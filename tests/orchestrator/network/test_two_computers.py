@@ -23,7 +23,8 @@ import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.network import key_file
 from hapticlink.orchestrator.results.tables import read_table
-from tests.orchestrator.foreign_fmus import python_fmu, scene
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import fmu_table, scene
 from tests.orchestrator.network.served import (
     command,
     free_address,
@@ -31,14 +32,15 @@ from tests.orchestrator.network.served import (
     processes_of,
     relay,
     server,
+    until,
 )
-from tests.shared_fixtures import needs_compiled_loop, status
+from tests.shared_fixtures import needs_compiled_loop, sets, status
 
 pytest.importorskip("zmq")
 pytest.importorskip("msgpack")
 pytestmark = needs_compiled_loop
 OPTIONS = ("hold=foh", "duration=0.75")
-SETS = [word for option in OPTIONS for word in ("--set", option)]
+SETS = sets(OPTIONS)
 
 
 def tables(folder: Path) -> dict[str, bytes]:
@@ -202,8 +204,7 @@ def slow_scene(folder: Path, body: str, more: str) -> Path:
     """An FMU at 64 Hz beside one at 512 Hz, for 10 s."""
     python_fmu(folder, "One")
     python_fmu(folder, "Slow", f"self.y = time + size\n        {body}")
-    fmus = '[[fmu]]\nname = "one"\npath = "One.fmu"\n'
-    fmus += '[[fmu]]\nname = "slow"\npath = "Slow.fmu"\nrate = 64\n'
+    fmus = fmu_table("one", "One") + fmu_table("slow", "Slow", "rate = 64\n")
     return scene(folder, fmus + more, 512, 10.0)
 
 
@@ -251,9 +252,7 @@ def test_two_network_namespaces(tmp_path: Path, netem: bool) -> None:
         with server("closed-loop", tmp_path, *sets, at="10.213.7.1:5555", before=there) as at:
             asked = command("run", "closed-loop", *options, "--remote", f"graphics={at}")
             with process([*here, *asked], tmp_path / "run.log", tmp_path) as running:
-                while not (out / "run.json").exists():
-                    assert running.poll() is None, (tmp_path / "run.log").read_text()
-                    sleep(0.05)
+                until((out / "run.json").exists, running, tmp_path / "run.log")
                 sleep(1)
                 for state, pause in (("down", 2), ("up", 0)):
                     link = ["ip", "-n", f"{name}a", "link", "set", "cable", state]
@@ -275,17 +274,14 @@ def test_two_network_namespaces(tmp_path: Path, netem: bool) -> None:
     assert not processes_of(tmp_path)
 
 
-def test_ctrl_c_ends_server_and_run(tmp_path: Path) -> None:
-    with server("closed-loop", tmp_path, *SETS) as at:
-        arguments = ["run", "closed-loop", "--set", "hold=foh", "--set", "duration=60"]
-        arguments += ["--out", tmp_path / "out", "--real-time", "--key", tmp_path / "key"]
-        asked = command(*arguments, "--remote", f"graphics={at}")
-        with process(asked, tmp_path / "run.log", tmp_path) as running:
-            while not (tmp_path / "out" / "run.json").exists():
-                assert running.poll() is None, (tmp_path / "run.log").read_text()
-                sleep(0.05)
-            running.send_signal(signal.SIGINT)
-            assert running.wait(60) == 1
+def test_ctrl_c_ends_a_run(folder: Path, served: str, tmp_path: Path) -> None:
+    options = [*sets(["hold=foh", "duration=60"]), "--out", tmp_path / "out", "--real-time"]
+    options += ["--remote", f"graphics={served}", "--key", folder / "key"]
+    asked = command("run", "closed-loop", *options)
+    with process(asked, tmp_path / "run.log", tmp_path) as running:
+        until((tmp_path / "out" / "run.json").exists, running, tmp_path / "run.log")
+        running.send_signal(signal.SIGINT)
+        assert running.wait(60) == 1
     assert not processes_of(tmp_path)
 
 

@@ -11,8 +11,8 @@ import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import folder_lock, tables
-from tests.orchestrator.foreign_fmus import RUN as COMMAND
-from tests.orchestrator.foreign_fmus import process
+from tests.orchestrator.foreign_scenes import RUN as COMMAND
+from tests.orchestrator.foreign_scenes import process
 from tests.shared_fixtures import status
 
 

@@ -13,45 +13,33 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
 from hapticlink.orchestrator.results.files import FileRecorder
 from hapticlink.orchestrator.results.recover import Recovered, recover
-from tests.orchestrator.foreign_fmus import (
-    COMMAND,
-    ISOLATED,
-    RUN,
-    fmu_table,
-    hostile_fmu,
-    process,
-    python_fmu,
-    scene,
-)
+from tests.orchestrator.c_fmus import hostile_fmu
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import COMMAND, ISOLATED, RUN, fmu_table, scene
 from tests.orchestrator.results.records import run_json
 
 LAST = 3.5
-KILLS = f"if time >= {LAST}: __import__('os').kill(__import__('os').getpid(), 9)"
 
 
-@pytest.mark.parametrize("extra", ["", ISOLATED])
-def test_a_run_that_is_killed_keeps_every_row(tmp_path, extra):
-    """By an FMU, before the first block of rows was full; or with all FMUs of others in processes
-    of their own, from outside, where no watchdog is."""
-    body = KILLS if not extra else f"if time >= {LAST}: __import__('time').sleep(1000)"
-    python_fmu(tmp_path, "Dies", f"self.y = time + size\n        {body}")
-    path, out = scene(tmp_path, fmu_table("one", "Dies", extra), duration=5), tmp_path / "out"
-    if extra:
-        with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.DEVNULL) as running:
-            while not (table := out / "haptics.rows").exists() or (
-                len(rows.read(table)[1]) < LAST * 64 + 1
-            ):
-                assert running.poll() is None
-            with pytest.raises(InputFault, match=f"its run goes on, in process {running.pid}"):
-                recover(out)
-            running.send_signal(signal.SIGKILL)
-        assert subprocess.run([*COMMAND, "recover", out], check=True, capture_output=True)
-    else:  # the watchdog does it, which holds the same stream
-        process(path, out)
+def test_a_run_that_is_killed_keeps_every_row(tmp_path):
+    """From outside, with all FMUs of others in processes of their own, where no watchdog is, and
+    before the first block of rows was full. By an FMU: run/test_faults.py."""
+    body = f"if time >= {LAST}: __import__('time').sleep(1000)"
+    python_fmu(tmp_path, "Hangs", f"self.y = time + size\n        {body}")
+    path, out = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED), duration=5), tmp_path / "out"
+    with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.DEVNULL) as running:
+        while not (table := out / "haptics.rows").exists() or (
+            len(rows.read(table)[1]) < LAST * 64 + 1
+        ):
+            assert running.poll() is None
+        with pytest.raises(InputFault, match=f"its run goes on, in process {running.pid}"):
+            recover(out)
+        running.send_signal(signal.SIGKILL)
+    assert subprocess.run([*COMMAND, "recover", out], check=True, capture_output=True)
     run = json.loads((out / "run.json").read_text())
     assert run["recovered"] == {"haptics": {"rows": LAST * 64 + 1, "time": LAST, "lost": 0}}
     assert run["end"] == {"reason": "fault", "time": LAST}
-    assert run["fault"]["kind"] == ("Killed" if extra else "Crash")
+    assert run["fault"]["kind"] == "Killed"
     assert {p.name for p in out.iterdir()} == {"run.json", "haptics.csv"}
     table = tables.load(out).haptics
     np.testing.assert_array_equal(table["time"], np.arange(LAST * 64 + 1) / 64)

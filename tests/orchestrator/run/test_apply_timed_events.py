@@ -16,19 +16,18 @@ PULLED = {
     "hand.wrench": [1.0, 0.0, 0.0], "at": [{"time": 0.5, "set": {"hand.wrench": [0.0, 0.0, 0.0]}}],
 }  # fmt: skip
 """A mass of 2 kg at rest, pulled until the hand lets go."""
-FREEZE = 'at=[{time=0.2, until=0.3, freeze=["controller.x_D"]}]'
 
 
 def vectors(run, name):
     return np.column_stack([run[f"{name}[{i}]"] for i in (1, 2, 3)])
 
 
-def seen(run, at=slice(None)):
+def seen(run):
     """What the virtual coupling saw of the handle: x_D and v_D in F_drift, entry by entry, as
     K (x_S - x_D) + B (v_S - v_D) - F_drift is 0 for those that the controller has."""
-    known = [vectors(run, f"virtual_mechanism.{p}")[at] for p in ("x", "v")]
-    force = vectors(run, "controller.F_drift")[at]
-    v_D = vectors(run, "haptic_device.v")[at]
+    known = [vectors(run, f"virtual_mechanism.{p}") for p in ("x", "v")]
+    force = vectors(run, "controller.F_drift")
+    v_D = vectors(run, "haptic_device.v")
     return known[0] - (force - B * (known[1] - v_D)) / K
 
 
@@ -66,29 +65,22 @@ def around(table, begin, end):
     return (time >= begin) & (time < end)
 
 
-def test_a_frozen_input_keeps_what_it_had():
-    run = hl.run("closed-loop", ["duration=0.5", FREEZE]).haptics
-    x_D, inside = vectors(run, "haptic_device.x"), around(run, 0.2, 0.3)
-    begin = np.flatnonzero(inside)[0]
-    np.testing.assert_allclose(seen(run)[inside], np.tile(x_D[begin], (inside.sum(), 1)), atol=1e-9)
-    np.testing.assert_allclose(seen(run)[~inside][:-1], x_D[~inside][:-1], atol=1e-9)
-    assert np.abs(x_D[inside] - x_D[begin]).max() > 1e-4
-
-
-def test_an_overridden_input_has_the_value_given():
-    at = 'at=[{time=0.2, until=0.3, override={"controller.x_D"=[0.05, 0.01, 0.1]}}]'
+def test_an_input_is_frozen_overridden_or_noisy_for_a_while():
+    x, given = "controller.x_D", [0.05, 0.01, 0.1]
+    at = f"""at=[{{ time = 0.1, until = 0.15, freeze = ["{x}"] }},
+        {{ time = 0.2, until = 0.25, override = {{ "{x}" = {given} }} }},
+        {{ time = 0.3, until = 0.4, noise = {{ "{x}" = 1e-6 }}, seed = 7 }}]"""
     run = hl.run("closed-loop", ["duration=0.5", at, "stop_when="]).haptics
-    inside = around(run, 0.2, 0.3)
-    np.testing.assert_allclose(seen(run)[inside], [[0.05, 0.01, 0.1]] * inside.sum(), atol=1e-9)
-
-
-def test_noise_has_its_standard_deviation_and_its_seed():
-    at = 'at=[{time=0.1, until=0.4, noise={"controller.x_D"=1e-6}, seed=7}]'
-    run = hl.run("closed-loop", ["duration=0.5", at]).haptics
-    off, inside = seen(run) - vectors(run, "haptic_device.x"), around(run, 0.1, 0.4)
-    drawn = np.random.Generator(np.random.PCG64(7)).standard_normal((inside.sum(), 3)) * 1e-6
-    np.testing.assert_allclose(off[inside], drawn, atol=1e-10)
-    assert np.abs(off[~inside][:-1]).max() < 1e-10
+    x_D = vectors(run, "haptic_device.x")
+    frozen, overridden, noisy = (
+        around(run, *times) for times in ((0.1, 0.15), (0.2, 0.25), (0.3, 0.4))
+    )
+    expected, begin = x_D.copy(), x_D[frozen][0]
+    expected[frozen], expected[overridden] = begin, given
+    drawn = np.random.Generator(np.random.PCG64(7)).standard_normal((noisy.sum(), 3))
+    expected[noisy] += 1e-6 * drawn
+    np.testing.assert_allclose(seen(run)[:-1], expected[:-1], rtol=0, atol=1e-9)
+    assert np.abs(x_D[frozen] - begin).max() > 1e-4
 
 
 def test_graphics_go_on_at_another_rate():

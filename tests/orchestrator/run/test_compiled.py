@@ -19,7 +19,8 @@ from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled
-from tests.orchestrator.foreign_fmus import ISOLATED, fmu_table, python_fmu, scene, wire_table
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.native_mass import held
 from tests.orchestrator.results.records import tables_of
 
@@ -61,12 +62,12 @@ def test_every_shipped_scene(tmp_path, monkeypatch, name):
 
 @pytest.mark.parametrize("hold", [*HOLDS.names()])
 def test_every_hold(tmp_path, monkeypatch, hold):
+    """Of samples that are late and lost, and beside them of some that are in time."""
     kind = "downsampling" if HOLDS[hold].downsamples else "hold"
     options = [f"{kind}={hold}", *NO_MATRICES, "graphics.rate=60", "duration=0.3"]
-    run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options)
-    assert hold in run["holds"].values()
     late = "delays.virtual_mechanism.x={ min = 0.001, max = 0.03, loss = 0.1, seed = 3 }"
     run, _ = both("closed-loop-direct", tmp_path, monkeypatch, *options, late)
+    assert hold in run["holds"].values()
     assert sum(link["lost"] for link in run["links"].values())
 
 
@@ -110,7 +111,7 @@ def test_every_scheme_and_rate(tmp_path, monkeypatch, options):
 STEPS = (
     'coupling = "{coupling}"\nsubsteps.two = 3\n'
     + fmu_table("one", "Gives")
-    + fmu_table("two", "Gives", "rate = 24\n{isolate}")
+    + fmu_table("two", "Gives", "rate = 24\n")
     + wire_table("one.y", "two.u", 'factor = 0.3\nhold = "foh"\n')
     + wire_table("two.y", "one.u", 'hold = "smooth"\n')
 )
@@ -118,13 +119,25 @@ STEPS = (
 
 @pytest.mark.parametrize(
     ("coupling", "isolate"),
-    [("gauss-seidel", ""), ("jacobi", ""), ("jacobi", ISOLATED)],
+    [
+        ("gauss-seidel", ""),
+        ("jacobi", ""),
+        ("gauss-seidel", "isolate"),
+        ("jacobi", "fmu.two.isolate"),
+    ],
 )
 def test_substeps_and_isolated_fmus(tmp_path, monkeypatch, coupling, isolate):
+    """Of FMUs in processes of their own, too, which change no byte."""
     python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
-    text = STEPS.format(coupling=coupling, isolate=isolate)
-    _, left = both(str(scene(tmp_path, text)), tmp_path, monkeypatch)
-    assert ("step two" in left) == bool(isolate)
+    path = str(scene(tmp_path, STEPS.format(coupling=coupling)))
+    run, left = both(path, tmp_path, monkeypatch, *([f"{isolate}=true"] if isolate else []))
+    apart = {"": [], "isolate": ["one", "two"], "fmu.two.isolate": ["two"]}[isolate]
+    assert sorted(run["isolated"]) == apart
+    assert {each for each in left if each.startswith("step")} == {f"step {name}" for name in apart}
+    assert bool(left) == bool(apart)
+    simulate(path, tmp_path / "here")
+    assert len(tables_of(tmp_path / "here")) == 2
+    assert tables_of(tmp_path / "here") == tables_of(tmp_path / "compiled")
 
 
 FAULTS = {

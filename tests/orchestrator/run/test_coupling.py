@@ -18,12 +18,9 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged
-from hapticlink.orchestrator.scene.read_and_check import read
 from hapticlink.orchestrator.scene.records import Iteration
-from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.coupled import (
     HERMITE,
@@ -31,6 +28,8 @@ from tests.orchestrator.coupled import (
     error,
     gain,
     iterated,
+    rows,
+    scene_of,
     simulate,
     stiff_exact,
     system,
@@ -59,12 +58,6 @@ def largest(fmus: Fmus, folder: Path, rate: int, between: str, substeps: int) ->
     """The largest error of a position within 1 s."""
     made = iterated(fmus, UNTIL, between, rate=rate, rows=HERMITE, substeps=substeps)
     return error(rows(made, folder))
-
-
-def rows(made: System, folder: Path) -> Table:
-    outcome, table = simulate(made, folder)
-    assert outcome.fault is None
-    return table
 
 
 @pytest.mark.parametrize(
@@ -224,31 +217,12 @@ def test_a_ring_opens_where_only_unread_outputs_are_direct(tmp_path):
 
 # --- as a scene ---------------------------------------------------------------------------
 
-SCENE = """
-title = "Two masses"
-duration = 0.5
-coupling = "{coupling}"
-haptics.rate = 100
-get_after_set = ["one", "two"]
-{settings}
-fmu = [{{ name = "one", path = "{folder}/one.fmu" }}, {{ name = "two", path = "{folder}/two.fmu" }}]
-connection = [
-    {{ from = "two.F", to = "one.F" }},
-    {{ from = "one.x", to = "two.x1" }},
-    {{ from = "one.v", to = "two.v1" }},
-]
-power = [{{ effort = "one.F", displacement = "one.x" }}]
-"""
-
-
-def scene(fmus: Fmus, coupling: str, settings: str) -> Scene:
-    folder = fmus["one"].path.parent.as_posix()
-    return read(SCENE.format(coupling=coupling, settings=settings, folder=folder))
+ITERATED = 'coupling = "iterated"\nget_after_set = ["one", "two"]\n'
 
 
 def test_a_scene_is_iterated_as_it_says(fmus, tmp_path):
-    settings = 'iteration = { method = "newton", interpolation = "hermite" }\nsubsteps.one = 2'
-    found = experiment.simulate(scene(fmus, "iterated", settings), tmp_path).results.run
+    how = 'iteration = { method = "newton", interpolation = "hermite" }\nsubsteps.one = 2\n'
+    found = experiment.simulate(scene_of(fmus, ITERATED + how), tmp_path).results.run
     assert found["fault"] is None
     assert found["causal"] is False
     assert set(found["holds"].values()) == {"hermite"}
@@ -261,11 +235,9 @@ def test_hermite_gives_way_where_a_source_has_no_derivative(tmp_path):
     """No connection of this scene takes `hold`, so it is not `hold` that does not fit."""
     bare = held(tmp_path)
     edited(bare["two"].path, lambda text: text.replace('"der(F)"', '"F_rate"'))
-    settings = (
-        'iteration = { method = "newton", interpolation = "hermite", tolerance = 1e-10 }\n'
-        "substeps = { one = 4, two = 4 }"
-    )
-    results = experiment.simulate(scene(bare, "iterated", settings), tmp_path / "out").results
+    how = 'iteration = { method = "newton", interpolation = "hermite", tolerance = 1e-10 }\n'
+    path = scene_of(bare, f"{ITERATED}{how}substeps = {{ one = 4, two = 4 }}\n")
+    results = experiment.simulate(path, tmp_path / "out").results
     assert results.run["fault"] is None
     assert results.run["holds"] == {
         "two.F -> one.F": "foh",

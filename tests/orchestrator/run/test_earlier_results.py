@@ -12,15 +12,9 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
-from tests.orchestrator.foreign_fmus import (
-    edited,
-    edited_entries,
-    fmu_table,
-    hostile_fmu,
-    run,
-    scene,
-    slave,
-)
+from tests.orchestrator.c_fmus import hostile_fmu
+from tests.orchestrator.foreign_fmus import edited, edited_entries, slave
+from tests.orchestrator.foreign_scenes import fmu_table, run, scene
 from tests.shared_fixtures import status
 
 ONE = fmu_table("one", "hostile")

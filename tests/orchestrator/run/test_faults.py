@@ -20,27 +20,21 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import tables
 from hapticlink.orchestrator.run.compiled.library import CHOICE
-from tests.orchestrator.foreign_fmus import (
+from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
+from tests.orchestrator.foreign_fmus import SLAVE, edited_entries, python_fmu, python_fmu_of, slave
+from tests.orchestrator.foreign_scenes import (
     COMMAND,
-    HOSTILE_LOG,
     ISOLATED,
     RUN,
-    SLAVE,
-    edited_entries,
     fault,
     fmu_table,
-    hostile_fmu,
     process,
-    python_fmu,
-    python_fmu_of,
     ran,
     run,
     scene,
-    slave,
     wire_table,
 )
-from tests.orchestrator.results.records import tables_of
-from tests.orchestrator.run.test_interrupt import waited_for
+from tests.orchestrator.run.test_interrupt import children, waited_for
 from tests.plugins import hapticlink, server
 from tests.shared_fixtures import LOOPS
 
@@ -58,25 +52,21 @@ def folders() -> set[str]:
     return {p.name for p in Path(tempfile.gettempdir()).glob("hapticlink-*")}
 
 
-def children() -> set[str]:
-    own = Path(f"/proc/{os.getpid()}/task")
-    found = (task / "children" for task in own.iterdir()) if own.exists() else ()
-    return {child for path in found if path.exists() for child in path.read_text().split()}
-
-
 @pytest.fixture(autouse=True)
 def _nothing_left_behind(own_temporary_folder):
     server()  # stays for the next command
-    before = folders(), children(), list(sys.path), os.getcwd()
+    before = folders(), {*children(os.getpid())}, os.getcwd()
     yield
     assert folders() <= before[0]
-    waited_for(lambda: children() <= before[1], 5.0)  # one that was killed is still to be reaped
-    assert os.getcwd() == before[3]
+    # One that was killed is still to be reaped.
+    waited_for(lambda: {*children(os.getpid())} <= before[1], 5.0)
+    assert os.getcwd() == before[2]
     assert not [p for p in sys.path if "hapticlink-" in p]
 
 
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
-@pytest.mark.parametrize("value", ["float('nan')", "float('inf')"])
+@pytest.mark.parametrize(
+    ("value", "isolate"), [("float('nan')", ""), ("float('inf')", ""), ("float('nan')", ISOLATED)]
+)
 def test_a_value_that_is_not_finite_stops_or_is_held(tmp_path, value, isolate):
     body = f"self.y = {value} if self.steps == 5 else float(self.steps)"
     python_fmu(tmp_path, "Lost", body)
@@ -194,18 +184,6 @@ def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(tmp_path, body,
     assert ended.exists()  # the other FMU was terminated
 
 
-def test_isolated_runs_give_the_same_bytes(tmp_path):
-    python_fmu(tmp_path, "Gives", "self.y = 0.9 * self.y + 0.1 * time + 0.3 * self.u")
-    text = fmu_table("one", "Gives") + fmu_table("two", "Gives", "rate = 24\n")
-    text += wire_table("one.y", "two.u", "factor = 0.3\n") + wire_table("two.y", "one.u")
-    for out, options in (("a", []), ("b", ["isolate=true"]), ("c", ["fmu.two.isolate=true"])):
-        ended = simulate(str(scene(tmp_path, text)), tmp_path / out, options)
-        assert ended.outcome.fault is None
-        assert (out == "a") == (ended.outcome.details.isolated == {})
-        assert len(tables_of(tmp_path / out)) == 2
-        assert tables_of(tmp_path / out) == tables_of(tmp_path / "a")
-
-
 def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path):
     for name, value in (("first", 1.0), ("second", 2.0)):
         (tmp_path / name).mkdir()
@@ -280,6 +258,7 @@ def test_a_process_that_dies_in_terminate_is_told(tmp_path):
         ("__import__('os')._exit(139)", 139),
         ("__import__('os')._exit(0)", 1),  # no good end
         ("__import__('os').abort()", -signal.SIGABRT),
+        ("__import__('os').kill(__import__('os').getpid(), 9)", -signal.SIGKILL),
     ],
 )
 def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, crash, status):
@@ -294,6 +273,8 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, cr
     np.testing.assert_array_equal(found.haptics["one.y"][1:], found.haptics["time"][1:])
     assert found.run["end"] == {"reason": "fault", "time": 2.0}
     assert found.run["fault"]["kind"] == "Crash"
+    assert found.run["recovered"] == {"haptics": {"rows": 2 * 64 + 1, "time": 2.0, "lost": 0}}
+    assert {p.name for p in out.iterdir()} == {"run.json", "haptics.csv"}
     assert not folders()
 
 

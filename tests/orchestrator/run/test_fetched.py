@@ -8,7 +8,8 @@ import pytest
 
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from tests.orchestrator.foreign_fmus import fmu_table, python_fmu, scene, wire_table
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 
 SCENE, SHORT = "closed-loop", ("duration=0.5",)
 TOLD = ("end", "fault", "energies", "energies_within_a_rate", "step_errors", "delays", "unstable")

@@ -4,11 +4,10 @@ reach is in holds/test_order_of_accuracy.py and test_coupling.py."""
 import math
 from collections.abc import Mapping
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator.experiment import simulate
@@ -17,6 +16,8 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled
+from tests.orchestrator.coupled import scene_of
+from tests.orchestrator.foreign_scenes import ISOLATED
 from tests.orchestrator.holds.test_order_of_accuracy import error
 from tests.orchestrator.native_mass import held, native
 from tests.orchestrator.results.records import tables_of
@@ -38,6 +39,7 @@ def constant(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", sorted(n for n, hold in HOLDS.items() if hold.degree))
+@settings(max_examples=30)
 @given(data=st.data())
 def test_what_an_fmu_is_told_is_the_hold(name, data):
     """Its Taylor polynomial, of order 1 to 3, is the hold everywhere within a step, and its mean
@@ -72,11 +74,11 @@ def test_what_an_fmu_is_told_is_the_hold(name, data):
 @pytest.mark.parametrize("hold", ["foh", "second-order", "delayed", "smooth"])
 def test_substeps_change_nothing(fmus, tmp_path, hold):
     """Each substep goes on along the same polynomial."""
-    rows = []
+    found = []
     for substeps in (1, 3):
         made = coupled.masses(fmus, Fraction(1, 100), 60, hold, substeps=substeps)
-        rows.append(coupled.motion(coupled.simulate(made, tmp_path)[1]))
-    np.testing.assert_allclose(rows[0], rows[1], rtol=0, atol=1e-11)
+        found.append(coupled.motion(coupled.rows(made, tmp_path)))
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-11)
 
 
 def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, constant, tmp_path):
@@ -91,36 +93,19 @@ def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, constant, tmp_pat
     }
 
 
-SCENE = """
-title = "Two masses"
-duration = 0.5
-haptics.rate = 100
-coupling = "jacobi"
-holds = { "two.F" = "second-order", "one.x" = "foh", "one.v" = "zoh" }
-fmu = [{ name = "one", path = "one.fmu"ISOLATE }, { name = "two", path = "two.fmu" }]
-connection = [
-    { from = "two.F", to = "one.F", factor = FACTOR },
-    { from = "one.x", to = "two.x1" },
-    { from = "one.v", to = "two.v1" },
-]
-"""
-
-
-def scene(fmus: Fmus, isolate: bool = False, factor: float = 1.0) -> Path:
-    path = fmus["one"].path.parent / "scene.toml"
-    text = SCENE.replace("ISOLATE", ", isolate = true" if isolate else "")
-    path.write_text(text.replace("FACTOR", str(factor)))
-    return path
+SETTINGS = (
+    'coupling = "jacobi"\nholds = { "two.F" = "second-order", "one.x" = "foh", "one.v" = "zoh" }\n'
+)
 
 
 def test_a_run_and_a_plan_say_who_takes_what(fmus, tmp_path, capsys):
     options = ["substeps.two=2"]
-    found = simulate(str(scene(fmus)), tmp_path / "out", options).results.run
+    found = simulate(scene_of(fmus, SETTINGS), tmp_path / "out", options).results.run
     assert found["within_a_step"] == {
         "two.F -> one.F": "derivatives to order 2",
         "one.x -> two.x1": "derivatives to order 1, renewed in 2 substeps",
     }
-    assert status("run", str(scene(fmus)), "--explain", "--set", options[0]) == 0
+    assert status("run", scene_of(fmus, SETTINGS), "--explain", "--set", options[0]) == 0
     told = capsys.readouterr().out
     assert "  evaluate two.F -> one.F order 2 width 1\n" in told
     assert "  evaluate one.x -> two.x1 ahead 1/2 order 1 width 1/2\n" in told
@@ -128,7 +113,7 @@ def test_a_run_and_a_plan_say_who_takes_what(fmus, tmp_path, capsys):
 
 
 def test_a_run_says_where_an_fmu_cannot(constant, tmp_path):
-    found = simulate(str(scene(constant)), tmp_path / "out", ["substeps.two=2"]).results.run
+    found = simulate(scene_of(constant, SETTINGS), tmp_path / "out", ["substeps.two=2"]).results.run
     assert found["within_a_step"] == {
         "two.F -> one.F": "constant, the hold at the middle (half-step lead)",
         "one.x -> two.x1": "constant in each of 2 substeps",
@@ -136,18 +121,20 @@ def test_a_run_says_where_an_fmu_cannot(constant, tmp_path):
 
 
 def test_in_a_process_of_its_own_it_is_the_same(fmus, tmp_path):
-    for isolate in (False, True):
-        ended = simulate(str(scene(fmus, isolate)), tmp_path / str(isolate))
+    for name, own in (("here", ""), ("apart", ISOLATED)):
+        ended = simulate(scene_of(fmus, SETTINGS, own), tmp_path / name)
         assert ended.outcome.fault is None
-    assert tables_of(tmp_path / "False") == tables_of(tmp_path / "True")
+    assert tables_of(tmp_path / "here") == tables_of(tmp_path / "apart")
 
 
 def test_derivatives_convert_like_values(fmus, tmp_path):
     """A force of minus F through a factor of -1, from a spring that pushes the other way."""
     turned = {"one": native(tmp_path, "one"), "two": fmus["two"]}
     (tmp_path / "two.fmu").write_bytes(native(tmp_path, "two", sign=-1.0).path.read_bytes())
-    plain = simulate(str(scene(fmus)), tmp_path / "plain").results.haptics
-    found = simulate(str(scene(turned, factor=-1.0)), tmp_path / "out").results.haptics
+    plain = simulate(scene_of(fmus, SETTINGS), tmp_path / "plain").results.haptics
+    found = simulate(
+        scene_of(turned, SETTINGS, force="factor = -1.0\n"), tmp_path / "out"
+    ).results.haptics
     np.testing.assert_allclose(found["one.x"], plain["one.x"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(found["two.F"], -plain["two.F"], rtol=0, atol=1e-9)
 
@@ -156,10 +143,10 @@ def test_a_step_taken_again_in_halves_goes_on_along_the_polynomial(fmus, tmp_pat
     """`one` discards what is longer than an eighth of a step; exact as it is, nothing changes."""
     (tmp_path / "brittle").mkdir()
     brittle = native(tmp_path / "brittle", "one", brittle=1e-9, fine=0.01 / 8, failure=2)
-    plain = simulate(str(scene(fmus)), tmp_path / "plain").results.haptics
-    path = scene({"one": brittle})
+    plain = simulate(scene_of(fmus, SETTINGS), tmp_path / "plain").results.haptics
+    path = scene_of({"one": brittle}, SETTINGS)
     (path.parent / "two.fmu").write_bytes(fmus["two"].path.read_bytes())
-    ended = simulate(str(path), tmp_path / "out", ["faults.discard=retry"])
+    ended = simulate(path, tmp_path / "out", ["faults.discard=retry"])
     assert ended.outcome.fault is None
     assert ended.outcome.details.smaller_steps["one"] > 40
     for name in ("one.x", "one.v", "two.F"):

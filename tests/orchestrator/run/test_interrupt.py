@@ -16,7 +16,9 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import rows, tables
-from tests.orchestrator.foreign_fmus import ISOLATED, RUN, fmu_table, hostile_fmu, python_fmu, scene
+from tests.orchestrator.c_fmus import hostile_fmu
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import ISOLATED, RUN, fmu_table, scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
@@ -65,12 +67,15 @@ def test_a_signal_before_the_run_says_so(bar, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def children(pid: int) -> list[str]:
+    """The processes that a process has started, where there is /proc."""
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [child for task in tasks if task.exists() for child in task.read_text().split()]
+
+
 def workers(pid: int) -> list[bytes]:
     """Command lines of the worker processes that a process has."""
-    found = []
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            found.append(Path(f"/proc/{child}/cmdline").read_bytes())
+    found = [Path(f"/proc/{child}/cmdline").read_bytes() for child in children(pid)]
     return [line for line in found if b"orchestrator.fmi.worker" in line]
 
 

@@ -2,16 +2,9 @@
 
 import pytest
 
-from tests.orchestrator.foreign_fmus import (
-    ISOLATED,
-    fault,
-    fmu_table,
-    hostile_fmu,
-    python_fmu,
-    ran,
-    run,
-    wire_table,
-)
+from tests.orchestrator.c_fmus import hostile_fmu
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, run, wire_table
 
 MEET = """import pathlib, time as clock
         folder = pathlib.Path({folder!r})

@@ -10,7 +10,7 @@ import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.errors import SceneFault
-from tests.orchestrator.foreign_fmus import fmu_table, wire_table
+from tests.orchestrator.foreign_scenes import fmu_table, wire_table
 
 RATE = 7.3
 """Of the angle, rad/s; the other coordinate is sin(3 t)."""

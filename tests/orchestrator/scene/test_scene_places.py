@@ -16,7 +16,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene import overrides, read_and_check
 from hapticlink.orchestrator.ssp import names
 from tests.orchestrator.foreign_fmus import python_fmu
-from tests.orchestrator.foreign_fmus import scene as foreign_scene
+from tests.orchestrator.foreign_scenes import scene as foreign_scene
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.shared_fixtures import status
 

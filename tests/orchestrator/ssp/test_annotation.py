@@ -12,7 +12,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from tests.orchestrator.foreign_fmus import edited, edited_entries, python_fmu
-from tests.orchestrator.ssps import foreign
+from tests.orchestrator.ssp.ssps import foreign
 
 RUN = {"duration": 0.2, "haptics": {"rate": 50}}
 

@@ -5,24 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.orchestrator.foreign_fmus import fmu_table, python_fmu, scene, wire_table, with_units
-from tests.orchestrator.ssp.test_ssp_2 import MATRIX, SIZE, parameters
-from tests.orchestrator.ssps import (
-    binding,
-    bindings,
-    component,
-    connectors,
-    line,
-    ssp,
-    system,
-    values,
-)
+from tests.orchestrator.foreign_fmus import python_fmu, with_units
+from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
+from tests.orchestrator.ssp.parameter_sets import binding, bindings, parameters, unit, values
+from tests.orchestrator.ssp.ssps import component, connectors, line, ssp, system
+from tests.orchestrator.ssp.test_ssp_2 import MATRIX, SIZE
 from tests.shared_fixtures import status
 
-CENTIMETRES = (
-    '<ssv:Units><ssc:Unit xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" '
-    'name="cm"><ssc:BaseUnit m="1" factor="0.01"/></ssc:Unit></ssv:Units>'
-)
+CENTIMETRES = unit("cm", 0.01)
 
 
 def run(folder: Path, path: object, *more: str) -> dict[str, dict[str, object]]:

@@ -12,22 +12,9 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read
 from tests.orchestrator.foreign_fmus import edited, python_fmu
-from tests.orchestrator.run.test_bonds import fmus
-from tests.orchestrator.ssps import (
-    HEAD,
-    ON,
-    TABLE,
-    TAIL,
-    binding,
-    bindings,
-    component,
-    connectors,
-    line,
-    linear,
-    ssp,
-    system,
-    values,
-)
+from tests.orchestrator.run.test_energy import fmus
+from tests.orchestrator.ssp.parameter_sets import ON, TABLE, binding, bindings, linear, values
+from tests.orchestrator.ssp.ssps import HEAD, TAIL, component, connectors, line, ssp, system
 
 
 def ended(path: str, folder: Path) -> dict[str, float]:

@@ -6,20 +6,17 @@ import pytest
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
-from tests.orchestrator.ssps import (
+from tests.orchestrator.ssp.parameter_sets import (
     ON,
     TABLE,
     binding,
     bindings,
-    component,
-    connectors,
-    line,
     linear,
     mapping,
-    ssp,
-    system,
+    unit,
     values,
 )
+from tests.orchestrator.ssp.ssps import component, connectors, line, ssp, system
 
 PARAMETERS = system(
     "top",
@@ -83,14 +80,10 @@ def test_a_mapping_renames_scales_and_leaves_out(tmp_path):
 
 
 def test_a_value_in_a_unit_is_converted_to_that_of_its_variable(tmp_path):
-    inch = (
-        '<ssv:Units><ssc:Unit xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" '
-        'name="inch"><ssc:BaseUnit m="1" factor="0.0254"/></ssc:Unit></ssv:Units>'
-    )
     found = starts(
         tmp_path,
         top=bindings(binding(values(("lid", "50 cm")))),
-        gives=bindings(binding(values(("gain", "2 inch"), units=inch))),
+        gives=bindings(binding(values(("gain", "2 inch"), units=unit("inch", 0.0254)))),
     )
     assert found["t"]["u"] == 0.5
     assert found["g"]["gain"] == pytest.approx(0.0508, rel=1e-15)

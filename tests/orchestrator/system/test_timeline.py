@@ -20,7 +20,8 @@ from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.system.timeline import clocks, timeline
-from tests.orchestrator.foreign_fmus import edited, fmu_table, python_fmu, scene, wire_table
+from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.timelines import CAUSAL, LOOP, fixed, scene_of, scenes, varying
 
 

@@ -1,5 +1,5 @@
-"""A number out of its range is refused, with its key, its place, the range and the unit: of every
-number that the shipped scenes may hold, by values that it cannot have."""
+"""Every key of a scene has a meaning, and every number a unit and a range: out of it, it is refused
+with its key, its place, the range and the unit."""
 
 import math
 import re
@@ -7,6 +7,7 @@ import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
+from itertools import chain
 from typing import Any, NamedTuple
 
 import jsonschema
@@ -18,10 +19,52 @@ from hapticlink.commands.json_schema import json_schema
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import SceneFault
-from hapticlink.orchestrator.scene import extends, find_scene, overrides, read_and_check, schema
+from hapticlink.orchestrator.scene import (
+    extends,
+    find_scene,
+    key_descriptions,
+    overrides,
+    read_and_check,
+    schema,
+)
 from hapticlink.orchestrator.scene.rates import Exact
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_source import Source
+
+
+def records(hint: Any) -> Iterator[Any]:
+    """Every record that is reached from a type."""
+    for kind in schema.branches(hint):
+        if is_dataclass(kind):
+            yield kind
+            yield from chain.from_iterable(map(records, schema.hints(kind).values()))
+        else:
+            yield from chain.from_iterable(map(records, typing.get_args(kind)))
+
+
+def bare(hint: Any) -> Iterator[Any]:
+    """The numbers within a type that say neither unit nor range."""
+    for kind, quantity in schema.measured(hint):
+        if kind in (float, int) and not quantity:
+            yield kind
+        elif typing.get_origin(kind) in (tuple, Mapping):
+            yield from chain.from_iterable(map(bare, typing.get_args(kind)))
+
+
+RECORDS = tuple(dict.fromkeys(records(Scene)))
+
+
+def test_records_of_every_table_are_found():
+    names = {record.__name__ for record in RECORDS}
+    assert {"Body", "PDDrive", "Observer", "ArmHand", "VariableRate", "Latency", "Trace"} <= names
+
+
+@pytest.mark.parametrize("record", RECORDS)
+def test_every_key_has_a_meaning_and_every_number_a_quantity(record):
+    meanings = key_descriptions.meanings(record)
+    for name, hint in schema.hints(record).items():
+        assert meanings[name].endswith("."), name
+        assert not list(bare(hint)), name
 
 
 class Number(NamedTuple):

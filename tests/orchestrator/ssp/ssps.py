@@ -4,6 +4,7 @@ import zipfile
 from pathlib import Path
 
 from tests.orchestrator.foreign_fmus import edited_entries, python_fmu, with_units
+from tests.orchestrator.ssp.parameter_sets import ON, binding, bindings, values
 
 HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <ssd:SystemStructureDescription version="1.0" name="nested"
@@ -58,48 +59,6 @@ def line(start: str, end: str, linear: str = "", how: str = "") -> str:
     return f"<ssd:Connection{text} {how}>{inside}</ssd:Connection>"
 
 
-def values(*parameters: tuple[str, str], units: str = "") -> str:
-    """A parameter set; a value is written as "0.5", or "0.5 mm"."""
-    made = ""
-    for name, text in parameters:
-        number, _, unit = text.partition(" ")
-        kind = "Boolean" if number in ("true", "false") else "Real"
-        of = f' unit="{unit}"' if unit else ""
-        made += f'<ssv:Parameter name="{name}"><ssv:{kind} value="{number}"{of}/></ssv:Parameter>'
-    space = 'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"'
-    return (
-        f'<ssv:ParameterSet version="1.0" name="p" {space}><ssv:Parameters>{made}</ssv:Parameters>'
-        f"{units}</ssv:ParameterSet>"
-    )
-
-
-def mapping(*entries: tuple[str, str, str], version: str = 'version="1.0"') -> str:
-    """(source, target, transformation) of each entry."""
-    made = "".join(
-        f'<ssm:MappingEntry source="{a}" target="{b}">{t}</ssm:MappingEntry>' for a, b, t in entries
-    )
-    spaces = (
-        'xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" '
-        'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"'
-    )
-    return f"<ssm:ParameterMapping {version} {spaces}>{made}</ssm:ParameterMapping>"
-
-
-def linear(factor: float, offset: float) -> str:
-    return f'<ssc:LinearTransformation factor="{factor}" offset="{offset}"/>'
-
-
-def binding(set_: str = "", map_: str = "", about: str = "", map_about: str = "") -> str:
-    inside = f"<ssd:ParameterValues>{set_}</ssd:ParameterValues>" if set_ else ""
-    if map_ or map_about:
-        inside += f"<ssd:ParameterMapping {map_about}>{map_}</ssd:ParameterMapping>"
-    return f"<ssd:ParameterBinding {about}>{inside}</ssd:ParameterBinding>"
-
-
-def bindings(*each: str) -> str:
-    return f"<ssd:ParameterBindings>{''.join(each)}</ssd:ParameterBindings>"
-
-
 def ssp(folder: Path, root: str, tail: str = TAIL, **entries: str | bytes) -> str:
     """Gives puts out 1000 gain (mm), Takes what it gets (m), Plain what it gets, times gain."""
     with_units(python_fmu(folder, "Gives", "self.y = 1000.0 * self.gain"), y="mm", gain="m")
@@ -114,7 +73,6 @@ def ssp(folder: Path, root: str, tail: str = TAIL, **entries: str | bytes) -> st
     return str(folder / "their.ssp")
 
 
-ON = bindings(binding(values(("on", "true"))))
 GIVES = connectors(y="output mm") + bindings(binding(about='source="resources/a.ssv"'))
 FOREIGN = system(
     "top",
@@ -136,9 +94,3 @@ def foreign(folder: Path, old: str = "", new: str = "") -> str:
         return all_ | {name: all_[name].replace(old.encode(), new.encode()) if old else all_[name]}
 
     return str(edited_entries(Path(path), change))
-
-
-TABLE = (
-    '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
-    "</ssc:BooleanMappingTransformation>"
-)

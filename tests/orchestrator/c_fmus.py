@@ -1,0 +1,173 @@
+"""FMUs of the C files of this folder: of FMI 2.0 and FMI 3.0, and one that fails on demand."""
+
+import re
+import tempfile
+import zipfile
+from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import Path
+
+from fmpy import platform, platform_tuple, sharedLibraryExtension
+
+from hapticlink.fmus.native import compile_library
+
+FOLDER = Path(__file__).parent
+
+
+def description3(
+    name: str, variables: str, outputs: Iterable[int], token: str = "", **flags: str
+) -> str:
+    """The modelDescription.xml of an FMU of FMI 3.0."""
+    given = "".join(f'<Output valueReference="{reference}"/>' for reference in outputs)
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{token or name}">
+<CoSimulation modelIdentifier="{name}" {attributes(flags)}/>
+<ModelVariables>{variables}</ModelVariables>
+<ModelStructure>{given}</ModelStructure>
+</fmiModelDescription>
+"""
+
+
+HOSTILE = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="hostile" guid="hostile">
+<CoSimulation modelIdentifier="hostile" {flags}/>
+<ModelVariables>
+<ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
+<ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
+<ScalarVariable name="slope" valueReference="2" causality="output"><Real/></ScalarVariable>
+</ModelVariables>
+<ModelStructure><Outputs><Unknown index="2"/><Unknown index="3"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+HOSTILE3 = """
+<Float64 name="u" valueReference="0" causality="input" start="0"/>
+<Float64 name="y" valueReference="1" causality="output"/>
+<Float64 name="slope" valueReference="2" causality="output"/>
+"""
+HOSTILE_LOG = "HOSTILE_FMU_LOG"
+STATES = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
+
+
+def hostile_fmu(folder: Path, fmi: str = "2", *options: str, **flags: str) -> Path:
+    """The FMU of hostile_fmu.c, with capability flags; it can restore its state. What its instances
+    do is in their names, "<place>_<act>_<step>"."""
+    given = {STATES[fmi]: "true", "canHandleVariableCommunicationStepSize": "true"} | flags
+    description, where = HOSTILE.format(flags=attributes(given)), platform
+    if fmi == "3":
+        description, where = description3("hostile", HOSTILE3, (1, 2), **given), platform_tuple
+    options = (f"-DFMI={fmi}", "-pthread", *options)
+    return packed(folder / "hostile.fmu", "hostile_fmu.c", where, description, *options)
+
+
+def attributes(given: Mapping[str, str]) -> str:
+    return " ".join(f'{name}="{value}"' for name, value in given.items())
+
+
+def packed(path: Path, source: str, where: str, description: str, *options: str) -> Path:
+    """The FMU of a C file of this folder, with one binary."""
+    if where == platform_tuple:
+        options = (*options, str(FOLDER / "fmi3_rest.c"))
+    found = re.search('modelIdentifier="(.*?)"', description)
+    assert found
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", description)
+        library = f"binaries/{where}/{found[1]}{sharedLibraryExtension}"
+        archive.writestr(library, compiled(FOLDER / source, *options))
+    return path
+
+
+@cache
+def compiled(source: Path, *options: str) -> bytes:
+    """A C file as a shared library, with all its functions exported."""
+    with tempfile.TemporaryDirectory() as room:
+        exported = ["-fvisibility=default", *options]
+        return compile_library(source, Path(room) / "library", options=exported).read_bytes()
+
+
+NUMBERS = (
+    "Float64", "Float32", "Int64", "Int32", "Int16", "Int8",
+    "UInt64", "UInt32", "UInt16", "UInt8", "Boolean",
+)  # fmt: skip  # in the order of types_fmu3.c
+
+
+def c_fmu3(folder: Path) -> Path:
+    """The FMU of types_fmu3.c: input in_<type> and output out_<type> of every number type of FMI
+    3.0, a parameter text, a matrix whose size is a structural parameter, the weighted sum
+    of its entries, and a binary input with its echo."""
+    rows = []
+    for k, kind in enumerate(NUMBERS):
+        how = "continuous" if kind.startswith("Float") else "discrete"
+        start = "false" if kind == "Boolean" else "0"
+        rows += [
+            f'<{kind} name="in_{kind}" valueReference="{2 * k}" causality="input" '
+            f'variability="{how}" start="{start}"/>',
+            f'<{kind} name="out_{kind}" valueReference="{2 * k + 1}" causality="output" '
+            f'variability="{how}"/>',
+        ]
+    variables = f"""{"".join(rows)}
+<String name="text" valueReference="23" causality="parameter" variability="fixed"><Start value=""/>
+</String>
+<UInt64 name="size" valueReference="24" causality="structuralParameter" variability="fixed"
+ start="2"/>
+<Float64 name="array" valueReference="25" causality="parameter" variability="fixed" start="0 0 0 0">
+<Dimension valueReference="24"/><Dimension valueReference="24"/></Float64>
+<Float64 name="sum" valueReference="26" causality="output" variability="continuous"/>
+<Binary name="blob" valueReference="27" causality="input" variability="discrete"><Start value=""/>
+</Binary>
+<Binary name="echo" valueReference="28" causality="output" variability="discrete"/>"""
+    description = description3("types", variables, (*range(1, 2 * len(NUMBERS), 2), 26, 28))
+    return packed(folder / "types.fmu", "types_fmu3.c", platform_tuple, description)
+
+
+EVENTS = """
+<Float64 name="x" valueReference="1" causality="output"/>
+<Float64 name="u" valueReference="2" causality="input" start="0"/>
+<Int32 name="falls" valueReference="3" causality="output"/>
+<Int32 name="alarms" valueReference="4" causality="output"/>
+<Int32 name="level" valueReference="5" causality="input" start="0"/>
+<Int32 name="parts" valueReference="6" causality="output"/>
+<Int32 name="mode" valueReference="7" causality="parameter" variability="fixed" start="0"/>
+<Int32 name="entered" valueReference="8" causality="output"/>
+"""
+
+
+def event_fmu3(folder: Path, varies: bool = True, token: str = "") -> Path:
+    """The FMU of event_fmu3.c, which has event mode; `varies`: it takes steps of any size."""
+    flags = {"hasEventMode": "true", "canGetAndSetFMUState": "true"}
+    flags["canHandleVariableCommunicationStepSize"] = str(varies).lower()
+    description = description3("events", EVENTS, (1, 3, 4, 6, 8), token, **flags)
+    return packed(folder / "events.fmu", "event_fmu3.c", platform_tuple, description)
+
+
+CLOCKED = """
+<Clock name="sample" valueReference="0" causality="input" intervalVariability="constant"
+ intervalDecimal="0.1" shiftDecimal="{shift}"/>
+<Clock name="told" valueReference="1" causality="input" intervalVariability="fixed"/>
+<Clock name="fired" valueReference="2" causality="output" intervalVariability="triggered"/>
+<Clock name="go" valueReference="3" causality="input" intervalVariability="triggered"/>
+<Clock name="later" valueReference="4" causality="input" intervalVariability="countdown"/>
+<Clock name="grows" valueReference="5" causality="input" intervalVariability="changing"/>
+<Float64 name="w" valueReference="20" causality="input" variability="discrete" clocks="0"
+ start="0"/>
+<Float64 name="held" valueReference="21" causality="output" variability="discrete" clocks="0"/>
+<Float64 name="v" valueReference="22" causality="input" variability="discrete" clocks="3"
+ start="0"/>
+<Float64 name="got" valueReference="23" causality="output" variability="discrete" clocks="3"/>
+<Float64 name="when" valueReference="24" causality="output" variability="discrete" clocks="4"/>
+<Float64 name="plain" valueReference="25" causality="output"/>
+{counts}"""
+CLOCKS = ("sample", "told", "fired", "go", "later", "grows")
+
+
+def clock_fmu3(folder: Path, shift: float = 0.05, **flags: str) -> Path:
+    """The FMU of clock_fmu3.c, with clocks of every kind and how often each was active, that of
+    0.1 s from `shift` (s) on; by default one with event mode that takes steps of any size."""
+    flags = flags or {"hasEventMode": "true", "canHandleVariableCommunicationStepSize": "true"}
+    counts = "".join(
+        f'<Int32 name="{name}_count" valueReference="{30 + k}" causality="output" clocks="{k}"/>\n'
+        for k, name in enumerate(CLOCKS)
+    )
+    variables = CLOCKED.format(counts=counts, shift=shift)
+    description = description3("clocks", variables, (), **flags)
+    of = platform_tuple, description, f"-DSHIFT={shift}"
+    return packed(folder / "clocks.fmu", "clock_fmu3.c", *of)
