@@ -34,12 +34,39 @@ def own_temporary_folder(
     return folder
 
 
+@pytest.fixture
+def emptied_temporary_folder(own_temporary_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """That folder where runs leave nothing, whatever else `fmus_unpacked_once` keeps."""
+    monkeypatch.setattr(process_cache, "_stay", False)
+    return own_temporary_folder
+
+
 @pytest.fixture(scope="module")
 def fmus_unpacked_once() -> Iterator[None]:
     """Runs of a module of tests leave the FMUs of this project unpacked for the next one, as those
     of a sweep do."""
     with process_cache.unpacked_once():
         yield
+
+
+RUNNING = (
+    "analysis",
+    "api",
+    "commands",
+    "docs",
+    "programs",
+    "reference",
+    "studies",
+    "visualization",
+)
+"""Rooms of tests that run scenes for their numbers."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _fmus_of_a_room_unpacked_once(request: pytest.FixtureRequest) -> None:
+    """Loading FMUs is half of a short run."""
+    if request.node.nodeid.split("/")[1] in RUNNING:
+        request.getfixturevalue("fmus_unpacked_once")
 
 
 def status(*arguments: object) -> int:

@@ -38,11 +38,11 @@ def same(one: hl.Run, two: hl.Run) -> bool:
 
 
 def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
-    tmp_path: Path, own_temporary_folder: Path
+    tmp_path: Path, emptied_temporary_folder: Path
 ) -> None:
     memory = hl.run("closed-loop", SHORT)
     assert memory.folder is None
-    assert not list(own_temporary_folder.iterdir())
+    assert not list(emptied_temporary_folder.iterdir())
     folder = hl.run("closed-loop", SHORT, out=tmp_path / "api")
     options = sets(f"{key}={value}" for key, value in SHORT.items())
     assert status("run", "closed-loop", *options, "--out", tmp_path / "command") == 0

@@ -14,8 +14,6 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.figures.run_figures import figures
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 
 @cache
 def account(scene: str, *options: str) -> tuple[Results, UserPort | None]:
