@@ -30,12 +30,15 @@ def test_values_and_texts_give_the_same_runs(tmp_path: Path) -> None:
         ({"a.b": 3}, "a.b: 3 is one value; give a list"),
         ("a.b=1,2", "vary 'a.b=1,2': give a mapping, or a list of key=values"),
         ({"a.b": []}, "a.b: no value"),
+        ([1], "vary: give"),
         ({}, "give either --vary"),
     ):
         with pytest.raises(hl.InputFault, match=message):
             points(wrong, ())
     with pytest.raises(hl.InputFault, match="give either --vary"):
         points(["a=1"], [{"a": 1}])
+    with pytest.raises(hl.InputFault, match="runs: give"):
+        points((), range(3))
 
 
 def test_a_sweep_is_that_of_the_command(

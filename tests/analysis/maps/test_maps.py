@@ -14,14 +14,10 @@ from hapticlink.analysis.maps import run_checks, wall_closed_form
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.overrides import written
+from tests.analysis.stability.own_hand import DAMPED as WALL
 
 M, D, T = 0.3, 5.0, 1 / 512
 STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
-WALL = {
-    "fmu.wall.settings.unilateral": False,
-    "fmu.wall.settings.damping": 1.0,
-    "hand.wrench": [0.0, 0.0, 0.0],
-}
 VARY = [f"{DAMPING}=1,20,40", f"{STIFFNESS}=2000,6000,10000", "hold=zoh,foh"]
 
 

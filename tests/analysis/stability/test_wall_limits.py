@@ -13,12 +13,11 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.orchestrator import open_scene
-from tests.analysis.stability.own_hand import own_hand
+from tests.analysis.stability.own_hand import BILATERAL, own_hand
 
 M, D, T = 0.3, 5.0, 1 / 512
 """Mass (kg), damping (N.s/m) and period (s) of the scene."""
 STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
-BILATERAL = {"fmu.wall.settings.unilateral": False, "hand.wrench": [0.0, 0.0, 0.0]}
 UNDAMPED = BILATERAL | {"linkage.joint.rail.damping": 0.0, "fmu.wall.settings.damping": 5.0}
 MEASURED = UNDAMPED | {
     "fmu.wall.settings.velocity": "measured",

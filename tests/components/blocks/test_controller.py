@@ -12,17 +12,11 @@ from hapticlink.components.control import topology
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
 from tests.blocks import Running
+from tests.mechanisms import MOBILITY as LAMBDA_INV
+from tests.mechanisms import WRENCH
 
 L = 0.042
-# Lambda^-1 of the report's five-bar at rest, Table 6.1, and a wrench of the hand
-LAMBDA_INV = np.array(
-    [
-        [0.3415204956524712, -0.1971892092835345, 4.867264929294315],
-        [-0.1971892092835345, 0.5132939799057613, 10.63410376500779],
-        [4.867264929294315, 10.63410376500779, 521.8803563146321],
-    ]
-)
-F_HAND = np.array([-0.5, 0.0, -0.0025])
+F_HAND = np.array(WRENCH)
 M = np.array([[0.27, 0.012, 4e-4], [0.012, 0.24, -3e-4], [4e-4, -3e-4, 3.1e-4]])
 ALONE = {"teleoperation": False, "topology": False}
 directions = st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=0, max_size=3)

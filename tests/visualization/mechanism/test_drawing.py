@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.visualization.mechanism import drawing
-from tests.shared_fixtures import status
+from tests.shared_fixtures import run_once, status
 
 
 def test_the_operational_point_is_drawn_where_it_is() -> None:
@@ -71,15 +71,9 @@ def test_info_draws_and_names_what_it_drew(
     assert all(str(tmp_path / name) in capsys.readouterr().out for name in sorted(files)[:1])
 
 
-def test_the_terminal_ends_with_the_numbers_of_the_tables(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert (
-        status("run", "closed-loop", "--set", "duration=0.2", "--no-figures", "--out", tmp_path)
-        == 0
-    )
-    told = capsys.readouterr().out
-    run = hl.load(tmp_path)
+def test_what_is_printed_of_a_run_has_the_numbers_of_its_tables() -> None:
+    run = run_once("closed-loop", {"duration": 0.2})
+    told = str(run)
     apart = run.haptics["virtual_mechanism.x"] - run.haptics["haptic_device.x_true"]
     largest = np.hypot(apart[:, 0], apart[:, 1]).max() * 1e3
     assert f"handle at most {largest:.3g} mm from the operational point" in told
