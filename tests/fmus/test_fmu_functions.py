@@ -1,6 +1,8 @@
 """A step and its outputs in one pass: the same bits as the component's own functions, with fewer
 operations."""
 
+from functools import cache
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ PULLED = ("closed-loop", "graphics.sync=operational")
 SCENES = (("closed-loop",), PULLED, ("local-model",), ("obstacles",), ("virtual-wall",))
 
 
+@cache
 def planned(scene, *options):
     return {block.name: block for block in blocks(load(scene, options)).built}
 

@@ -5,9 +5,8 @@ from dataclasses import asdict
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from hapticlink.components.device import pantograph
 from hapticlink.components.specs.device import Device
@@ -40,7 +39,7 @@ estimate_4 = function([ANGLES, POSE], pantograph.pose_from_angles(ANGLES, POSE, 
 torques = function([WRENCH, POSE], pantograph.motor_torques(WRENCH, POSE, P))
 
 workspace = st.tuples(st.floats(-0.06, 0.05), st.floats(-0.05, 0.05), st.floats(-20, 20))
-wrenches = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.02, 0.02))
+wrenches = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-0.2, 0.2))
 twists = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-5, 5))
 
 
@@ -120,20 +119,6 @@ def test_rate_of_the_mass_matrix_less_2C_is_skew(pose, v):
     np.testing.assert_allclose(N, -N.T, atol=1e-6)
 
 
-def test_free_motion_keeps_its_energy():
-    """M v' + C v = 0, SciPy's DOP853: a wrong C would make or lose energy."""
-
-    def rate(_, x):
-        M, C = dynamics(x[:3], x[3:])
-        return np.concatenate([x[3:], np.linalg.solve(M, -C @ x[3:])])
-
-    x0 = np.array([-0.03, 0.01, 0.4, 0.05, -0.04, 9.0])
-    run = solve_ivp(rate, (0, 0.6), x0, "DOP853", rtol=1e-11, atol=1e-13)
-    energy = [x[3:] @ dynamics(x[:3], x[3:])[0] @ x[3:] / 2 for x in run.y.T]
-    assert np.ptp(run.y[2]) > np.pi
-    np.testing.assert_allclose(energy, energy[0], rtol=1e-8)
-
-
 def test_the_default_device_fits_the_reported_motion():
     """Over x -.06 to .05, |y| <= .05 m and every theta: far from singular, light, well sensed."""
     rows = []
@@ -171,25 +156,16 @@ def test_the_default_device_fits_the_reported_motion():
 
 @settings(max_examples=60, deadline=None)
 @given(workspace, wrenches)
-def test_torques_give_the_wrench_with_least_norm(pose, wrench):
+@example((0.01, -0.02, 0.7), (9.0, -5.0, 0.1))
+@example((0.01, -0.02, 0.7), (0.9, -0.5, 0.01))
+def test_torques_give_the_wrench_with_least_norm_or_saturate_in_its_direction(pose, wrench):
     tau = torques(wrench, pose).ravel()
     J = jacobian(pose)
     asked = np.linalg.pinv(J.T) @ wrench
     if np.abs(asked).max() <= DEVICE.torque_limit:
         np.testing.assert_allclose(J.T @ tau, wrench, atol=1e-12)
     np.testing.assert_allclose(
-        tau, asked * min(1, 0.5 / max(np.abs(asked).max(), 1e-9)), atol=1e-12
-    )
-
-
-def test_saturation_keeps_the_direction():
-    pose, wrench = (0.01, -0.02, 0.7), np.array([9.0, -5.0, 0.1])
-    tau = torques(wrench, pose).ravel()
-    given_wrench = jacobian(pose).T @ tau
-    assert np.abs(tau).max() == pytest.approx(DEVICE.torque_limit, rel=1e-12)
-    assert np.linalg.norm(given_wrench) < np.linalg.norm(wrench)
-    np.testing.assert_allclose(
-        given_wrench / np.linalg.norm(given_wrench), wrench / np.linalg.norm(wrench), atol=1e-12
+        tau, asked * min(1, DEVICE.torque_limit / max(np.abs(asked).max(), 1e-9)), atol=1e-12
     )
 
 
