@@ -21,6 +21,7 @@ from lxml import etree
 import hapticlink as hl
 from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator.base.errors import InputFault
+from tests.fmus.named_fmu import Named
 from tests.programs.built import needs_compiler, program
 from tests.programs.comparison import differing, outputs, run
 
@@ -137,16 +138,14 @@ def test_a_condition_to_stop_asks_to_terminate(tmp_path: Path) -> None:
     options = ("duration=0.5", "stop_when=virtual_mechanism.v[1] < -0.3")
     experiment = run("pendulum", options, tmp_path)
     path = program("pendulum", options, fmi=3)
-    with session(path) as fmu:
-        slave = fmu.instance()
-        initialize(slave)
-        reached = slave.doStep(0.0, 0.5)
+    with session(path) as opened:
+        fmu = Named(opened).start()
+        reached = fmu.slave.doStep(0.0, 0.5)
         assert reached == (False, True, False, experiment.outcome.end_time)
         time = variables(path)["time"].valueReference
-        assert slave.getFloat64([time]) == [experiment.outcome.end_time]
-        at = {v.name: v.valueReference for v in fmu.description.modelVariables}
-        values = slave.getReal([at[name] for name in experiment.results.haptics.columns[1:]])
-        assert values == experiment.results.haptics.rows[-1, 1:].tolist()
+        assert fmu.slave.getFloat64([time]) == [experiment.outcome.end_time]
+        rows = experiment.results.haptics
+        assert fmu.get(*rows.columns[1:]) == rows.rows[-1, 1:].tolist()
 
 
 def test_hapticlink_runs_it(tmp_path: Path) -> None:
