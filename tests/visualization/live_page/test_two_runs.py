@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.visualization.browser_code.chromium import Page, chromium
-from tests.visualization.browser_code.compared_runs import differ_without_topology
+from tests.visualization.browser_code.chromium import Page, chromium, differ_without_topology
 from tests.visualization.browser_code.served_page import Served
 
 NAME = "hapticlink.commands.compared_run"

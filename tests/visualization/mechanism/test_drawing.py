@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.patches import Polygon
+from numpy.typing import NDArray
 
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.visualization.mechanism import drawing
+from hapticlink.visualization.mechanism.picture import Part, directions
 from tests.shared_fixtures import run_once, status
 
 
@@ -93,3 +96,24 @@ def test_what_the_device_cannot_reach_is_shaded(scene: str, reaches: bool) -> No
     (axes,) = drawing.figure(found, start).axes  # type: ignore[arg-type]
     labels = axes.get_legend_handles_labels()[1]
     assert ("outside the device's workspace" not in labels) == reaches
+
+
+def test_constrained_directions_are_those_of_the_projector() -> None:
+    """Against the singular vectors of the projector's range, also where it has rank 2 out of the
+    plane."""
+    part = Part("", "directions", ("P_c",), (9,), directions(), sparse=True)
+
+    def shown(projector: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array(part.value({"P_c": projector.ravel().tolist()})).reshape(-1, 2)
+
+    line = np.array([math.cos(0.3), math.sin(0.3), 0.0])
+    (found,) = shown(np.outer(line, line))
+    assert abs(np.dot(found, line[:2])) == pytest.approx(1.0)
+    assert len(shown(np.diag([0.0, 0.0, 1.0]))) == 0
+    both = shown(np.diag([1.0, 1.0, 0.0]))
+    assert np.allclose(both @ both.T, np.eye(2))
+    basis, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 2)))
+    _, sizes, axes = np.linalg.svd(basis[:2].T)
+    found = shown(basis @ basis.T)
+    assert np.hypot(*found.T) == pytest.approx(sizes)
+    assert np.abs(np.sum(found * axes, axis=1)) == pytest.approx(sizes)

@@ -13,8 +13,7 @@ import pytest
 import hapticlink as hl
 from benchmarks import standalone as bench
 from hapticlink.commands import main
-from tests.visualization.browser_code.chromium import AT, Page, chromium
-from tests.visualization.browser_code.compared_runs import differ_without_topology
+from tests.visualization.browser_code.chromium import AT, Page, chromium, differ_without_topology
 from tests.visualization.browser_code.javascript import NODE
 
 
