@@ -15,10 +15,10 @@ from hapticlink.analysis.fit.arm_fit import NAMES, fit_arm
 from hapticlink.analysis.fit.device_fit import fit_device
 from hapticlink.analysis.fit.estimate import Estimate, standard_deviations
 from hapticlink.analysis.fit.log import Log
-from hapticlink.commands import main
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand
 from tests.analysis.fit import device_log
+from tests.shared_fixtures import status
 
 STILL = ((0.0, 0.0, 0.0, 0.0),)
 DEVICE = Device(handle_mass=0.19, handle_inertia=1.5e-4, motor_damping=2e-3, motor_friction=6e-3)
@@ -120,8 +120,7 @@ def test_a_log_without_motion_in_an_axis_has_no_estimates_there(log: Log) -> Non
 def test_the_command_writes_what_a_scene_takes(log: Log, tmp_path: Path, capsys) -> None:
     path = csv(log, tmp_path / "shaken.csv")
     out = tmp_path / "fit"
-    with pytest.raises(SystemExit, match="0"):
-        main(["fit", str(path), "--device", "handle_mass", "--out", str(out), "--json"])
+    assert status("fit", path, "--device", "handle_mass", "--out", out, "--json") == 0
     record = json.loads(capsys.readouterr().out)
     assert record["parameters"] == json.loads((out / "fit.json").read_text())["parameters"]
     scene = tmp_path / "mine.toml"

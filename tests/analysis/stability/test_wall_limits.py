@@ -117,7 +117,6 @@ CASES = [
     pytest.param(BILATERAL, STIFFNESS, wall_limits.stable(M, D, T), id="spring"),
     pytest.param(LATE, STIFFNESS, wall_limits.stable(M, D, T, 1), id="a sample late"),
     pytest.param(LATER, STIFFNESS, wall_limits.stable(M, D, T, 2), id="two samples late"),
-    pytest.param(UNDAMPED, STIFFNESS, wall_limits.undamped(M, T, 5.0), id="sampled damper"),
     pytest.param(MEASURED, STIFFNESS, wall_limits.undamped_measured(T, 5.0), id="velocity read"),
     pytest.param(MEASURED | {STIFFNESS: 0.0}, DAMPING, wall_limits.damper(M, T), id="damper alone"),
 ]
