@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -70,18 +71,13 @@ def test_a_device_of_which_every_start_is_wrong(log: Log) -> None:
     assert 0.25 < counts < 0.33
 
 
-def test_an_arm_of_which_every_start_is_wrong(log: Log) -> None:
-    estimates, unexplained = fit_arm(log, ArmHand(target=STILL))
+@pytest.mark.parametrize("start", [{}, {"damping": (0.0, 0.0, 0.0)}], ids=["damped", "undamped"])
+def test_an_arm_of_which_every_start_is_wrong(log: Log, start: dict[str, Any]) -> None:
+    estimates, unexplained = fit_arm(log, ArmHand(target=STILL, **start))
     assert len(estimates) == 15
     for estimate in estimates:
         assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.line
     assert max(unexplained) < 0.02
-
-
-def test_an_arm_that_is_assumed_without_damping_is_fitted_as_any(log: Log) -> None:
-    estimates, _ = fit_arm(log, ArmHand(damping=(0.0, 0.0, 0.0), target=STILL))
-    for estimate in estimates:
-        assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.line
 
 
 def test_the_spread_is_that_of_repeated_logs(log: Log) -> None:
