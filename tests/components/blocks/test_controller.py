@@ -168,7 +168,7 @@ def test_bias_needs_the_impedance_law():
         controller(Controller(impedance=False, bias="full"), L)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(directions)
 def test_constraint_map_is_symmetric_and_semidefinite(vectors):
     G = constraint_map(projector(vectors))
@@ -176,7 +176,7 @@ def test_constraint_map_is_symmetric_and_semidefinite(vectors):
     assert np.linalg.eigvalsh(G)[0] > -1e-14
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(directions, pulls, pulls)
 def test_constraint_wrench_does_no_work_on_free_motion(vectors, pull, motion):
     P, S = projector(vectors), np.diag([1, 1, L])
@@ -196,7 +196,7 @@ def test_constraint_wrench_does_no_work_on_free_motion_at_any_scale():
         np.testing.assert_allclose(F_T[n], F_T[L], rtol=1e-8)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(pulls)
 def test_constraint_wrench_at_both_ends(pull):
     """No constrained direction: no wrench. All: the device's whole inertia, M_d pull."""

@@ -45,7 +45,7 @@ def test_printed_trapezoid_does_not_integrate_a_constant():
 
 
 @pytest.mark.parametrize("rule", RULES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(re=st.floats(-50, 50), im=st.floats(-50, 50), period=st.floats(1e-3, 0.5))
 def test_poles_go_where_the_map_says(rule, re, im, period):
     A = np.array([[re, im], [-im, re]])

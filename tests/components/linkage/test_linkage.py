@@ -50,7 +50,7 @@ def test_random_linkages_have_loops_of_every_number():
         assert seen[loops, True] >= 2
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(linkages())
 def test_laws_of_any_linkage(drawn):
     """D is symmetric positive definite, T = 1/2 qd' D qd, C qd = Ddot qd - dT/dq; loops are closed
@@ -96,7 +96,7 @@ def test_a_tree_without_a_root_is_refused():
         terms(linkage, "x_h")
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(linkages())
 def test_tree_recursion_is_D_and_its_inverse(drawn):
     """D a and D^-1 b by the articulated-body recursion against the matrix, free joints too."""
