@@ -36,7 +36,7 @@ def own_temporary_folder(
 
 @pytest.fixture
 def emptied_temporary_folder(own_temporary_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """That folder where runs leave nothing, whatever else `fmus_unpacked_once` keeps."""
+    """That folder, for a test that looks at what its runs leave there: no FMU stays unpacked."""
     monkeypatch.setattr(process_cache, "_stay", False)
     return own_temporary_folder
 
@@ -50,22 +50,16 @@ def fmus_unpacked_once() -> Iterator[None]:
 
 
 RUNNING = (
-    "analysis",
-    "api",
-    "commands",
-    "docs",
-    "programs",
-    "reference",
-    "studies",
-    "visualization",
+    *("tests/analysis/", "tests/api/", "tests/commands/", "tests/docs/", "tests/programs/"),
+    *("tests/reference/", "tests/studies/", "tests/visualization/"),
 )
 """Rooms of tests that run scenes for their numbers."""
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _fmus_of_a_room_unpacked_once(request: pytest.FixtureRequest) -> None:
-    """Loading FMUs is half of a short run."""
-    if request.node.nodeid.split("/")[1] in RUNNING:
+def fmus_of_a_room_unpacked_once(request: pytest.FixtureRequest) -> None:
+    """Loading its FMUs is half of a short run."""
+    if request.node.nodeid.startswith(RUNNING):
         request.getfixturevalue("fmus_unpacked_once")
 
 
