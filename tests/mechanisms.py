@@ -19,6 +19,14 @@ TABLE_6_1 = {
 }
 Q0 = (math.pi / 4, -math.pi / 2, -0.4 * math.pi, math.pi / 2)
 WRENCH = (-0.5, 0.0, -0.0025)
+MOBILITY = np.array(
+    [
+        [0.3415204956524712, -0.1971892092835345, 4.867264929294315],
+        [-0.1971892092835345, 0.5132939799057613, 10.63410376500779],
+        [4.867264929294315, 10.63410376500779, 521.8803563146321],
+    ]
+)
+"""Lambda^-1 of the report's five-bar at rest, Table 6.1, by Pinocchio."""
 
 
 def five_bar(l=TABLE_6_1["l"], m=TABLE_6_1["m"], I=TABLE_6_1["I"], f=(0.5,) * 4, start=Q0):  # noqa: E741

@@ -34,12 +34,33 @@ def own_temporary_folder(
     return folder
 
 
+@pytest.fixture
+def emptied_temporary_folder(own_temporary_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """That folder, for a test that looks at what its runs leave there: no FMU stays unpacked."""
+    monkeypatch.setattr(process_cache, "_stay", False)
+    return own_temporary_folder
+
+
 @pytest.fixture(scope="module")
 def fmus_unpacked_once() -> Iterator[None]:
     """Runs of a module of tests leave the FMUs of this project unpacked for the next one, as those
     of a sweep do."""
     with process_cache.unpacked_once():
         yield
+
+
+RUNNING = (
+    *("tests/analysis/", "tests/api/", "tests/commands/", "tests/docs/", "tests/programs/"),
+    *("tests/reference/", "tests/studies/", "tests/visualization/"),
+)
+"""Rooms of tests that run scenes for their numbers."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fmus_of_a_room_unpacked_once(request: pytest.FixtureRequest) -> None:
+    """Loading its FMUs is half of a short run."""
+    if request.node.nodeid.startswith(RUNNING):
+        request.getfixturevalue("fmus_unpacked_once")
 
 
 def status(*arguments: object) -> int:

@@ -11,7 +11,10 @@ import pytest
 
 import hapticlink as hl
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
+    pytest.mark.usefixtures("emptied_temporary_folder"),
+]
 
 
 def maps() -> int:

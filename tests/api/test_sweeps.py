@@ -30,16 +30,19 @@ def test_values_and_texts_give_the_same_runs(tmp_path: Path) -> None:
         ({"a.b": 3}, "a.b: 3 is one value; give a list"),
         ("a.b=1,2", "vary 'a.b=1,2': give a mapping, or a list of key=values"),
         ({"a.b": []}, "a.b: no value"),
+        ([1], "vary: give"),
         ({}, "give either --vary"),
     ):
         with pytest.raises(hl.InputFault, match=message):
             points(wrong, ())
     with pytest.raises(hl.InputFault, match="give either --vary"):
         points(["a=1"], [{"a": 1}])
+    with pytest.raises(hl.InputFault, match="runs: give"):
+        points((), range(3))
 
 
 def test_a_sweep_is_that_of_the_command(
-    bar: Path, tmp_path: Path, own_temporary_folder: Path
+    bar: Path, tmp_path: Path, emptied_temporary_folder: Path
 ) -> None:
     told: list[tuple[int, int]] = []
     vary = {"hold": ["zoh", "none"], "haptics.rate": np.array([100, 200])}
@@ -48,7 +51,7 @@ def test_a_sweep_is_that_of_the_command(
     assert told[0] == (2, 4)  # those refused
     assert told[-1] == (4, 4)
     assert found.folder is None
-    assert not list(own_temporary_folder.iterdir())
+    assert not list(emptied_temporary_folder.iterdir())
     arguments = ["--set", "linkage.start_velocity.slide=0.25", "--set", "duration=0.1"]
     arguments += ["--vary", "hold=zoh,none", "--vary", "haptics.rate=100,200"]
     assert status("sweep", bar, *arguments, "--out", tmp_path, "--jobs", 1) == 0

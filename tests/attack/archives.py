@@ -207,7 +207,3 @@ def _there(folder: Path) -> set[str]:
     """What stands in the folder, but for the place of the cases, which looks after its own."""
     found = (path.relative_to(folder) for path in folder.rglob("*"))
     return {str(path) for path in found if path.parts[0] != "cases"}
-
-
-if __name__ == "__main__":
-    cases.command("archives", "Damaged FMUs, and such as are made to harm.", attack, 500)

@@ -176,8 +176,3 @@ def attack(number: int, seed: int) -> Iterator[cases.Made]:
         for kind in kinds:
             for component in made:
                 yield from called(kind(component, folder), share, seed, folder)
-
-
-if __name__ == "__main__":
-    about = "Random calls of the C interface of FMUs."
-    cases.command("c_interface", about, attack, 500_000, OUTCOMES)

@@ -1,15 +1,14 @@
-"""What attacks share: what may become of a case, the count of each, the table, the command line."""
+"""What attacks share: what may become of a case, the count of each, and the table."""
 
 from __future__ import annotations
 
-import argparse
 import csv
 import random
 import signal
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,24 +99,3 @@ def hear_interrupts() -> None:
     """Processes that this one starts hear SIGINT, which a shell ignores in the background."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def command(
-    name: str,
-    about: str,
-    attack: Callable[[int, int], Iterable[Made]],
-    number: int,
-    outcomes: Sequence[str] = OUTCOMES,
-) -> None:
-    """`python -m tests.attack.<name> [--cases N] [--seed N] [--out CSV]`: `attack(cases, seed)`
-    makes its cases; the table goes to results/faults/<name>.csv. Status 1 where any was bad."""
-    parser = argparse.ArgumentParser(description=about)
-    parser.add_argument("--cases", type=int, default=number)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=FOLDER / f"{name}.csv")
-    given = parser.parse_args()
-    hear_interrupts()
-    counts = counted(attack(given.cases, given.seed))
-    write(given.out, counts, given.seed, outcomes)
-    print(given.out)
-    sys.exit(1 if bad(counts) else 0)

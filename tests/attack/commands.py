@@ -99,8 +99,7 @@ class Place(Room):
                     yield f"{path.name} of the earlier run has changed or is gone"
         elif json.loads(story.read_text("utf-8"))["end"].get("reason") in (None, "running"):
             yield "run.json has no end"
-        if hidden := [p.name for p in self.out.glob(".*")]:
-            yield f"files {', '.join(hidden)}"
+        yield from self.hidden(self.out)
         if left := self.left_files():
             yield f"temporary {', '.join(left)}"
 

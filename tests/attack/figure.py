@@ -9,13 +9,9 @@ import csv
 
 from matplotlib.figure import Figure
 
+from tests.attack.__main__ import ATTACKS
 from tests.attack.cases import FOLDER
 
-NAMES = (
-    "signals_of_commands",
-    *("scenes", "options", "ssps", "archives", "c_interface", "signals"),
-    *("hostile", "folders", "special_files", "plugins", "misuse", "loops", "page"),
-)
 ENDS = {
     "done": "#0077bb",
     "returned": "#44aa99",
@@ -37,12 +33,12 @@ def counts(name: str) -> dict[str, int]:
 def figure() -> Figure:
     drawn = Figure(figsize=(7.5, 5.0), layout="constrained")
     axes = drawn.add_subplot()
-    found = {name: counts(name) for name in NAMES}
-    left = dict.fromkeys(NAMES, 0.0)
+    found = {name: counts(name) for name in ATTACKS}
+    left = dict.fromkeys(ATTACKS, 0.0)
     for end, color in (ENDS | BAD).items():
-        shares = [100 * found[name][end] / sum(found[name].values()) for name in NAMES]
-        axes.barh(NAMES, shares, left=list(left.values()), color=color, label=end)
-        left = {name: left[name] + share for name, share in zip(NAMES, shares, strict=True)}
+        shares = [100 * found[name][end] / sum(found[name].values()) for name in ATTACKS]
+        axes.barh([*ATTACKS], shares, left=list(left.values()), color=color, label=end)
+        left = {name: left[name] + share for name, share in zip(ATTACKS, shares, strict=True)}
     bad = sum(cases[end] for cases in found.values() for end in BAD)
     total = sum(sum(cases.values()) for cases in found.values())
     title = f"{bad} of {total:,} cases lost results, crashed, hung or were believed"

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import Made, command, seeded
+from tests.attack.cases import Made, seeded
 from tests.attack.processes import Process, own_folder
 
 SCENES = ("pendulum", "closed-loop", "four-bar")
@@ -71,7 +71,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
         with own_folder() as folder:
             ended = _case(folder / "out", draw, kills)
         yield Made("at once, one killed" if kills else "at once", case, *ended)
-
-
-if __name__ == "__main__":
-    command("folders", "Several runs at once into one folder.", attack, 60)

@@ -22,7 +22,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
+from tests.attack.cases import WITH_BELIEVED, Made, seeded
 from tests.attack.processes import PATIENCE, Room, own_folder
 from tests.orchestrator import hostile_slave
 from tests.orchestrator.c_fmus import hostile_fmu
@@ -95,7 +95,7 @@ class Attack(Room):
             return "crashed", f"status {status}: {said[-400:]}"
         if act == "exit" and crash and status == 0:
             return "believed", "exit(0) of an FMU was a success"
-        if wrong := [*self._untrue(status, said, crash), *self.left(15.0), *self._hidden()]:
+        if wrong := [*self._untrue(status, said, crash), *self.left(15.0), *self.hidden(self.out)]:
             return "lost", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"
         if wrong := [*self._believed(fmi, packed, place, act, status)]:
             return "believed", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"
@@ -135,10 +135,6 @@ class Attack(Room):
         if run["end"]["reason"] == "duration" and len(times) != ROWS:
             yield f"{len(times)} rows"
 
-    def _hidden(self) -> Iterator[str]:
-        if names := [path.name for path in self.out.glob(".*")]:
-            yield f"files {', '.join(names)}"
-
     def _believed(self, fmi: str, packed: str, place: str, act: str, status: int) -> Iterator[str]:
         called = place in ("make", "enter", "leave", "set", "get", "step", "end")
         failed = hostile_slave.RAISES if packed == "Python" else {*STATUSES} - {"warning"}
@@ -175,6 +171,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
 
 
 OUTCOMES = tuple(outcome for outcome in WITH_BELIEVED if outcome != "refused")
-
-if __name__ == "__main__":
-    command("hostile", "FMUs that behave badly.", attack, 300, OUTCOMES)

@@ -1,10 +1,7 @@
 """Random scenes on both event loops: the tables of the compiled loop have the bits of Python's,
 where a hold extrapolates matrices its digits (`holds/holds_on_manifolds.py`), and a run that faults
 ends in both with the same words. A part of them runs with the C of the loop compiled by gcc with
-its address and undefined-behaviour sanitizers, which report nothing.
-
-python -m tests.attack.loops --cases 300
-"""
+its address and undefined-behaviour sanitizers, which report nothing."""
 
 from __future__ import annotations
 
@@ -23,7 +20,7 @@ from hapticlink.orchestrator.run.compiled import build
 from hapticlink.orchestrator.scene import find_scene
 from tests.attack import mutations
 from tests.attack.c_interface import UNDEFINED, _address_library, can_sanitize
-from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
+from tests.attack.cases import Made, seeded
 from tests.attack.processes import own_folder
 from tests.attack.scenes import written
 
@@ -149,7 +146,3 @@ def _judged(compiled: Any, python: Any) -> str:
     if str(compiled[1]).startswith("refused"):
         return "refused"
     return "told" if compiled[1][1] else "done"
-
-
-if __name__ == "__main__":
-    command("loops", "Random scenes on both loops.", attack, 300, WITH_BELIEVED)

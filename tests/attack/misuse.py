@@ -15,7 +15,7 @@ from typing import Any
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import Fault
-from tests.attack.cases import Made, command, seeded
+from tests.attack.cases import Made, seeded
 from tests.attack.processes import own_folder
 
 VALUES: tuple[Any, ...] = (
@@ -122,7 +122,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
                 case = f"{kind}({ascii(positional)[:200]}, {ascii(named)[:200]})"
                 call = partial(functions[kind], *positional, **named)
             yield Made(kind, case, *_outcome(call, folder))
-
-
-if __name__ == "__main__":
-    command("misuse", "Arguments that are none.", attack, 500)

@@ -1,7 +1,4 @@
-"""Options of the commands that are wrong: keys and values of --set, ranges of --vary, flags.
-
-python -m tests.attack.options --cases 4000
-"""
+"""Options of the commands that are wrong: keys and values of --set, ranges of --vary, flags."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from typing import Any
 
 from hapticlink.orchestrator.scene import find_scene
 from tests.attack import mutations
-from tests.attack.cases import Made, command
+from tests.attack.cases import Made
 from tests.attack.commands import Place
 from tests.attack.processes import own_folder
 from tests.attack.scenes import SMALL
@@ -95,7 +92,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
             kind = KINDS[i % len(KINDS)]
             made = [a.replace("\0", "") for a in arguments(kind, place.out, draw)]
             yield Made(kind, ascii(made)[:500], *place.made(made))
-
-
-if __name__ == "__main__":
-    command("options", "Options that are wrong.", attack, 4000)

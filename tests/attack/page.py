@@ -21,7 +21,7 @@ import hapticlink as hl
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.session import Session
-from tests.attack.cases import Made, command, seeded
+from tests.attack.cases import Made, seeded
 from tests.attack.processes import own_folder
 
 ASKED = {"resets": 10, "holds": 100, "anything": 50}
@@ -125,7 +125,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
                 if grown[0] > 2**20 + MOST_BYTES[kind] * asked or grown[1] > 40 or grown[2] > 2:
                     outcome, wrong = "lost", said
             yield Made(name, case, outcome, wrong)
-
-
-if __name__ == "__main__":
-    command("page", "Resets and changes behind a page.", attack, 120)

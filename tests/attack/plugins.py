@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tests.attack.cases import WITH_BELIEVED, Made, command, seeded
+from tests.attack.cases import Made, seeded
 from tests.attack.commands import Place
 from tests.attack.processes import own_folder
 
@@ -61,7 +61,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
                 outcome, wrong = "believed", f"status 0: {text!r}"
             kind = "names" if named else "modules"
             yield Made(kind, ascii(module if named else text)[:200], outcome, wrong)
-
-
-if __name__ == "__main__":
-    command("plugins", "Plugins that fail.", attack, 200, WITH_BELIEVED)

@@ -98,6 +98,12 @@ class Room:
         if names := self.left_files():
             yield f"temporary {', '.join(names)}"
 
+    @staticmethod
+    def hidden(folder: Path) -> Iterator[str]:
+        """Files that a run writes beside its results and removes."""
+        if names := [path.name for path in folder.glob(".*")]:
+            yield f"files {', '.join(names)}"
+
     def left_files(self) -> list[str]:
         """Names of temporary files, which are removed."""
         if names := [path.name for path in self.temporary.iterdir()]:

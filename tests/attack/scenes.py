@@ -1,7 +1,4 @@
-"""Shipped scenes with values, keys, structure, lines or bytes changed, each run by the command.
-
-python -m tests.attack.scenes --cases 2700
-"""
+"""Shipped scenes with values, keys, structure, lines or bytes changed, each run by the command."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from typing import Any
 
 from hapticlink.orchestrator.scene import find_scene, overrides
 from tests.attack import mutations
-from tests.attack.cases import Made, command
+from tests.attack.cases import Made
 from tests.attack.commands import Place
 from tests.attack.processes import own_folder
 
@@ -57,7 +54,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
         for kind, said, content in cases(number, seed):
             path.write_bytes(content)
             yield Made(kind, said, *place.made(["run", str(path), "--out", str(place.out)]))
-
-
-if __name__ == "__main__":
-    command("scenes", "Scenes that are changed.", attack, 2700)

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from hapticlink.orchestrator.results import tables
-from tests.attack.cases import OF_SIGNALS, Made, command, hear_interrupts
+from tests.attack.cases import Made, hear_interrupts
 from tests.attack.processes import PATIENCE, Process, Room, own_folder
 
 KINDS = {
@@ -69,7 +69,7 @@ class Attack(Room):
             return "before", ""
         if status not in (0, 1) or "Traceback" in said or "Fatal" in said:
             return "crashed", f"status {status}: {said[-500:]}"
-        if wrong := [*self._untrue(status, said), *self.left(), *self._hidden()]:
+        if wrong := [*self._untrue(status, said), *self.left(), *self.hidden(self.out)]:
             return "lost", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"
         return "told" if status else "done", ""
 
@@ -93,10 +93,6 @@ class Attack(Room):
         if status == 0 and there != listed:
             yield f"run.json lists other files: {', '.join(sorted(there ^ listed))}"
 
-    def _hidden(self) -> Iterator[str]:
-        if names := [path.name for path in self.out.glob(".*")]:
-            yield f"files {', '.join(names)}"
-
 
 def python_itself(status: int, said: str) -> bool:
     """Whether the signal came before the first line of this project was read."""
@@ -115,7 +111,3 @@ def attack(
             kind = kinds[i % len(kinds)]
             instants = room.instants(kind, draw)
             yield Made(kind, str(instants), *room.made(kind, instants))
-
-
-if __name__ == "__main__":
-    command("signals", "Ctrl-C at random instants of a run.", attack, 300, OF_SIGNALS)

@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from tests.attack.cases import OF_SIGNALS, Made, command, seeded
+from tests.attack.cases import Made, seeded
 from tests.attack.processes import PATIENCE, Room, own_folder
 from tests.attack.signals import python_itself
 
@@ -108,8 +108,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
         for i, case, draw in seeded(number, seed):
             kind = [*COMMANDS][i % len(COMMANDS)]
             yield Made(kind, case, *_case(kind, room, read, draw))
-
-
-if __name__ == "__main__":
-    about = "Signals at random instants of commands."
-    command("signals_of_commands", about, attack, 300, OF_SIGNALS)

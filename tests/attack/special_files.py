@@ -9,7 +9,7 @@ import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from tests.attack.cases import Made, command, seeded
+from tests.attack.cases import Made, seeded
 from tests.attack.commands import Place
 from tests.attack.processes import own_folder
 
@@ -89,7 +89,3 @@ def _judged(place: Place, status: int | None, said: str) -> tuple[str, str]:
     if left := place.left_files():
         return "lost", f"temporary {', '.join(left)}: {said[-300:]}"
     return ("done", "told", "refused")[status or 0], ""
-
-
-if __name__ == "__main__":
-    command("special_files", "Results that are no regular files.", attack, 300)

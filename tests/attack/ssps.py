@@ -1,7 +1,4 @@
-"""Exported SSPs with bytes, structure or annotation changed, each run by the command.
-
-python -m tests.attack.ssps --cases 400
-"""
+"""Exported SSPs with bytes, structure or annotation changed, each run by the command."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from xml.etree import ElementTree
 import hapticlink as hl
 from tests.attack import mutations
 from tests.attack.archives import entries, zipped
-from tests.attack.cases import Made, command
+from tests.attack.cases import Made
 from tests.attack.commands import Place
 from tests.attack.processes import own_folder
 
@@ -110,7 +107,3 @@ def attack(number: int, seed: int) -> Iterator[Made]:
             path.write_bytes(changed(kind, whole[which], draw))
             made = place.made(["run", str(path), "--out", str(place.out)])
             yield Made(kind, f"{SCENES[which]}, case {i}", *made)
-
-
-if __name__ == "__main__":
-    command("ssps", "Exported SSPs that are changed.", attack, 400)

@@ -1,6 +1,8 @@
 """The commands from outside: files, messages and exit statuses."""
 
 import io
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +12,10 @@ import pytest
 from matplotlib.image import imread
 
 import hapticlink as hl
-from hapticlink.commands.progress import progress
+from hapticlink.commands.progress import progress, timed
+from hapticlink.fmus import durations
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.errors import Fault, Interrupted
 from hapticlink.orchestrator.results import tables
 from tests.shared_fixtures import status
 
@@ -134,3 +139,75 @@ def test_a_signal_before_the_first_event_has_a_good_end(
     monkeypatch.setattr(hl, "run", interrupted)
     status("run", bar, "--out", tmp_path)
     assert "interrupted at 0 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("of length 0"), RecursionError(), KeyError(3)])
+def test_an_error_of_ours_is_a_message_and_a_report(
+    error: Exception,
+    own_temporary_folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def load(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(open_scene, "load", load)
+    assert status("run", "pendulum") == 1
+    said = capsys.readouterr().err
+    (report,) = own_temporary_folder.glob("hapticlink-error-*.txt")
+    assert said.splitlines()[0].startswith("hapticlink: an error of hapticlink itself")
+    assert said.splitlines()[1] == f"  please report it, with {report}"
+    text = report.read_text()
+    assert "Traceback" in text
+    assert "raise error" in text
+    assert "$ " in text
+
+
+def test_arguments_that_are_no_text(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("run", "pendulum", "--set", "title=\udcff") == 2
+    assert r"'title=\udcff': no text" in capsys.readouterr().err
+
+
+RUN = f"{sys.executable} -m hapticlink run pendulum --set duration=0.01 --no-figures --out out"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell's redirections")
+@pytest.mark.parametrize(
+    "closed", [">&-", "2>&-", "<&- >&- 2>&-", "--set isolate=true <&- >&- 2>&-"]
+)
+def test_a_closed_stream_is_no_fault(tmp_path: Path, closed: str) -> None:
+    subprocess.run(f"{RUN} {closed}", shell=True, cwd=tmp_path, check=True)
+    found = tables.load(tmp_path / "out")
+    assert found.run["end"]["reason"] == "duration"
+    assert len(found.haptics["time"]) == 6
+
+
+def test_letters_that_the_terminal_lacks_are_escaped(tmp_path: Path) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-m", "hapticlink", "info", "pendulum", "--set", "title=λ"],
+        env=os.environ | {"PYTHONIOENCODING": "ascii"}, capture_output=True, check=False,
+    )  # fmt: skip
+    assert (ended.returncode, ended.stdout[:7]) == (0, b"\\u03bb\n")
+
+
+def test_a_long_command_tells_how_long_it_took(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
+    times = iter([0.0, 90.0, 0.0, 30.0, 0.0, 0.0])
+    monkeypatch.setattr(durations, "monotonic", lambda: next(times))
+    for _ in range(3):
+        with timed("bench it", "about 3 minutes"):
+            pass
+    told = re.findall("duration (.*)", capsys.readouterr().err)
+    known = "up to 1.5 minutes here, less if partly finished before"
+    assert told == ["about 3 minutes", known, known]
+
+
+def test_an_interrupted_command_keeps_no_duration(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
+    with pytest.raises(Fault, match="finished runs are kept"), timed("bench it"):
+        raise Interrupted
+    assert not [*tmp_path.iterdir()]

@@ -16,6 +16,7 @@ import pytest
 
 import hapticlink as hl
 from tests.docs.pages import ROOT, blocks
+from tests.shared_fixtures import run_once
 
 
 def written(page: str, title: str, folder: Path) -> Path:
@@ -49,7 +50,7 @@ def test_watt_s_linkage_draws_watt_s_curve(tmp_path: Path) -> None:
 
 
 def test_the_first_variation_ends_early() -> None:
-    run = hl.run("closed-loop", {"graphics.rate": 10, "controller.topology": False})
+    run = run_once("closed-loop", {"graphics.rate": 10, "controller.topology": False})
     assert run.fault is None
     end = run.run["end"]
     assert end["reason"] == "stop_when"
@@ -57,7 +58,7 @@ def test_the_first_variation_ends_early() -> None:
 
 
 def test_the_handle_stays_within_5_mm() -> None:
-    distance = hl.run("closed-loop").tracking().distance_mm
+    distance = run_once("closed-loop").tracking().distance_mm
     assert 4 < distance.max() < 5
 
 

@@ -19,7 +19,7 @@ import jsonschema
 import pytest
 
 import hapticlink as hl
-from hapticlink.analysis.sweep.grid import grid, parse
+from hapticlink.analysis.sweep.grid import parse
 from hapticlink.commands import COMMANDS, _commands, app
 from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.scene import find_scene
@@ -169,7 +169,7 @@ PARSED = [p for p in PAGES if name(p) not in ELSEWHERE and every_command(p)]
 
 @pytest.mark.parametrize("page", PARSED, ids=name)
 def test_every_command_can_be_parsed(page: Path) -> None:
-    """Options, and keys and values of shipped scenes; those of sweeps too."""
+    """Options, and keys and values of shipped scenes; those of sweeps too, one axis at a time."""
     _commands([])
     for command in every_command(page):
         parsed(command)
@@ -181,9 +181,14 @@ def parsed(command: str) -> None:
     _, bound, _ = app.parse_args(shlex.split(command)[1:], exit_on_error=False)
     scene = bound.args[0] if bound.args else None
     if scene in SHIPPED:
-        for point in grid([parse(text) for text in bound.kwargs.get("vary") or ()]):
-            varied = (f"{key}={value}" for key, value in point.items())
-            hl.scene(scene, [*(bound.kwargs.get("set") or ()), *varied])
+        axes, given = (
+            [parse(text) for text in bound.kwargs.get("vary") or ()],
+            bound.kwargs.get("set"),
+        )
+        first = [f"{axis.key}={axis.values[0]}" for axis in axes]
+        varied = [f"{axis.key}={value}" for axis in axes for value in axis.values[1:]]
+        for option in ("", *varied):
+            hl.scene(scene, [*(given or ()), *first, *filter(None, [option])])
 
 
 def test_extras_that_are_installed_exist() -> None:

@@ -10,7 +10,10 @@ import hapticlink as hl
 from hapticlink.components.component import Variable
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator.scene.blocks import blocks
+from tests.blocks import once
 from tests.docs.pages import ROOT
+
+MADE = once(component)
 
 WALL = {
     "name": "wall",
@@ -42,7 +45,7 @@ def declared() -> Iterator[Row]:
     for name, options in SCENES:
         scene = hl.scene(name, options)
         for block in blocks(scene).built:
-            made = component(block.block, block.settings)
+            made = MADE(block.block, block.settings)
             for side, variables in (("input", made.inputs), ("output", made.outputs)):
                 yield from ((block.block, side, port(v), units(v)) for v in variables)
 

@@ -1,4 +1,4 @@
-"""The FMU as a file: the same bytes, whole or not at all, documented."""
+"""The FMU as a file: the same bytes, whole or not at all, valid, documented."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ from pathlib import Path
 import casadi as ca
 import fmpy
 import pytest
+from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Block, Variable
 from hapticlink.fmus.blocks import build_block
 from hapticlink.fmus.build import build
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
+from hapticlink.fmus.python_fmu import entries
+from hapticlink.fmus.write_fmu import findings, write_fmu
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.blocks import blocks
 from tests.fmus import sample_components
@@ -160,3 +163,29 @@ def test_documentation_names_no_file_of_the_sources(block, tmp_path):
     path = build_block(plan.block, plan.settings, tmp_path)
     page = zipfile.ZipFile(path).read("documentation/index.html").decode()
     assert not re.search(r"\w\.py\b|`\w+_\w+`", page)
+
+
+DESCRIPTION = "modelDescription.xml"
+VALID = ("x", "_a1", "x[1]", "a.b[2,3].c", "der(x)", "'a b'")
+INVALID = ("1x", "x[]", "a..b", "x y", "é", "x[a]")
+
+
+def renamed(name: str) -> dict[str, bytes]:
+    """The entries of an FMU, one of whose variables has the name."""
+    files = entries(sample_components.stateless(), stop_time=1.0, step_size=0.1)
+    text = files[DESCRIPTION].decode()
+    assert text.count('name="y"') == 1
+    return {**files, DESCRIPTION: text.replace('name="y"', f'name="{name}"').encode()}
+
+
+@pytest.mark.parametrize("name", VALID)
+def test_a_valid_name_is_written(name: str, tmp_path: Path) -> None:
+    path = write_fmu(renamed(name), tmp_path, "gain")
+    assert validate_fmu(str(path)) == findings(str(path)) == []
+
+
+@pytest.mark.parametrize("name", INVALID)
+def test_another_name_is_refused_by_fmpy(name: str, tmp_path: Path) -> None:
+    with pytest.raises(FmuError, match=r"(?s)`gain` fails validation.*is not a legal"):
+        write_fmu(renamed(name), tmp_path, "gain")
+    assert not [*tmp_path.iterdir()]

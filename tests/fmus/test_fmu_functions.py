@@ -10,16 +10,19 @@ from hapticlink.fmus.blocks import component
 from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.orchestrator.open_scene import load
 from hapticlink.orchestrator.scene.blocks import blocks
+from tests.blocks import once
 from tests.fmus import sample_components
 
 PULLED = ("closed-loop", "graphics.sync=operational")
 SCENES = (("closed-loop",), PULLED, ("local-model",), ("obstacles",), ("virtual-wall",))
 
 
+@once
 def planned(scene, *options):
     return {block.name: block for block in blocks(load(scene, options)).built}
 
 
+@once
 def made(scene, name):
     """The component of a block of a scene, its name and options."""
     block = planned(*scene)[name]

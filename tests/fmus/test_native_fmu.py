@@ -45,7 +45,7 @@ from hapticlink.components.specs.linkage import (
 from hapticlink.components.specs.paths import CoordinateSine, Interpolation
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.build import build, build_native
-from hapticlink.fmus.check import check_fmu, session
+from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native import compile_library, compiler, split_functions
 from hapticlink.fmus.native.compiler_cache import linker_cache
@@ -55,6 +55,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import blocks
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
+from tests.mechanisms import one_body
 
 OPTIONS = ("sensing=encoders", "controller.bias=full", "mechanism.directions=true")
 NAMES = ("hand", "controller", "haptic_device", "virtual_mechanism", "virtual_environment")
@@ -106,17 +107,8 @@ def arm(
 def driven_slider(sine: CoordinateSine | None = None) -> Component:
     """A joint on a path whose rows stand within steps, at their ends and at the end of the run."""
     table = sine or ((0.005, 0.1), (8 * H, 0.3), (0.03, 0.2), (40 * H, 0.1))
-    joint = Joint(
-        name="rail",
-        type="prismatic",
-        child="block",
-        drive=PDDrive(table=table, stiffness=400.0, damping=8.0),
-    )
-    linkage = Linkage(
-        body=(Body(name="block", mass=2.0, inertia=1.0),),
-        joint=(joint,),
-        operational_point=OperationalPoint(body="block"),
-    )
+    drive = PDDrive(table=table, stiffness=400.0, damping=8.0)
+    linkage = one_body(Body(name="block", mass=2.0, inertia=1.0), type="prismatic", drive=drive)
     return virtual_mechanism(linkage, Mechanism(integrator="linearly-implicit"), step_s=H)
 
 
@@ -125,18 +117,12 @@ def rubbing_rod() -> Component:
     turns back at a limit: states beside q and qd."""
     limits = Limits(upper=0.05, stiffness=50.0, restitution=0.6)
     pivot = Joint(name="pivot", child="rod", friction=0.02, friction_speed=0.05, limits=limits)
+    rod = Body(
+        name="rod", mass=0.2, inertia=1e-3, center=(0.1, 0.0), radius=0.01,
+        capsule=((0.0, 0.0), (0.2, 0.0)),
+    )  # fmt: skip
     linkage = Linkage(
-        body=(
-            Body(
-                name="rod",
-                mass=0.2,
-                inertia=1e-3,
-                center=(0.1, 0.0),
-                radius=0.01,
-                capsule=((0.0, 0.0), (0.2, 0.0)),
-            ),
-            Body(name="disc", mass=0.1, radius=0.008),
-        ),
+        body=(rod, Body(name="disc", mass=0.1, radius=0.008)),
         joint=(pivot, Joint(name="disc", type="free", child="disc")),
         operational_point=OperationalPoint(body="rod", at=(0.2, 0.0)),
         start={"disc": (0.12, -0.02, 0.0)},
@@ -194,9 +180,7 @@ def test_deflections_are_part_of_a_saved_state(both):
     for path in both["rubbing"]:
         with session(path) as at:
             slave = at.instance()
-            slave.setupExperiment(startTime=0.0)
-            slave.enterInitializationMode()
-            slave.exitInitializationMode()
+            initialize(slave)
             for k in range(30):
                 slave.doStep(k * H, H)
             state, twice = slave.getFMUState(), []
@@ -211,13 +195,13 @@ def test_deflections_are_part_of_a_saved_state(both):
             np.testing.assert_array_equal(*twice)
 
 
-@pytest.mark.parametrize("name", ["driven", "rubbing"])
-def test_contract_of_forces_with_tables_and_states(both, name):
+@pytest.mark.parametrize("name", [*NAMES, "driven", "rubbing"])
+def test_contract_of_the_blocks(both, name):
     for path in both[name]:
         assert check_fmu(path) == []
 
 
-@pytest.mark.parametrize("name", ["arm", "driven", "rubbing", "splined", "swung"])
+@pytest.mark.parametrize("name", [*NAMES, "arm", "driven", "rubbing", "splined", "swung"])
 def test_plain_python_gives_the_same_bits(both, name, monkeypatch):
     by_c = driven(both[name][1])
     monkeypatch.setenv("HAPTICLINK_PURE_PYTHON", "1")
@@ -312,15 +296,17 @@ def test_rows_of_a_table_are_data(both):
     assert long.count(";") == short.count(";")
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_contract_of_the_blocks(both, name):
-    for path in both[name][1:]:
-        assert check_fmu(path) == []
-
-
 def test_the_same_component_gives_the_same_bytes(native_fmus, tmp_path):
     again = build_native(sample_components.spring(), tmp_path)
     assert again.read_bytes() == native_fmus["spring"].read_bytes()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_scene_gives_the_same_bytes(both, name, tmp_path):
+    scene = open_scene.load("closed-loop", OPTIONS)
+    block = next(b for b in blocks.blocks(scene).built if b.name == name)
+    again = build(component(block.block, block.settings), tmp_path)
+    assert again.read_bytes() == both[name][0].read_bytes()
 
 
 def test_the_archive_is_self_contained(native_fmus, tmp_path):
@@ -384,9 +370,7 @@ def test_a_message_has_its_status_and_category(native_fmus):
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _, *about: said.append(about))
         slave.instantiate(callbacks=callbacks)
-        slave.setupExperiment()
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
+        initialize(slave)
         slave.setReal([0], [100.0])
         with pytest.raises(FMICallException):
             slave.doStep(0.0, 0.1)

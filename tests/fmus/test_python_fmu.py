@@ -72,15 +72,6 @@ def test_an_exception_inside_a_step_is_a_discard(opened):
     assert "'NoneType' object is not callable" in " ".join(at.messages)
 
 
-def test_plain_python_gives_the_bits_of_casadi(fmus, monkeypatch):
-    def simulate():
-        return fmpy.simulate_fmu(str(fmus["spring"]), stop_time=0.5, output_interval=1 / 512)
-
-    by_casadi = simulate()
-    monkeypatch.setenv("HAPTICLINK_PURE_PYTHON", "1")
-    assert simulate().tobytes() == by_casadi.tobytes()
-
-
 def test_runs_without_casadi_and_without_this_package(fmus):
     """In a process where neither can be imported."""
     code = f"""

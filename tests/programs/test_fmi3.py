@@ -6,10 +6,9 @@ import math
 import re
 import shutil
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -17,13 +16,14 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi3 import FMU3Slave
 from lxml import etree
 
 import hapticlink as hl
+from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator.base.errors import InputFault
+from tests.fmus.named_fmu import Named
 from tests.programs.built import needs_compiler, program
-from tests.programs.comparison import Outputs, differing, run
+from tests.programs.comparison import differing, outputs, run
 
 pytestmark = needs_compiler
 SECOND = "duration=1"
@@ -32,81 +32,17 @@ CASES = [("closed-loop", (SECOND,)), ("closed-loop-direct", DIRECT), ("five-bar"
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 
 
-class Opened:
-    """An FMU and its instances. sizes, references: of its variables, by name."""
-
-    def __init__(self, path: Path) -> None:
-        self.description = fmpy.read_model_description(str(path), validate=False)
-        self.folder = fmpy.extract(str(path))
-        self.messages: list[str] = []
-        self.variables = {v.name: v for v in self.description.modelVariables}
-        self.references = {name: v.valueReference for name, v in self.variables.items()}
-        self.sizes = {name: math.prod(v.shape or ()) for name, v in self.variables.items()}
-        self.slaves: list[FMU3Slave] = []
-
-    def instance(self, event_mode: bool = False, token: str | None = None) -> FMU3Slave:
-        slave = FMU3Slave(
-            guid=token or self.description.guid,
-            unzipDirectory=self.folder,
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName="one",
-        )
-        slave.instantiate(
-            eventModeUsed=event_mode,
-            logMessage=lambda _, __, ___, message: self.messages.append(message.decode()),
-        )
-        self.slaves.append(slave)
-        return slave
-
-    def get(self, slave: FMU3Slave, names: list[str]) -> list[float]:
-        """The entries of variables, row by row."""
-        count = sum(self.sizes[name] for name in names)
-        return slave.getFloat64([self.references[name] for name in names], count)
-
-    def scalars(self, name: str) -> list[str]:
-        """As FMI 2.0 calls them."""
-        shape = self.variables[name].shape or ()
-        at = (",".join(str(i + 1) for i in place) for place in np.ndindex(*shape))
-        return [f"{name}[{where}]" for where in at] if shape else [name]
-
-    def outputs(self) -> list[str]:
-        return [name for name, v in self.variables.items() if v.causality == "output"]
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[Opened]:
-    found = Opened(path)
-    try:
-        yield found
-    finally:
-        for slave in found.slaves:
-            slave.freeInstance()
-        shutil.rmtree(found.folder)
-
-
-def initialize(slave: FMU3Slave) -> FMU3Slave:
-    slave.enterInitializationMode(startTime=0.0)
-    slave.exitInitializationMode()
-    return slave
+def variables(path: Path) -> dict[str, Any]:
+    """By name, arrays whole."""
+    described = fmpy.read_model_description(str(path), validate=False)
+    return {v.name: v for v in described.modelVariables}
 
 
 @pytest.mark.parametrize(("scene", "options"), CASES)
 def test_it_has_the_bits_of_the_run(scene: str, options: tuple[str, ...], tmp_path: Path) -> None:
     experiment = run(scene, options, tmp_path)
-    timeline = experiment.system.timeline
-    step = 16 * timeline.clocks[0].longest
-    with opened(program(scene, options, fmi=3)) as fmu:
-        slave, names = initialize(fmu.instance()), fmu.outputs()
-        ticks, values = [0], [fmu.get(slave, names)]
-        while ticks[-1] + step <= timeline.end:
-            slave.doStep(timeline.seconds(ticks[-1]), timeline.seconds(step))
-            ticks.append(ticks[-1] + step)
-            values.append(fmu.get(slave, names))
-        assert fmu.get(slave, ["time"]) == [timeline.seconds(ticks[-1])]
-        sampled = {name for name in names if fmu.variables[name].variability == "discrete"}
-        discrete = {scalar for name in sampled for scalar in fmu.scalars(name)}
-        scalars = [scalar for name in names for scalar in fmu.scalars(name)]
-    found = Outputs(scalars, np.array(ticks), np.array(values), discrete, {})
+    step = 16 * experiment.system.timeline.clocks[0].longest
+    found = outputs(program(scene, options, fmi=3), experiment, step)
     assert [*differing(found, experiment)] == []
 
 
@@ -116,61 +52,41 @@ def test_fmpy_simulates_it_as_that_of_fmi2() -> None:
         simulate_fmu(str(path), stop_time=1.0, output_interval=1 / 512) for path in made.values()
     )
     assert len(three) == 513
-    with opened(made[3]) as fmu:
-        for name in fmu.outputs():
-            expected = np.column_stack([two[scalar] for scalar in fmu.scalars(name)])
+    for name, v in variables(made[3]).items():
+        if v.causality == "output":
+            at = (",".join(str(i + 1) for i in place) for place in np.ndindex(*v.shape or ()))
+            scalars = [f"{name}[{where}]" for where in at] if v.shape else [name]
+            expected = np.column_stack([two[scalar] for scalar in scalars])
             np.testing.assert_array_equal(three[name].reshape(len(three), -1), expected)
 
 
 def test_vectors_and_matrices_are_arrays() -> None:
     """Whole ones with one unit, or their units in the description; a part of one is scalars."""
-    with opened(program("closed-loop", (SECOND,), "hand", fmi=3)) as fmu:
-        inverse = fmu.variables["virtual_environment.Lambda_inv"]
-        assert inverse.shape == (3, 3)
-        assert inverse.unit is None
-        assert "(1/kg, 1/kg, 1/(kg.m), " in inverse.description
-        force = fmu.variables["hand.F"]
-        assert (force.causality, force.start, force.shape) == ("input", "-0.5 0.0 -0.0025", (3,))
-        motor, velocity = fmu.variables["haptic_device.x"], fmu.variables["haptic_device.v"]
-        assert velocity.derivative is motor
-        gain = fmu.variables["controller.k_j"]
-        assert (gain.unit, gain.causality, gain.variability) == ("1/s2", "parameter", "tunable")
-        assert fmu.variables["haptic_device.base_x"].variability == "fixed"
+    found = variables(program("closed-loop", (SECOND,), "hand", fmi=3))
+    inverse = found["virtual_environment.Lambda_inv"]
+    assert inverse.shape == (3, 3)
+    assert inverse.unit is None
+    assert "(1/kg, 1/kg, 1/(kg.m), " in inverse.description
+    force = found["hand.F"]
+    assert (force.causality, force.start, force.shape) == ("input", "-0.5 0.0 -0.0025", (3,))
+    assert found["haptic_device.v"].derivative is found["haptic_device.x"]
+    gain = found["controller.k_j"]
+    assert (gain.unit, gain.causality, gain.variability) == ("1/s2", "parameter", "tunable")
+    assert found["haptic_device.base_x"].variability == "fixed"
     options = (SECOND, 'record.signals=["virtual_mechanism.x[1]", "virtual_mechanism.v"]')
-    with opened(program("closed-loop", options, fmi=3)) as fmu:
-        assert fmu.outputs() == ["virtual_mechanism.x[1]", "virtual_mechanism.v"]
+    found = variables(program("closed-loop", options, fmi=3))
+    recorded = [name for name, v in found.items() if v.causality == "output"]
+    assert recorded == ["virtual_mechanism.x[1]", "virtual_mechanism.v"]
 
 
-def test_a_state_is_saved_restored_and_restored_elsewhere() -> None:
-    with opened(program("closed-loop", (SECOND,), "hand", fmi=3)) as fmu:
-        one, other = initialize(fmu.instance()), initialize(fmu.instance())
-        force, names = [fmu.references["hand.F"]], fmu.outputs()
-
-        def driven(slave: FMU3Slave) -> list[float]:
-            slave.setFloat64(force, [0.3, -0.2, 0.001])
-            slave.doStep(0.2, 0.3)
-            return fmu.get(slave, names)
-
-        one.doStep(0.0, 0.2)
-        state = one.getFMUState()
-        kept = one.serializeFMUState(state)
-        there = driven(one)
-        one.setFMUState(state)
-        assert driven(one) == there
-        own = other.deserializeFMUState(kept)
-        assert other.serializeFMUState(own) == kept
-        other.setFMUState(own)
-        assert driven(other) == there
-        one.freeFMUState(state)
-        other.freeFMUState(own)
-        other.reset()
-        initialize(other).doStep(0.0, 0.2)
-        assert driven(other) == there
+def test_it_lives_as_every_fmu_of_this_project() -> None:
+    assert check_fmu(program("closed-loop", (SECOND,), "hand", fmi=3)) == []
 
 
 def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
-    with opened(program("closed-loop", (SECOND,), "hand", fmi=3)) as fmu:
-        slave, at = fmu.instance(), fmu.references
+    with session(program("closed-loop", (SECOND,), "hand", fmi=3)) as fmu:
+        slave = fmu.instance()
+        at = {v.name: v.valueReference for v in fmu.description.modelVariables}
         nothing = (False, False, True, 0.0)
 
         def fails(call, *arguments) -> str:
@@ -181,19 +97,20 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
         assert fails(slave.doStep, 0.0, 0.1).startswith(
             "fmi3DoStep may not be called: the FMU is i"
         )
-        message = fails(slave.enterInitializationMode, None, 1.0)
+        slave.setupExperiment(1.0)
+        message = fails(slave.enterInitializationMode)
         assert message == "a scene starts at 0 s, not at 1 s"
         initialize(slave)
         message = fails(slave.enterInitializationMode)
         assert message == "fmi3EnterInitializationMode may not be called: the FMU is initialised"
-        force = at["hand.F"]
+        force = at["hand.F[1]"]
         for reference in (force + 1, 99999):
             assert fails(slave.getFloat64, [reference]) == f"unknown value reference {reference}"
         message = fails(slave.setFloat64, [force], [0.0, 0.0])
         assert message == "fmi3SetFloat64 got 2 values for variables of 3 entries"
         message = fails(slave.setFloat64, [force], [0.0, math.nan, 0.0])
         assert message == "hand.F[2] cannot be nan"
-        message = fails(slave.setFloat64, [at["haptic_device.x"]], [0.0] * 3)
+        message = fails(slave.setFloat64, [at["haptic_device.x[1]"]], [0.0] * 3)
         assert message == "haptic_device.x[1] is no input or parameter"
         message = fails(slave.setFloat64, [at["haptic_device.base_x"]], [0.0])
         assert message.startswith("parameter haptic_device.base_x is fixed")
@@ -204,9 +121,15 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
         assert "has no end" in fails(slave.doStep, 0.1, math.inf)
         slave.setFloat64([force], [1e300, 0.0, 0.0])
         assert "the run has diverged" in fails(slave.doStep, 0.1, 0.4)
-        for arguments in ({"event_mode": True}, {"token": "{other}"}):
+        for token, event_mode in ((fmu.description.guid, True), ("{other}", False)):
+            refused = fmu.make(
+                guid=token,
+                unzipDirectory=fmu.folder,
+                modelIdentifier=fmu.description.coSimulation.modelIdentifier,
+                instanceName="one",
+            )
             with pytest.raises(Exception, match="Failed to instantiate"):
-                fmu.instance(**arguments)
+                refused.instantiate(eventModeUsed=event_mode, logMessage=fmu._log)
         assert "the guid {other} is not that" in fmu.messages[-1]
         assert "without event mode" in fmu.messages[-2]
 
@@ -214,19 +137,15 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
 def test_a_condition_to_stop_asks_to_terminate(tmp_path: Path) -> None:
     options = ("duration=0.5", "stop_when=virtual_mechanism.v[1] < -0.3")
     experiment = run("pendulum", options, tmp_path)
-    with opened(program("pendulum", options, fmi=3)) as fmu:
-        slave = initialize(fmu.instance())
-        reached = slave.doStep(0.0, 0.5)
+    path = program("pendulum", options, fmi=3)
+    with session(path) as opened:
+        fmu = Named(opened).start()
+        reached = fmu.slave.doStep(0.0, 0.5)
         assert reached == (False, True, False, experiment.outcome.end_time)
-        names = [column for column in experiment.results.haptics.columns[1:]]
-        values = dict(
-            zip(
-                (scalar for name in fmu.outputs() for scalar in fmu.scalars(name)),
-                fmu.get(slave, fmu.outputs()),
-                strict=True,
-            )
-        )
-        assert [values[n] for n in names] == experiment.results.haptics.rows[-1, 1:].tolist()
+        time = variables(path)["time"].valueReference
+        assert fmu.slave.getFloat64([time]) == [experiment.outcome.end_time]
+        rows = experiment.results.haptics
+        assert fmu.get(*rows.columns[1:]) == rows.rows[-1, 1:].tolist()
 
 
 def test_hapticlink_runs_it(tmp_path: Path) -> None:

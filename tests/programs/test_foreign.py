@@ -13,13 +13,14 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 
-from hapticlink.fmus.check import check_fmu, initialize, session
+from hapticlink.fmus.check import check_fmu, session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.programs.build import build_program, program_files
 from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
+from tests.fmus.named_fmu import Named
 from tests.orchestrator import c_fmus, foreign_scenes, native_mass
 from tests.programs import test_page_program
 from tests.programs.built import needs_compiler, program
@@ -96,19 +97,14 @@ def test_the_values_of_its_types_and_its_resources_arrive(two: str, tmp_path: Pa
     assert {float(v) for v in experiment.results.haptics["fast.size"]} == {7.0}
     with session(program(two)) as opened:
         variables = {v.name: v for v in opened.description.modelVariables}
-        slave = opened.instance()
-        initialize(slave)
-        slave.doStep(0.0, 0.5)
-
-        def value(name: str) -> float:
-            return slave.getReal([variables[name].valueReference])[0]
-
-        assert (value("fast.gain"), value("fast.size"), value("fast.steps")) == (2.5, 7.0, 32.0)
-        assert (value("slow.scale"), value("slow.u")) == (1.0, 3.0)
-        before = value("fast.y")
-        slave.setReal([variables["fast.scale"].valueReference], [0.0])
-        slave.doStep(0.5, 0.25)
-        assert value("fast.y") == before
+        one = Named(opened).start()
+        one.step(0.0, 0.5)
+        assert one.get("fast.gain", "fast.size", "fast.steps") == [2.5, 7.0, 32.0]
+        assert one.get("slow.scale", "slow.u") == [1.0, 3.0]
+        before = one.get("fast.y")
+        one.set(**{"fast.scale": 0.0})
+        one.step(0.5, 0.25)
+        assert one.get("fast.y") == before
         assert variables["slow.scale"].variability == "tunable"
         assert variables["fast.y"].unit == "mm"
 
@@ -118,10 +114,8 @@ def test_what_one_of_its_fmus_lacks_the_program_lacks(two: str) -> None:
         simulation = opened.description.coSimulation
         assert not simulation.canGetAndSetFMUstate
         assert not simulation.canSerializeFMUstate
-        slave = opened.instance()
-        initialize(slave)
         with pytest.raises(FMICallException):
-            slave.getFMUState()
+            Named(opened).start().slave.getFMUState()
         assert "fast is an FMU that does not offer this" in opened.messages[-1]
 
 
@@ -164,15 +158,14 @@ def test_an_fmu_that_ends_the_simulation_ends_the_program(
     experiment = simulate(path, tmp_path / "run")
     assert experiment.outcome.end_time == end
     with session(program(path)) as opened:
-        slave = opened.instance()
-        initialize(slave)
+        one = Named(opened).start()
         for i in range(int(end)):
-            slave.doStep(i, 1.0)
+            one.step(i, 1.0)
         with pytest.raises(FMICallException) as ended:
-            slave.doStep(end, 1.0)
+            one.step(end, 1.0)
         assert ended.value.status == DISCARD
         over = ctypes.c_int()
-        slave.fmi2GetBooleanStatus(slave.component, IS_TERMINATED, ctypes.byref(over))
+        one.slave.fmi2GetBooleanStatus(one.slave.component, IS_TERMINATED, ctypes.byref(over))
         assert over.value
         assert act in opened.messages[-1]
 
@@ -186,10 +179,9 @@ def test_a_failure_names_the_fmu_and_passes_its_message_on(
     table_fmu(tmp_path)
     path = scene(tmp_path, fmu("weak", "table", f"start = {{ {failure} }}\n"))
     with session(program(path)) as opened:
-        slave = opened.instance()
-        initialize(slave)
+        one = Named(opened).start()
         with pytest.raises(FMICallException) as failed:
-            slave.doStep(0.0, 1.0)
+            one.step(0.0, 1.0)
         assert failed.value.status == status
         own, last = opened.messages[-2:]
         assert own == "table: 3 steps of mine, 100%% of them"  # a format, which has no arguments

@@ -17,6 +17,7 @@ from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.programs.build import build_program, program_files
+from tests.fmus.named_fmu import Named
 from tests.programs import life
 from tests.programs.built import COMPILER, FLAGS, needs_compiler, program, sources
 from tests.programs.comparison import differing, outputs, run
@@ -145,12 +146,10 @@ def test_without_the_hand_its_force_is_an_input(tmp_path: Path) -> None:
         inputs = {v.name: v for v in opened.description.modelVariables if v.causality == "input"}
         assert [*inputs] == ["hand.F[1]", "hand.F[2]", "hand.F[3]"]
         assert [float(v.start) for v in inputs.values()] == [0.4, 0.1, 0.0]
-        slave = opened.instance()
-        initialize(slave)
-        slave.setReal([inputs["hand.F[1]"].valueReference], [-0.4])
-        slave.doStep(0.0, 0.25)
-        x = next(v for v in opened.description.modelVariables if v.name == "haptic_device.x[1]")
-        moved = slave.getReal([x.valueReference])[0]
+        fmu = Named(opened).start()
+        fmu.set(**{"hand.F[1]": -0.4})
+        fmu.step(0.0, 0.25)
+        (moved,) = fmu.get("haptic_device.x[1]")
     row = found.values[found.ticks.tolist().index(240 * 8), found.names.index("haptic_device.x[1]")]
     assert moved < row
 
@@ -158,17 +157,14 @@ def test_without_the_hand_its_force_is_an_input(tmp_path: Path) -> None:
 def test_a_time_between_ticks_is_the_tick_before() -> None:
     path = program("pendulum", (HALF,))
     with session(path) as opened:
-        references = [v.valueReference for v in opened.description.modelVariables
-                      if v.causality == "output"]  # fmt: skip
-        one, two = opened.instance("one"), opened.instance("two")
-        initialize(one)
-        initialize(two)
-        one.doStep(0.0, 3.4 / 512)
-        two.doStep(0.0, 3 / 512)
-        assert one.getReal(references) == two.getReal(references)
-        one.doStep(3.4 / 512, 0.6 / 512)
-        two.doStep(3 / 512, 1 / 512)
-        assert one.getReal(references) == two.getReal(references)
+        outputs = [v.name for v in opened.description.modelVariables if v.causality == "output"]
+        one, two = (Named(opened, name).start() for name in ("one", "two"))
+        one.step(0.0, 3.4 / 512)
+        two.step(0.0, 3 / 512)
+        assert one.get(*outputs) == two.get(*outputs)
+        one.step(3.4 / 512, 0.6 / 512)
+        two.step(3 / 512, 1 / 512)
+        assert one.get(*outputs) == two.get(*outputs)
 
 
 @pytest.mark.parametrize("scene", ["closed-loop", "five-bar"])
@@ -177,24 +173,24 @@ def test_outputs_depend_at_once_on_the_inputs_that_are_listed_alone(scene: str) 
     closed loop none."""
     with session(program(scene, (HALF,), "hand")) as opened:
         variables = opened.description.modelVariables
-        outputs = [v.valueReference for v in variables if v.causality == "output"]
-        depends = {u.variable.valueReference: [d.name for d in u.dependencies]
-                   for u in opened.description.outputs}  # fmt: skip
-        slave = opened.instance()
-        initialize(slave)
-        slave.doStep(0.0, 0.1)
+        outputs = [v.name for v in variables if v.causality == "output"]
+        depends = {
+            u.variable.name: [d.name for d in u.dependencies] for u in opened.description.outputs
+        }
+        fmu = Named(opened).start()
+        fmu.step(0.0, 0.1)
         changed = set()
-        for v in (v for v in variables if v.causality == "input"):
-            before = slave.getReal(outputs)
-            slave.setReal([v.valueReference], [slave.getReal([v.valueReference])[0] + 0.5])
-            after = slave.getReal(outputs)
-            at_once = {r for r, a, b in zip(outputs, before, after, strict=True) if a != b}
-            assert all(v.name in depends[r] for r in at_once)
+        for name in (v.name for v in variables if v.causality == "input"):
+            before = fmu.get(*outputs)
+            fmu.set(**{name: fmu.get(name)[0] + 0.5})
+            after = fmu.get(*outputs)
+            at_once = {n for n, a, b in zip(outputs, before, after, strict=True) if a != b}
+            assert all(name in depends[output] for output in at_once)
             changed |= at_once
-        assert changed == {r for r, names in depends.items() if names}
+        assert changed == {output for output, names in depends.items() if names}
         assert bool(changed) == (scene == "five-bar")
-        slave.doStep(0.1, 0.1)
-        assert slave.getReal(outputs) != after
+        fmu.step(0.1, 0.1)
+        assert fmu.get(*outputs) != after
 
 
 def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
@@ -235,20 +231,16 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
 def test_a_run_that_diverges_names_the_output() -> None:
     path = program("closed-loop", DELAYED, "hand")
     with session(path) as opened:
-        force = [v.valueReference for v in opened.description.modelVariables
-                 if v.causality == "input"]  # fmt: skip
-        slave = opened.instance()
-        initialize(slave)
-        slave.setReal(force[:1], [1e300])
+        fmu = Named(opened).start()
+        fmu.set(**{"hand.F[1]": 1e300})
         with pytest.raises(FMICallException):
-            slave.doStep(0.0, 0.4)
+            fmu.step(0.0, 0.4)
         assert re.fullmatch(r"output [a-z_]+\.\S+ is .* at t = 0 s: .*", opened.messages[-1])
         with pytest.raises(FMICallException):
-            slave.doStep(0.0, 0.1)
+            fmu.step(0.0, 0.1)
         assert "has failed; reset it or restore a state" in opened.messages[-1]
-        slave.reset()
-        initialize(slave)
-        slave.doStep(0.0, 0.1)
+        fmu.slave.reset()
+        fmu.start().step(0.0, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -282,15 +274,13 @@ def test_a_condition_to_stop_ends_the_simulation(tmp_path: Path) -> None:
     experiment = run("pendulum", options, tmp_path)
     assert experiment.outcome.reason == "stop_when"
     with session(program("pendulum", options)) as opened:
-        slave = opened.instance()
-        initialize(slave)
+        fmu = Named(opened).start()
+        slave = fmu.slave
         with pytest.raises(FMICallException) as ended:
-            slave.doStep(0.0, 0.5)
+            fmu.step(0.0, 0.5)
         assert ended.value.status == DISCARD
-        names = {v.name: v.valueReference for v in opened.description.modelVariables}
-        columns = experiment.results.haptics.columns[1:]
-        values = slave.getReal([names[column] for column in columns])
-        assert values == experiment.results.haptics.rows[-1, 1:].tolist()
+        rows = experiment.results.haptics
+        assert fmu.get(*rows.columns[1:]) == rows.rows[-1, 1:].tolist()
         time, terminated = ctypes.c_double(), ctypes.c_int()
         slave.fmi2GetRealStatus(slave.component, LAST_SUCCESSFUL_TIME, ctypes.byref(time))
         slave.fmi2GetBooleanStatus(slave.component, IS_TERMINATED, ctypes.byref(terminated))

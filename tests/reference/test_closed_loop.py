@@ -5,17 +5,19 @@ import pytest
 
 from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.experiment import simulate
+from tests.shared_fixtures import run_once
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
+def runs():
     """(topology, bias) -> results of `closed-loop` at 30 Hz."""
-    found = {}
-    for topology, bias in (("true", "none"), ("false", "none"), ("true", "full")):
-        options = [f"controller.topology={topology}", f"controller.bias={bias}"]
-        experiment = simulate("closed-loop", tmp_path_factory.mktemp("run"), options)
-        assert experiment.outcome.fault is None
-        found[topology, bias] = experiment.results
+    options = {
+        ("true", "none"): (),
+        ("false", "none"): ("controller.topology=false",),
+        ("true", "full"): ("controller.bias=full",),
+    }
+    found = {of: run_once("closed-loop", given) for of, given in options.items()}
+    assert all(run.fault is None for run in found.values())
     return found
 
 
@@ -31,15 +33,6 @@ def test_distance_with_and_without_the_topology_controller(runs):
 
 def test_distance_with_velocity_terms_sent(runs):
     assert tracking(runs["true", "full"])[1].max() < 1
-
-
-def test_leaving_the_workspace_ends_in_good_order(tmp_path):
-    """Without the topology controller the handle leaves; at 10 Hz well before the 3 s."""
-    options = ["controller.topology=false", "graphics.rate=10"]
-    run = simulate("closed-loop", tmp_path, options).results.run
-    assert run["end"]["reason"] == "stop_when"
-    assert 1.5 < run["end"]["time"] < 2.5
-    assert run["fault"] is None
 
 
 def test_device_accelerates_as_the_mechanism_at_the_start(runs):

@@ -15,8 +15,6 @@ from benchmarks.cosimulation.points import CONTACT, LOOP, Point, points
 from benchmarks.rows import Rows
 from hapticlink.orchestrator import open_scene
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 ENDS = {LOOP: 0.5, CONTACT: 0.625}
 """After a change of the number of constrained directions, and after a contact has begun (s)."""
 TOLERANCE = {"rtol": 1e-9, "atol": 1e-11}

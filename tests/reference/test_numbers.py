@@ -12,19 +12,12 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
+from tests.mechanisms import MOBILITY, WRENCH
 
 Q = (0.784991951649258, -1.572795639643859, -1.25622704583455, 1.570109063323428)
 QDD = (4.287604403298784, -8.025937758732525, -12.053370282343105, 13.642585235436435)
 MULTIPLIERS = (0.201619247044097, 0.050598224334071)
-MOBILITY = np.array(
-    [
-        [0.3415204956524712, -0.1971892092835345, 4.867264929294315],
-        [-0.1971892092835345, 0.5132939799057613, 10.63410376500779],
-        [4.867264929294315, 10.63410376500779, 521.8803563146321],
-    ]
-)
 EIGENVALUES = (0.0, 0.59269813383711, 522.142472656353)
-WRENCH = (-0.5, 0.0, -0.0025)
 
 
 @pytest.fixture(scope="module")

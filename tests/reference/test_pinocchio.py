@@ -67,7 +67,7 @@ def open_tree(linkage, q, qd, F):
     return [np.abs(size).max(initial=1e-3) for size in sizes]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(linkages(), st.integers(0, 2**31))
 def test_random_linkages_in_motion(drawn, seed):
     linkage, q, qd = drawn
@@ -92,7 +92,7 @@ def exact(linkage, q, qd, F):
     return found[:n, 0], found[n:, 0], J @ found[:n, 1:]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(linkages(max_bodies=6), st.integers(0, 2**31))
 def test_masses_of_any_ratio(drawn, seed):
     """Each body's between 1e-4 and 1e4 times what was drawn; sizes are those of the open tree."""

@@ -1,15 +1,49 @@
-"""One page for all tests of a module."""
+"""One page and one browser for all tests of a module."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from tests.visualization.browser_code.served_page import Served
 
+if TYPE_CHECKING:
+    from tests.visualization.browser_code.chromium import Page
+
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with Served(tmp_path_factory.mktemp("view")) as page:
+def served(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Served]:
+    """`view` of the scene that the module calls SERVED, by default one with a free direction."""
+    scene = getattr(request.module, "SERVED", "scene.toml")
+    with Served(tmp_path_factory.mktemp("view"), scene=scene) as page:
         yield page
+
+
+@pytest.fixture(scope="module")
+def browser(request: pytest.FixtureRequest) -> Iterator[Any]:
+    """Chromium, in which a module that says BYPASS_CSP = False does nothing that pages forbid."""
+    from tests.visualization.browser_code.chromium import chromium  # skips where it is not
+
+    with chromium(getattr(request.module, "BYPASS_CSP", True)) as opened:
+        yield opened
+
+
+@pytest.fixture
+def window(browser: Any) -> Iterator[Callable[..., Page]]:
+    """(url, ...) -> its page, in which nothing goes wrong until it is closed after the test."""
+    from tests.visualization.browser_code.chromium import Page
+
+    pages: list[Page] = []
+
+    def opened(url: str, *size: int, **settings: Any) -> Page:
+        pages.append(Page(browser, url, *size, **settings))
+        return pages[-1]
+
+    yield opened
+    for page in pages:
+        assert page.faults == []
+        page.page.close()

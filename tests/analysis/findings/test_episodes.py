@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 import hapticlink as hl
 from hapticlink.analysis.findings.episodes import Episode, episodes, spans
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 
 @given(st.lists(st.booleans(), min_size=1, max_size=40))
 def test_spans_hold_the_samples_that_have_it_and_no_others(holds: list[bool]) -> None:

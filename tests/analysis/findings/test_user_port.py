@@ -14,8 +14,6 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.figures.run_figures import figures
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 
 @cache
 def account(scene: str, *options: str) -> tuple[Results, UserPort | None]:
@@ -131,12 +129,17 @@ def test_a_force_that_is_lost_or_overtaken_does_not_act(link: dict[str, float]) 
     np.testing.assert_allclose(port.generated_J, expected, atol=1e-9 * np.abs(work).max())
 
 
-def test_a_meter_that_stops_between_two_frames() -> None:
-    """A hand half a tick beside the others: its work until the last frame is that of its samples,
-    whatever the energy between the frames before."""
-    options = ["duration=0.5", "phases.hand=1/1024", "hand.wrench=[-0.5, 0.0, 0.0]"]
-    results, port = with_port("closed-loop-direct", *options)
+@pytest.mark.parametrize(
+    ("options", "goes_on"),
+    [(("duration=0.5", "phases.hand=1/1024"), False), (("duration=0.6", "graphics.rate=60"), True)],
+)
+def test_a_meter_that_ends_beside_the_last_frame(options: tuple[str, ...], goes_on: bool) -> None:
+    """A hand half a tick beside the others, whatever the energy between the frames before; and a
+    meter with ticks after that frame: its work until then is that of its constant wrench."""
+    results, port = with_port("closed-loop-direct", *options, "hand.wrench=[-0.5, 0.0, 0.0]")
     frames, ticks = results.graphics, results.haptics
+    until = results.record.meters["hand.F -> haptic_device.F_hand"].until
+    assert (until > port.time_s[-1] + 0.01) == goes_on
     x = np.interp(frames["time"], ticks["time"], ticks["haptic_device.x_true"][:, 0])
     energy = frames["virtual_mechanism.energy"]
     np.testing.assert_allclose(port.generated_J, energy - energy[0] + 0.5 * (x - x[0]), atol=1e-12)
@@ -155,19 +158,6 @@ def test_a_run_that_ends_beside_a_frame() -> None:
     energy = frames["virtual_mechanism.energy"]
     lost = port.blocks_J["mechanism"][-1]
     assert lost == pytest.approx(energy[-1] - energy[0] - work, abs=1e-9)
-
-
-def test_a_meter_that_goes_on_after_the_last_frame() -> None:
-    """The hand's work until the mechanism's last frame is that of its constant wrench until then,
-    without that of the ticks after it, which the meter has."""
-    options = ["duration=0.6", "graphics.rate=60", "hand.wrench=[-0.5, 0.0, 0.0]"]
-    results, port = with_port("closed-loop-direct", *options)
-    frames, ticks = results.graphics, results.haptics
-    until = results.record.meters["hand.F -> haptic_device.F_hand"].until
-    assert until > port.time_s[-1] + 0.01
-    x = np.interp(frames["time"], ticks["time"], ticks["haptic_device.x_true"][:, 0])
-    energy = frames["virtual_mechanism.energy"]
-    np.testing.assert_allclose(port.generated_J, energy - energy[0] + 0.5 * (x - x[0]), atol=1e-12)
 
 
 def test_a_hold_of_its_drift_force_is_that_of_the_meter() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import ClassVar
 from weakref import WeakSet
@@ -31,19 +31,26 @@ CASES = {
 }
 
 
-def results(folder: Path, monkeypatch: pytest.MonkeyPatch, scene: str, *options: str) -> Results:
-    simulate(scene, folder, options, keep_rows=True)
+Ran = Callable[..., Results]
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ran:
+    """(scene, *options, folder=tmp_path) -> a run that is read in windows."""
     monkeypatch.setattr(windows, "WINDOW_BYTES", 40_000)
-    found = windows.opened(folder)
-    assert found.number > 3
-    return found
+
+    def ran(scene: str, *options: str, folder: Path = tmp_path) -> Results:
+        simulate(scene, folder, options, keep_rows=True)
+        found = windows.opened(folder)
+        assert found.number > 3
+        return found
+
+    return ran
 
 
 @pytest.mark.parametrize("scene", CASES)
-def test_windows_give_what_the_whole_tables_give(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scene: str
-) -> None:
-    found = results(tmp_path, monkeypatch, scene, "duration=1", *CASES[scene])
+def test_windows_give_what_the_whole_tables_give(tmp_path: Path, results: Ran, scene: str) -> None:
+    found = results(scene, "duration=1", *CASES[scene])
     whole = load(tmp_path, binary=True)
     of, all_of = Measures(found), Measures(whole)
     for name in ("forces", "motors", "closure_m", "constrained", "folded", "port", "saturations"):
@@ -62,19 +69,17 @@ def test_windows_give_what_the_whole_tables_give(
 
 
 @pytest.mark.parametrize("late", ["virtual_mechanism.x", "virtual_mechanism.P_c"])
-def test_samples_that_come_in_a_later_window(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, late: str
-) -> None:
+def test_samples_that_come_in_a_later_window(tmp_path: Path, results: Ran, late: str) -> None:
     delay = f"delays.{late}={{ min = 0.001, max = 0.09, loss = 0.1, seed = 3 }}"
-    found = results(tmp_path, monkeypatch, "closed-loop-direct", "duration=1", delay)
+    found = results("closed-loop-direct", "duration=1", delay)
     assert Measures(found).port == Measures(load(tmp_path, binary=True)).port
 
 
-def test_no_window_grows_with_the_duration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_window_grows_with_the_duration(tmp_path: Path, results: Ran) -> None:
     most = []
     for duration in (1, 4):
         folder = tmp_path / str(duration)
-        found = results(folder, monkeypatch, "closed-loop", f"duration={duration}")
+        found = results("closed-loop", f"duration={duration}", folder=folder)
         rows = [sum(t.rows.nbytes for t in w.tables.values()) for w in found.windows()]
         kept = [np.flatnonzero(np.diff(w.tables["haptics"]["time"])) for w in found.windows()]
         assert sum(map(len, kept)) >= duration * 512
@@ -96,11 +101,11 @@ class Kept(Streamed):
 
 
 def test_windows_that_were_read_do_not_stay_in_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    results: Ran, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Not until a collection of garbage either, which arrays do not count for."""
     monkeypatch.setattr(windows, "Streamed", Kept)
-    found = results(tmp_path, monkeypatch, "closed-loop", "duration=1")
+    found = results("closed-loop", "duration=1")
     gc.disable()
     try:
         assert [*summary.lines(found), *summary.numbers(found), *episodes(found)]
@@ -112,9 +117,9 @@ def test_windows_that_were_read_do_not_stay_in_memory(
 
 
 def test_tables_of_a_long_run_are_read_when_they_are_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, results: Ran
 ) -> None:
-    found = results(tmp_path, monkeypatch, "closed-loop", "duration=1")
+    found = results("closed-loop", "duration=1")
     whole = load(tmp_path)
     for table in tmp_path.glob("*.rows"):
         table.unlink()

@@ -12,8 +12,3 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin
 def no_margins(monkeypatch: pytest.MonkeyPatch) -> None:
     """Verdicts come without margins and remedies, which are most of their time."""
     monkeypatch.setattr(scene_stability, "improvements", lambda *_: (Margin(None, None, None), ()))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _fmus_stay_unpacked(fmus_unpacked_once: None) -> None:
-    """From one run to the next."""

@@ -23,6 +23,9 @@ from hapticlink.analysis.stability.modes import (
 )
 from hapticlink.analysis.stability.poses import in_own_hand
 
+BILATERAL = {"fmu.wall.settings.unilateral": False, "hand.wrench": [0.0, 0.0, 0.0]}
+"""Options of `virtual-wall` with which it pulls as it pushes, and nobody pushes against it."""
+DAMPED: dict[str, Any] = BILATERAL | {"fmu.wall.settings.damping": 1.0}
 LOST = 1e-6
 """Modes with a smaller |z| have vanished within a period."""
 

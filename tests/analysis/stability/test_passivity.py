@@ -12,6 +12,7 @@ from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.port_response import hand_port, mechanism_port
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.system.build_system import built
+from tests.analysis.stability.own_hand import DAMPED as WALL
 
 T = 1 / 512
 HELD: dict[str, Any] = {
@@ -20,11 +21,6 @@ HELD: dict[str, Any] = {
         "target": [[0.0, 0.035, 0.025, -0.785]],
     }
 }  # fmt: skip
-WALL: dict[str, Any] = {
-    "fmu.wall.settings.unilateral": False,
-    "fmu.wall.settings.damping": 1.0,
-    "hand.wrench": [0.0, 0.0, 0.0],
-}
 
 
 @pytest.mark.parametrize(

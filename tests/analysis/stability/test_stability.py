@@ -16,8 +16,8 @@ from hapticlink.analysis.stability.forward_sensitivity import KINK
 from hapticlink.analysis.stability.hand_cases import SLIGHT
 from hapticlink.analysis.stability.modes import Linearisation, counted, modes, verdict
 from hapticlink.analysis.stability.smooth_scene import linearisable
-from hapticlink.commands import main
 from tests.analysis.stability.own_hand import own_hand
+from tests.shared_fixtures import status
 
 T = 1 / 512
 HELD: dict[str, Any] = {
@@ -307,7 +307,6 @@ def test_every_kind_of_fmu_has_the_same_map(
 @pytest.mark.parametrize(
     ("hold", "weights"),
     [
-        ("zoh", (1.0,)),
         ("foh", (1.5, -0.5)),
         ("lead", (1.5, -0.5)),
         ("second-order", (15 / 8, -10 / 8, 3 / 8)),
@@ -315,7 +314,8 @@ def test_every_kind_of_fmu_has_the_same_map(
     ],
 )
 def test_the_memory_of_a_hold_is_part_of_the_state(hold: str, weights: tuple[float, ...]) -> None:
-    """The mass takes the mean over its step of the force that is extrapolated from samples."""
+    """The mass takes the mean over its step of the force that is extrapolated from samples; `zoh`,
+    whose memory is none, is that of test_a_sampled_spring_has_the_eigenvalues_of_its_map."""
     found = own_hand("sampled-spring", {"holds": {"hand.F": hold}})
     h, A = 0.05, np.eye(4, k=-1)  # of x_k, x_{k-1}, x_{k-2} and, in the last row, v
     A[0] = A[3] = 0.0
@@ -338,10 +338,7 @@ def test_friction_and_quanta_are_taken_out_and_named(wall_radius: float) -> None
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], wall_radius: float) -> None:
     """The wall in the hand of the scene, and the closed form of its port: K T/2."""
-    command = ["stability", "virtual-wall", "--equilibrium", "--port", "--out", str(tmp_path)]
-    with pytest.raises(SystemExit) as ended:
-        main(command)
-    assert ended.value.code == 0
+    assert status("stability", "virtual-wall", "--equilibrium", "--port", "--out", tmp_path) == 0
     out = capsys.readouterr().out
     assert out.startswith("virtual-wall: stable in the scene's own hand and 1 pose")
     record = json.loads((tmp_path / "stability.json").read_text())

@@ -212,7 +212,7 @@ def test_one_table_whatever_the_processes(bar: Path, tmp_path: Path) -> None:
 
 
 def test_a_process_of_many_runs_makes_each_as_a_process_of_its_own(
-    tmp_path: Path, own_temporary_folder: Path
+    tmp_path: Path, emptied_temporary_folder: Path
 ) -> None:
     """Rates, holds and masses in turn: the bytes of single runs, FMUs in their place from the first
     run on, and nothing left."""
@@ -234,13 +234,13 @@ def test_a_process_of_many_runs_makes_each_as_a_process_of_its_own(
     with process_cache.unpacked_once():
         for _ in range(3):
             assert [rows(job) for job in made] == single
-            mapped.append(Path("/proc/self/maps").read_text().count(str(own_temporary_folder)))
-            folders.append(len([*own_temporary_folder.iterdir()]))
+            mapped.append(Path("/proc/self/maps").read_text().count(str(emptied_temporary_folder)))
+            folders.append(len([*emptied_temporary_folder.iterdir()]))
         assert mapped[0] == mapped[-1]
         assert folders[0] == folders[-1]
         process_cache.trim(1)
-        assert len([*own_temporary_folder.iterdir()]) == 1
-    assert not [*own_temporary_folder.iterdir()]
+        assert len([*emptied_temporary_folder.iterdir()]) == 1
+    assert not [*emptied_temporary_folder.iterdir()]
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -29,8 +29,6 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.overrides import written
 from tests.analysis.stability.own_hand import linearised
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 RECORDED = Path(__file__).parents[3] / "results" / "tune"
 NO_ENCODER = ("device.encoder_resolution=1e-12",)
 """The map has no quantisation."""

@@ -12,17 +12,11 @@ from hapticlink.components.control import topology
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
 from tests.blocks import Running
+from tests.mechanisms import MOBILITY as LAMBDA_INV
+from tests.mechanisms import WRENCH
 
 L = 0.042
-# Lambda^-1 of the report's five-bar at rest, Table 6.1, and a wrench of the hand
-LAMBDA_INV = np.array(
-    [
-        [0.3415204956524712, -0.1971892092835345, 4.867264929294315],
-        [-0.1971892092835345, 0.5132939799057613, 10.63410376500779],
-        [4.867264929294315, 10.63410376500779, 521.8803563146321],
-    ]
-)
-F_HAND = np.array([-0.5, 0.0, -0.0025])
+F_HAND = np.array(WRENCH)
 M = np.array([[0.27, 0.012, 4e-4], [0.012, 0.24, -3e-4], [4e-4, -3e-4, 3.1e-4]])
 ALONE = {"teleoperation": False, "topology": False}
 directions = st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=0, max_size=3)
@@ -174,7 +168,7 @@ def test_bias_needs_the_impedance_law():
         controller(Controller(impedance=False, bias="full"), L)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(directions)
 def test_constraint_map_is_symmetric_and_semidefinite(vectors):
     G = constraint_map(projector(vectors))
@@ -182,7 +176,7 @@ def test_constraint_map_is_symmetric_and_semidefinite(vectors):
     assert np.linalg.eigvalsh(G)[0] > -1e-14
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(directions, pulls, pulls)
 def test_constraint_wrench_does_no_work_on_free_motion(vectors, pull, motion):
     P, S = projector(vectors), np.diag([1, 1, L])
@@ -202,7 +196,7 @@ def test_constraint_wrench_does_no_work_on_free_motion_at_any_scale():
         np.testing.assert_allclose(F_T[n], F_T[L], rtol=1e-8)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(pulls)
 def test_constraint_wrench_at_both_ends(pull):
     """No constrained direction: no wrench. All: the device's whole inertia, M_d pull."""

@@ -1,5 +1,7 @@
 """The haptic device as a block: motion, sensing, and what it leaves out."""
 
+import typing
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from scipy.integrate import solve_ivp
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.device import pantograph
 from hapticlink.components.specs.device import Device, Observer
+from hapticlink.components.specs.quantities import Quantity
 from tests.blocks import Running, advance
 
 T = 1 / 512
@@ -157,3 +160,20 @@ def test_workspace_margin_and_stop():
         least = min(least, device.y["workspace_margin"])
     assert -0.01 < least < 0
     assert np.isfinite(device.x).all()
+
+
+def declared():
+    """The unit of each key of the scene, by its name."""
+    found = {}
+    for record in (Device, Observer):
+        for name, hint in typing.get_type_hints(record, include_extras=True).items():
+            beside = getattr(hint, "__metadata__", ())
+            found.update((name, each.unit) for each in beside if isinstance(each, Quantity))
+    return found
+
+
+def test_a_parameter_has_the_unit_that_the_scene_s_key_declares():
+    component, keys = haptic_device(Device(motor_friction=0.01), encoders=True), declared()
+    units = {p.name: p.unit for p in component.parameters if p.name != "x_start"}
+    assert len(keys) == 26
+    assert units == {name: unit for name, unit in keys.items() if name != "substeps"}  # structure

@@ -7,7 +7,6 @@ from scipy.optimize import minimize
 
 from hapticlink.components.dynamics.assembly import AssemblyError
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.specs.linkage import Directions
 from tests.blocks import Running, order, running
 from tests.components import appendix_a
 from tests.components.appendix_a import L
@@ -83,7 +82,8 @@ def test_projection_keeps_closure_to_rounding_and_the_order(method):
 
 
 def test_closure_under_semi_implicit_euler():
-    """Figures 3.3 and 3.4: it drifts, and Baumgarte at dead beat holds it to 9 um."""
+    """Figures 3.3 and 3.4: it drifts without (B.17)'s w_stab, Baumgarte at dead beat holds it to
+    9 um."""
     euler = {"step_s": 1 / 512, "integrator": "semi-implicit-euler"}
     drift, held = (
         largest_gap(running(five_bar(), **euler, stabilization=kind), 3 * 512, 3.0)
@@ -94,11 +94,8 @@ def test_closure_under_semi_implicit_euler():
     assert held < 1e-3 * min(L)
 
 
-def test_open_loop_has_no_multiplier_and_the_mobility_of_5_4():
-    y = running(open_arm(five_bar()), directions=Directions()).y
-    assert not {"lambda", "closure_error"} & set(y)
-    J_h, D = appendix_a.J_h(Q0), appendix_a.D(Q0)
-    np.testing.assert_allclose(y["Lambda_inv"], J_h @ np.linalg.solve(D, J_h.T), rtol=1e-12)
+def test_an_open_chain_has_no_multiplier():
+    assert not {"lambda", "closure_error"} & set(running(open_arm(five_bar())).y)
 
 
 def test_energy_is_the_work_of_the_hand():

@@ -75,7 +75,7 @@ def test_rank_drops_where_the_rods_line_up():
     assert block.y["rank"] == 1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(linkages(), st.integers(1, 2))
 def test_rank_and_condition_against_singular_values(drawn, times):
     """Every loop once, or twice: redundant closures."""

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.linalg import expm
 
 from hapticlink.components.device import discretisation
 
@@ -46,7 +45,7 @@ def test_printed_trapezoid_does_not_integrate_a_constant():
 
 
 @pytest.mark.parametrize("rule", RULES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(re=st.floats(-50, 50), im=st.floats(-50, 50), period=st.floats(1e-3, 0.5))
 def test_poles_go_where_the_map_says(rule, re, im, period):
     A = np.array([[re, im], [-im, re]])
@@ -72,19 +71,6 @@ def test_image_of_the_left_half_plane():
     edge = 1j * np.linspace(-500, 500, 81)
     np.testing.assert_allclose(np.abs(discretisation.pole("backward", edge) - 0.5), 0.5, rtol=1e-12)
     np.testing.assert_allclose(np.abs(discretisation.pole("trapezoidal", edge)), 1, rtol=1e-12)
-
-
-@pytest.mark.parametrize(("rule", "order"), [("forward", 1), ("backward", 1), ("trapezoidal", 2)])
-def test_order(rule, order):
-    steps = np.array([20, 40, 80, 160])
-    errors = []
-    for n in steps:
-        x = np.array([[1.0], [0.5]])
-        for _ in range(n):
-            x = step(rule, A, B, x, [0, 0], [0, 0], 0.2 / n)
-        errors.append(np.abs(x - expm(0.2 * A) @ [[1.0], [0.5]]).max())
-    slope = np.polyfit(np.log(0.2 / steps), np.log(errors), 1)[0]
-    assert slope == pytest.approx(order, abs=0.25)
 
 
 def test_unknown_rule_names_the_choices():

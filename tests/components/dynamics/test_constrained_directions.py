@@ -41,7 +41,7 @@ def symmetric(v):
     return np.array([[v[0], v[1], v[2]], [v[1], v[3], v[4]], [v[2], v[4], v[5]]])
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(entries)
 def test_eigenvalues_are_those_of_lapack(v):
     M = symmetric(v)
@@ -52,7 +52,7 @@ def test_eigenvalues_are_those_of_lapack(v):
     np.testing.assert_allclose(vectors.T @ vectors, np.eye(3), atol=1e-14)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(entries, st.integers(0, 3))
 def test_projector_is_orthogonal_of_that_rank(v, number):
     P = np.array(PROJECTOR(symmetric(v), number))

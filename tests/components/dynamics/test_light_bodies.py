@@ -115,7 +115,7 @@ def spread(draw):
     return replace(linkage, body=body), q, qd, rng
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(spread())
 def test_random_linkages_are_as_exact_as_their_last_digits(drawn):
     """The error is within 1000 times of what a change of every length, angle, rate, mass and

@@ -48,7 +48,7 @@ def masses(prefix, factor):
     return each | {f"{prefix}{name}.inertia": inertia * factor for name, _, inertia in MASSES}
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.floats(-4, 4), st.floats(-4, 4))
 def test_two_linkages_move_as_each_alone(first, other):
     s = 10.0**first, 10.0**other

@@ -42,7 +42,7 @@ def solution(model, F):
     return *space.motion(model.J_h.T @ F), space.Lambda_inv
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(linkages(), st.floats(-3, 3), st.integers(0, 2**31))
 def test_units_of_length_do_not_matter(drawn, exponent, seed):
     linkage, q, qd = drawn

@@ -10,13 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.specs.drives import PDDrive
-from hapticlink.components.specs.linkage import (
-    Body,
-    Joint,
-    Linkage,
-    Loop,
-    OperationalPoint,
-)
+from hapticlink.components.specs.linkage import Body, Joint, Loop
 from hapticlink.orchestrator import open_scene
 from tests import blocks
 from tests.blocks import RATES, advance, order
@@ -202,41 +196,27 @@ def test_a_linkage_with_a_redundant_loop_sticks_in_all_its_joints():
 
 
 def test_a_cut_joint_rubs_as_one_of_the_tree():
-    """A four-bar with friction, a spring, a damper and a servo in the pivot between coupler and
+    """`four-bar` with friction, a spring, a damper and a servo in the pivot between coupler and
     rocker, with this pivot cut, and with the rocker's cut instead."""
-    crank, coupler, rocker = (
-        Body(name=n, mass=m, inertia=i, center=(c, 0.0))
-        for n, m, i, c in (("a", 0.2, 3e-5, 0.02), ("b", 0.6, 7e-4, 0.06), ("c", 0.4, 3e-4, 0.045))
-    )
     rubs = {"friction": 0.01, "friction_speed": 0.5, "friction_deflection": 2e-3}
     rubs |= {"damping": 2e-3, "stiffness": 0.3, "rest": 1.5}
     table = ((0.0, 0.8), (0.4, 1.2), (1.0, 0.6))
     rubs["drive"] = PDDrive(table=table, stiffness=0.2, damping=1e-3)
-    base = Joint(name="crank", child="a")
-    wrist = Joint(name="wrist", parent="a", child="b", at_parent=(0.04, 0.0))
-    angles = {"crank": 1.05, "wrist": -0.61, "rocker": 1.25}
-    common = {
-        "body": (crank, coupler, rocker),
-        "operational_point": OperationalPoint(body="b"),
-        "gravity": (0.0, -G),
-    }
-    cut = Linkage(
-        joint=(base, wrist, Joint(name="rocker", child="c", at_parent=(0.1, 0.0))),
-        loop=(Loop(bodies=("c", "b"), at=((0.09, 0.0), (0.12, 0.0)), **rubs),),
-        start=angles,
-        start_velocity={"crank": 8.0},
-        **common,
-    )
+    linkage = open_scene.load("four-bar").linkage
+    joints = (replace(linkage.joint[0], drive=None), *linkage.joint[1:])
+    linkage = replace(linkage, gravity=(0.0, -G), start_velocity={"crank": 8.0})
+    pin = Loop(bodies=("rocker", "coupler"), at=((0.09, 0.0), (0.12, 0.0)), **rubs)
+    cut = replace(linkage, joint=joints, loop=(pin,))
     q = running(cut).state["q"]
     elbow = Joint(
-        name="elbow", parent="b", child="c", at_parent=(0.12, 0.0), at_child=(0.09, 0.0), **rubs
-    )
-    whole = Linkage(
-        joint=(base, wrist, elbow),
-        loop=(Loop(bodies=("c", "ground"), at=((0.0, 0.0), (0.1, 0.0))),),
+        name="elbow", parent="coupler", child="rocker", at_parent=(0.12, 0.0),
+        at_child=(0.09, 0.0), **rubs,
+    )  # fmt: skip
+    whole = replace(
+        linkage,
+        joint=(*joints[:2], elbow),
+        loop=(Loop(bodies=("rocker", "ground"), at=((0.0, 0.0), (0.1, 0.0))),),
         start={"crank": q[0], "wrist": q[1], "elbow": q[2] - q[0] - q[1]},
-        start_velocity={"crank": 8.0},
-        **common,
     )
     runs = [running(cut, 5e-4), running(whole, 5e-4)]
     runs[0].put(q=q)

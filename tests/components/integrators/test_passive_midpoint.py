@@ -72,7 +72,7 @@ def with_forces(draw):
     return replace(linkage, joint=joints, spring=springs, gravity=weight, start_velocity=free), rng
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(with_forces())
 def test_no_step_makes_energy(made):
     linkage, rng = made

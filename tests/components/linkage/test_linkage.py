@@ -9,6 +9,7 @@ from hypothesis import given, settings
 
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.linkage.poses import poses
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, OperationalPoint
 from tests.components import appendix_a
 from tests.mechanisms import evaluated, five_bar, linkages, one_body, terms
@@ -49,7 +50,7 @@ def test_random_linkages_have_loops_of_every_number():
         assert seen[loops, True] >= 2
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(linkages())
 def test_laws_of_any_linkage(drawn):
     """D is symmetric positive definite, T = 1/2 qd' D qd, C qd = Ddot qd - dT/dq; loops are closed
@@ -95,7 +96,7 @@ def test_a_tree_without_a_root_is_refused():
         terms(linkage, "x_h")
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(linkages())
 def test_tree_recursion_is_D_and_its_inverse(drawn):
     """D a and D^-1 b by the articulated-body recursion against the matrix, free joints too."""
@@ -113,3 +114,28 @@ def test_tree_recursion_is_D_and_its_inverse(drawn):
     D, applied, solved = evaluated(linkage, both, b.shape)(q, qd, b)
     np.testing.assert_allclose(applied, D @ b, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(solved, np.linalg.solve(D, b), rtol=1e-8, atol=1e-8)
+
+
+def test_places_of_two_links_and_a_slider():
+    """A link about the origin, a second one on its end, and a slider along an axis of the second:
+    sums of rotated vectors."""
+    slide = {"type": "prismatic", "at_parent": (0.4, 0.0), "axis": 0.5}
+    linkage = Linkage(
+        body=tuple(Body(name=n, mass=1.0, inertia=0.1) for n in "abc"),
+        joint=(
+            Joint(name="first", child="a"),
+            Joint(name="second", parent="a", child="b", at_parent=(0.3, 0.1), at_child=(-0.2, 0.0)),
+            Joint(name="slide", parent="b", child="c", **slide),
+        ),
+        operational_point=OperationalPoint(body="c"),
+    )
+    first, second, slid = q = np.array([[0.7, 2.5], [-1.9, 0.4], [0.25, -0.1]])
+    turned = np.exp(1j * (first + second))
+    b = (0.3 + 0.1j) * np.exp(1j * first) + 0.2 * turned
+    c = b + (0.4 + slid * np.exp(0.5j)) * turned
+    expected = {"a": (0 * b, first), "b": (b, first + second), "c": (c, first + second)}
+    places = poses(linkage, q.T)
+    for body, (place, angle) in expected.items():
+        exact = np.column_stack([place.real, place.imag, angle])
+        np.testing.assert_allclose(places[body], exact, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(places["ground"], np.zeros((2, 3)))

@@ -33,8 +33,6 @@ from studies.mismatch.method_choice import choice, within
 from studies.mismatch.methods import HOLDS, RATES, Method
 from tests.shared_fixtures import status
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 ALL = [*cases.trained(), *cases.kept_apart()]
 
 

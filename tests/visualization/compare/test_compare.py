@@ -21,8 +21,6 @@ from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, page, settings
 from tests.shared_fixtures import status
 
-pytestmark = pytest.mark.usefixtures("fmus_unpacked_once")
-
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -1,6 +1,5 @@
 """Figures: their titles, and the signals that they draw."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,11 +7,11 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.findings.user_port import user_port
-from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figures import run_figures, sweep_labels
 from hapticlink.visualization.figures.force_figure import forces
+from tests.shared_fixtures import run_once
 
 
 @pytest.mark.parametrize(
@@ -24,36 +23,26 @@ def test_numbers_are_three_digits_without_powers_of_ten(value: float, text: str)
     assert figure_axes.short(value) == text
 
 
-def drawn(results: tables.Results) -> dict[str, Any]:
+def drawn(results: Results) -> dict[str, Any]:
     """The axes of each figure, by its name."""
     return {name: figure.axes[0] for name, figure in run_figures.figures(results).items()}
 
 
-def run(scene: str, out: Path, *options: str) -> tables.Results:
-    return simulate(scene, out, options).results
-
-
-def test_an_early_end_stands_in_every_title(tmp_path: Path) -> None:
-    found = drawn(run("closed-loop", tmp_path, "stop_when='virtual_mechanism.x[1]<0.044'"))
-    drawings = {
-        "mechanism",
-        "distance",
-        "forces",
-        "constraints",
-        "energies",
-        "user_port",
-    }
-    assert drawings == set(found)
+def test_an_early_end_stands_in_every_title() -> None:
+    found = drawn(run_once("closed-loop", ["stop_when='virtual_mechanism.x[1]<0.044'"]))
+    assert {*found} == {
+        "mechanism", "distance", "forces", "constraints", "energies", "user_port",
+    }  # fmt: skip
     for axes in found.values():
         assert "until stop_when ended the run at 0." in axes.get_title().replace("\n", " ")
     names = [line.get_label() for line in found["mechanism"].lines]
     assert {"path of operational point x_S", "path of handle x_D", "operational point"} <= {*names}
 
 
-def test_the_drawing_says_what_happened_and_shows_the_device_whole(tmp_path: Path) -> None:
+def test_the_drawing_says_what_happened_and_shows_the_device_whole() -> None:
     """The numbers are those of the tables; the arrow points along the wrench of the hand."""
     options = "graphics.rate=10", "controller.topology=false"
-    found = run("closed-loop", tmp_path, *options)
+    found = run_once("closed-loop", options)
     figure = run_figures.figures(found)["mechanism"]
     axes, whole = figure.axes
     x = found.haptics["virtual_mechanism.x"][:, :2] * 1e3
@@ -73,8 +62,8 @@ def test_the_drawing_says_what_happened_and_shows_the_device_whole(tmp_path: Pat
     assert min(y for y, _ in drawn_y) > 1e3 * device.base_y_a
 
 
-def test_the_energy_at_the_port_stands_beside_the_work_of_the_hand(tmp_path: Path) -> None:
-    found = run("closed-loop", tmp_path, "duration=0.6")
+def test_the_energy_at_the_port_stands_beside_the_work_of_the_hand() -> None:
+    found = run_once("closed-loop", ["duration=0.6"])
     axes = drawn(found)["user_port"]
     curves = {line.get_label(): line.get_ydata() for line in axes.lines}
     F, pose = found.haptics["hand.F"], found.haptics["haptic_device.x_true"]
@@ -88,8 +77,8 @@ def test_the_energy_at_the_port_stands_beside_the_work_of_the_hand(tmp_path: Pat
     assert high >= max(map(np.max, curves.values()))
 
 
-def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
-    found = run("obstacles", tmp_path, "duration=0.7")
+def test_obstacles_and_the_force_of_contacts_are_drawn() -> None:
+    found = run_once("obstacles", ["duration=0.7"])
     axes = drawn(found)
     patches = axes["mechanism"].patches
     assert [type(p).__name__ for p in patches][:3] == ["Circle", "Circle", "Polygon"]
@@ -99,21 +88,21 @@ def test_obstacles_and_the_force_of_contacts_are_drawn(tmp_path: Path) -> None:
     F = found.haptics["virtual_mechanism.F_env"]
     assert force == pytest.approx((F[:, 0] ** 2 + F[:, 1] ** 2) ** 0.5)
     assert force.max() > 0
-    enclosed = drawn(run("enclosure", tmp_path, "duration=0.2"))
+    enclosed = drawn(run_once("enclosure", ["duration=0.2"]))
     (walls,) = (line for line in enclosed["mechanism"].lines if line.get_label() == "enclosure")
     assert walls.get_xydata().min(axis=0) == pytest.approx((-30, -45))
 
 
-def test_every_hand_s_point_is_drawn(tmp_path: Path) -> None:
-    found = run("two-hands", tmp_path, "duration=0.5")
+def test_every_hand_s_point_is_drawn() -> None:
+    found = run_once("two-hands", ["duration=0.5"])
     (left,) = (x for x in drawn(found)["mechanism"].lines if x.get_label() == "path of point left")
     expected = found.haptics["virtual_mechanism.left.x"][:, 0] * 1e3
     assert left.get_xdata() == pytest.approx(expected)
 
 
-def test_both_users_are_drawn_and_their_works_are_told(tmp_path: Path) -> None:
+def test_both_users_are_drawn_and_their_works_are_told() -> None:
     """A held force times the displacement of the step over which it acts."""
-    found = run("two-users", tmp_path, "duration=0.5")
+    found = run_once("two-users", ["duration=0.5"])
     axes, r = drawn(found), found.haptics
     apart = (r["virtual_mechanism.left.x"] - r["haptic_device_left.x_true"])[:, :2] * 1e3
     assert axes["distance"].lines[1].get_ydata() == pytest.approx(np.hypot(*apart.T), abs=1e-12)
@@ -126,16 +115,16 @@ def test_both_users_are_drawn_and_their_works_are_told(tmp_path: Path) -> None:
     assert port.works["left: hand"] == pytest.approx(work, rel=1e-9)
 
 
-def test_both_users_forces_are_drawn_where_a_system_describes_no_device(tmp_path: Path) -> None:
+def test_both_users_forces_are_drawn_where_a_system_describes_no_device() -> None:
     """As that of an SSP, which has the blocks and not their descriptions."""
-    found = run("two-users", tmp_path, "duration=0.1")
+    found = run_once("two-users", ["duration=0.1"])
     styles = {line.get_linestyle() for line in forces(found, {}).axes[0].get_lines()}
     assert styles == {"-", "--"}
 
 
-def test_a_sampled_spring_shows_its_energy(tmp_path: Path) -> None:
+def test_a_sampled_spring_shows_its_energy() -> None:
     """All that the mass has gained, its spring's energy counted, is what the hold made."""
-    found = run("sampled-spring", tmp_path)
+    found = run_once("sampled-spring")
     axes = drawn(found)["energies"]
     (bar,) = axes.patches
     x = found.haptics["virtual_mechanism.x"][:, 0]

@@ -1,11 +1,15 @@
-"""What a page can change, without a page."""
+"""What a page can change, and its messages, without a page."""
 
 from __future__ import annotations
 
+import json
+
+import pytest
+
 import hapticlink as hl
 from hapticlink.visualization.interactive_scene.offered_controls import Settings
-from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.controls import Controls
+from hapticlink.visualization.live_page.messages import Gain, Hand, Rate, Time, newest, parse
 from tests.api.test_real_time import ENERGY, ran
 
 
@@ -32,9 +36,64 @@ def test_the_rate_of_the_scene_without_jitter_is_no_change() -> None:
     def turn(live: hl.RealTime) -> None:
         controls = Controls(live, settings)
         for value in (64.0, 30.0):
-            controls.apply(messages.Rate("rate", value))
+            controls.apply(Rate("rate", value))
             rates.append(settings.rate)
         live.stop()
 
     ran("closed-loop-direct", turn)
     assert rates == [64.0, None]
+
+
+def test_a_pull_is_read() -> None:
+    assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
+    other = '{"type": "hand", "at": null, "user": "left"}'
+    assert parse(other) == Hand("hand", None, "left")
+    assert parse('{"type": "rate", "value": 10, "b": true}') == Rate("rate", 10.0, b=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        '"hand"',
+        "{}",
+        '{"type": "exec", "at": null}',
+        '{"type": "hand"}',
+        '{"type": "hand", "at": [0.1]}',
+        '{"type": "hand", "at": [0.1, 0.2, 0.3]}',
+        '{"type": "hand", "at": [0.1, "0.2"]}',
+        '{"type": "hand", "at": [0.1, NaN]}',
+        '{"type": "hand", "at": [0.1, 1e999]}',
+        '{"type": "hand", "at": [0.1, 0.2], "more": 1}',
+        '{"type": "hand", "at": null, "user": 1}',
+        '{"type": "jitter", "value": 1.0}',
+        '{"type": "rate", "value": 0}',
+        '{"type": "rate", "value": 1e-320}',
+        '{"type": "rate", "value": -3}',
+        '{"type": "rate", "value": true}',
+        '{"type": "delay", "connection": "a", "value": 2}',
+        '{"type": "gain", "name": "controller.K_pc", "factor": -1}',
+        '{"type": "topology", "on": 1}',
+        '{"type": "time", "do": "stop"}',
+        '{"type": "time", "do": "pause", "b": true}',
+        '{"type": "rate", "value": 10, "b": 1}',
+        '{"type": "compare", "on": 1}',
+        json.dumps({"type": "hold", "connection": "x" * 201, "hold": "zoh"}),
+        json.dumps({"type": "hold", "connection": "x", "hold": "z" * 5000}),
+        b'{"type": "hand", "at": null}',
+    ],
+)
+def test_what_is_no_message_is_refused(text: str | bytes) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        parse(text)
+
+
+def test_of_many_messages_the_newest_of_each_control_is_kept() -> None:
+    gain = [Gain("gain", name, float(i)) for i in range(5) for name in "ab"]
+    step = [Time("time", "step")] * 2
+    pulls = [Hand("hand", at, user) for user in ("", "left") for at in ((0.0, 0.0), None)]
+    found = newest([*gain, *step, *pulls])
+    assert found == [*gain[-2:], *step, pulls[1], pulls[3]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -13,15 +13,11 @@ from hapticlink.visualization.interactive_scene.prediction import judged
 from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.frames import Frames
-from tests.visualization.browser_code.chromium import Page, chromium
+from tests.visualization.browser_code.chromium import Page
 from tests.visualization.browser_code.javascript import javascript
 from tests.visualization.browser_code.served_page import Served
 
-
-@pytest.fixture(scope="module")
-def direct(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with Served(tmp_path_factory.mktemp("direct"), scene="closed-loop-direct") as page:
-        yield page
+SERVED = "closed-loop-direct"
 
 
 def begun(name: str) -> tuple[dict[str, Any], dict[str, list[float]]]:
@@ -106,18 +102,18 @@ def test_restored_is_what_differs_from_the_start(controls: dict[str, Any]) -> No
     ]
 
 
-def test_restore_brings_back_the_verdict_of_the_start(direct: Served) -> None:
+def test_restore_brings_back_the_verdict_of_the_start(
+    served: Served, window: Callable[..., Page]
+) -> None:
     """At 30 Hz, whose frames end between haptic ticks unless the rate was changed."""
-    with chromium() as browser:
-        page = Page(browser, direct.url)
-        page.until("view.map?.verdict && !view.map.said.endsWith('so far')")
-        before = page.get("view.map.why")
-        page.page.click("#presets button:has-text('Calm')")
-        page.until("view.map.verdict === 'stable'")
-        page.page.click("#restore")
-        page.until("view.map.verdict === 'unstable' && !view.map.said.endsWith('so far')")
-        assert page.get("view.map.why") == before
-        assert page.faults == []
+    page = window(served.url)
+    page.until("view.map?.verdict && !view.map.said.endsWith('so far')")
+    before = page.get("view.map.why")
+    page.page.click("#presets button:has-text('Calm')")
+    page.until("view.map.verdict === 'stable'")
+    page.page.click("#restore")
+    page.until("view.map.verdict === 'unstable' && !view.map.said.endsWith('so far')")
+    assert page.get("view.map.why") == before
 
 
 @pytest.mark.parametrize(("press", "left"), [("ending.hide();", [2, 0]), ("", [2, 2])])
@@ -137,32 +133,30 @@ def test_what_a_run_ended_with_goes_at_a_press_and_is_read_meanwhile(
     assert javascript("ending.js", f"{statements}{press}{end}", None) == left
 
 
-def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(direct: Served) -> None:
-    with chromium() as browser:
-        page = Page(browser, direct.url)
-        page.until("document.querySelectorAll('#presets button').length === 3")
-        page.page.fill("[data-control=rate]", "9")  # 10 Hz
-        for port in ("x", "v"):
-            name = f"virtual_mechanism.{port} -> controller.{port}_S"
-            page.page.select_option(f"select[data-control='{name}']", "foh")
-        page.pull(0.02, -0.015)
-        page.until("view.state.ended")
-        said = page.page.inner_text("#ended")
-        assert said.startswith("Diverged at ")
-        assert "the run has diverged" in said
-        assert "red" in page.get("document.getElementById('light').className")
-        box, stage = (page.page.locator(x).bounding_box() for x in ("#ended", "#stage"))
-        assert box["y"] + box["height"] <= stage["y"]  # nothing covers it
-        page.until("!view.state.ended && view.frame?.t > 0.1")  # pulled on by what is still pressed
-        page.page.mouse.move(400, 400, steps=2)
-        page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) > 0.5")
-        assert page.page.inner_text("#ended").startswith("Diverged at ")  # or of the next run
-        page.page.mouse.up()
-        page.page.click("#restore")
-        page.until(
-            "document.querySelector('[data-control=rate]').parentNode.innerText.includes('30')"
-        )
-        page.until("!view.state.ended")
-        page.page.mouse.click(400, 400)  # the next run may have diverged before it was restored
-        page.until("!document.getElementById('ended').textContent")
-        assert page.faults == []
+def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(
+    served: Served, window: Callable[..., Page]
+) -> None:
+    page = window(served.url)
+    page.until("document.querySelectorAll('#presets button').length === 3")
+    page.page.fill("[data-control=rate]", "9")  # 10 Hz
+    for port in ("x", "v"):
+        name = f"virtual_mechanism.{port} -> controller.{port}_S"
+        page.page.select_option(f"select[data-control='{name}']", "foh")
+    page.pull(0.02, -0.015)
+    page.until("view.state.ended")
+    said = page.page.inner_text("#ended")
+    assert said.startswith("Diverged at ")
+    assert "the run has diverged" in said
+    assert "red" in page.get("document.getElementById('light').className")
+    box, stage = (page.page.locator(x).bounding_box() for x in ("#ended", "#stage"))
+    assert box["y"] + box["height"] <= stage["y"]  # nothing covers it
+    page.until("!view.state.ended && view.frame?.t > 0.1")  # pulled on by what is still pressed
+    page.page.mouse.move(400, 400, steps=2)
+    page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) > 0.5")
+    assert page.page.inner_text("#ended").startswith("Diverged at ")  # or of the next run
+    page.page.mouse.up()
+    page.page.click("#restore")
+    page.until("document.querySelector('[data-control=rate]').parentNode.innerText.includes('30')")
+    page.until("!view.state.ended")
+    page.page.mouse.click(400, 400)  # the next run may have diverged before it was restored
+    page.until("!document.getElementById('ended').textContent")

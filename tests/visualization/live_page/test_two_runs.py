@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
-from tests.visualization.browser_code.chromium import Page, chromium
-from tests.visualization.browser_code.compared_runs import differ_without_topology
+from tests.visualization.browser_code.chromium import Page, differ_without_topology
 from tests.visualization.browser_code.served_page import Served
 
+SERVED = "closed-loop"
 NAME = "hapticlink.commands.compared_run"
-
-
-@pytest.fixture(scope="module")
-def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with Served(tmp_path_factory.mktemp("pair"), scene="closed-loop") as page:
-        yield page
 
 
 def second_runs(served: Served) -> list[int]:
@@ -32,29 +24,27 @@ def second_runs(served: Served) -> list[int]:
     return [int(c) for c in below if NAME in Path(f"/proc/{c}/cmdline").read_text()]
 
 
-def test_two_settings_run_under_one_mouse(pair: Served) -> None:
+def test_two_settings_run_under_one_mouse(served: Served, window: Callable[..., Page]) -> None:
     """Without its topology controller B follows the mouse further, has energies of its own, and the
     controls that act on it leave A as it is."""
-    with chromium() as browser:
-        page = Page(browser, pair.url)
-        page.page.click("#compare")
-        page.until("view.frame?.b && view.frame.t < 1 && view.stage.limits")
-        page.pull(0.03, 0.03)
-        page.run_for(0.5)
-        for pulled in page.get("[view.frame, view.frame.b].map((f) => Math.hypot(...f.F_hand))"):
-            assert pulled > 0.3
-        page.page.mouse.up()
-        differ_without_topology(page)
-        page.page.mouse.up()
-        page.page.click("#acts")
-        page.until("document.querySelector('[data-control=topology]').checked")
-        page.page.click("#compare")
-        page.until("!view.frame?.b && view.frame?.t < 1")
-        assert page.faults == []
+    page = window(served.url)
+    page.page.click("#compare")
+    page.until("view.frame?.b && view.frame.t < 1 && view.stage.limits")
+    page.pull(0.03, 0.03)
+    page.run_for(0.5)
+    for pulled in page.get("[view.frame, view.frame.b].map((f) => Math.hypot(...f.F_hand))"):
+        assert pulled > 0.3
+    page.page.mouse.up()
+    differ_without_topology(page)
+    page.page.mouse.up()
+    page.page.click("#acts")
+    page.until("document.querySelector('[data-control=topology]').checked")
+    page.page.click("#compare")
+    page.until("!view.frame?.b && view.frame?.t < 1")
 
 
-def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(pair: Served) -> None:
-    with pair.window() as window:
+def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(served: Served) -> None:
+    with served.window() as window:
         window.until(lambda new: "controls" in new)
         window.send(type="time", do="pause")
         window.send(type="compare", on=True)
@@ -64,7 +54,7 @@ def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(pair: Served)
             lambda new: new["controls"].get("b", {}).get("rate", {}).get("value") == 10
         )
         assert found["controls"]["rate"]["value"] == 30
-        assert len(second_runs(pair)) == 1
+        assert len(second_runs(served)) == 1
         window.until(lambda new: "b" in new["frame"] and new["scene"].get("runs") == 2)
         times = set[tuple[float, float]]()
         for _ in range(20):  # of the second one, before it begins anew and since
@@ -75,18 +65,18 @@ def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(pair: Served)
         window.until(lambda new: min(new["frame"]["t"], new["frame"]["b"]["t"]) > 0.2)
         window.send(type="compare", on=False)
         window.until(lambda new: "b" not in new["frame"] and new.get("scene", {}).get("runs") == 1)
-        window.until(lambda new: not second_runs(pair))
+        window.until(lambda new: not second_runs(served))
 
 
-def test_a_second_run_that_dies_ends_the_comparison(pair: Served) -> None:
+def test_a_second_run_that_dies_ends_the_comparison(served: Served) -> None:
     """What it refuses is said before."""
-    with pair.window() as window:
+    with served.window() as window:
         window.send(type="compare", on=True)
         window.until(lambda new: new.get("scene", {}).get("runs") == 2)
         connection = "virtual_environment.Lambda_inv -> controller.Lambda_inv"
         window.send(type="hold", connection=connection, hold="no such", b=True)
         window.until(lambda new: "no such" in new.get("refused", {}).get("why", ""))
-        os.kill(second_runs(pair)[0], signal.SIGKILL)
+        os.kill(second_runs(served)[0], signal.SIGKILL)
         window.until(
             lambda new: "the second run has ended" in new.get("refused", {}).get("why", "")
         )

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 
-from tests.visualization.browser_code.chromium import Page, chromium
+from tests.visualization.browser_code.chromium import Page
 from tests.visualization.browser_code.served_page import Served
 
-
-@pytest.fixture(scope="module")
-def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with Served(tmp_path_factory.mktemp("two"), scene="two-users") as page:
-        yield page
+SERVED = "two-users"
 
 
 def place(frame: dict[str, Any], user: str, port: str) -> np.ndarray:
     return np.array((frame["others"][user] if user else frame)[port])
 
 
-def test_each_window_pulls_a_handle_and_both_feel_the_other(two: Served) -> None:
+def test_each_window_pulls_a_handle_and_both_feel_the_other(served: Served) -> None:
     """The second user holds on where the point is; a pull at the first one is felt there, and the
     point yields less than with nobody there."""
     moved = {}
     for holds_on in (False, True):
-        with two.window() as first, two.window() as second:
+        with served.window() as first, served.window() as second:
             first.until(lambda new: new["frame"]["t"] > 0.3)
             first.send(type="time", do="reset")
             start = first.until(lambda new: "state" in new and new["frame"]["t"] < 0.2)["frame"]
@@ -46,10 +41,10 @@ def test_each_window_pulls_a_handle_and_both_feel_the_other(two: Served) -> None
     assert moved[True] < 0.95 * moved[False]
 
 
-def test_a_handle_has_one_hand_and_a_closed_window_lets_go(two: Served) -> None:
-    with two.window() as watching:
+def test_a_handle_has_one_hand_and_a_closed_window_lets_go(served: Served) -> None:
+    with served.window() as watching:
         watching.until(lambda new: new["frame"]["t"] > 0.3)
-        with two.window() as first:
+        with served.window() as first:
             x = place(first.until(lambda new: True)["frame"], "left", "x")
             first.send(type="hand", at=[x[0] + 0.02, x[1]], user="left")
             pulled = "F_hand"
@@ -61,30 +56,30 @@ def test_a_handle_has_one_hand_and_a_closed_window_lets_go(two: Served) -> None:
         watching.until(lambda new: np.hypot(*place(new["frame"], "left", pulled)[:2]) < 1e-2)
 
 
-def test_in_two_browser_windows_the_nearest_handle_is_pulled(two: Served) -> None:
-    with chromium() as browser:
-        pages = {"": Page(browser, two.url), "left": Page(browser, two.url)}
-        places = {"": "view.frame.handle", "left": "view.frame.others.left.handle"}
-        pages[""].get("document.getElementById('pause').click()")
-        pages["left"].until("view.state.paused")
-        for user, page in pages.items():
-            x, y = page.get(
-                f"(() => {{ const box = view.stage.canvas.getBoundingClientRect();"
-                f" const [x, y] = view.stage.toScreen({places[user]});"
-                " return [box.left + x, box.top + y]; })()"
-            )
-            page.page.mouse.move(x, y)
-            page.page.mouse.down()
-            page.page.mouse.move(x + (-120 if user else 120), y, steps=5)
-            assert page.get("[...view.stage.pulls.values()].map((p) => p.user)") == [user]
-        pages[""].get("document.getElementById('pause').click()")
-        for page in pages.values():
-            force = "Math.hypot(...{}.F_hand.slice(0, 2)) > 0.2"
-            page.until(force.format("view.frame"))
-            page.until(force.format("view.frame.others.left"))
-        captions = "[...document.querySelectorAll('figcaption')].map((c) => c.innerText).join()"
-        assert "left: error" in pages["left"].get(captions)
-        pages[""].page.close()
-        pages["left"].until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.05")
-        assert pages["left"].get("view.stage.pulls.size") == 1
-        assert [page.faults for page in pages.values()] == [[], []]
+def test_in_two_browser_windows_the_nearest_handle_is_pulled(
+    served: Served, window: Callable[..., Page]
+) -> None:
+    pages = {"": window(served.url), "left": window(served.url)}
+    places = {"": "view.frame.handle", "left": "view.frame.others.left.handle"}
+    pages[""].get("document.getElementById('pause').click()")
+    pages["left"].until("view.state.paused")
+    for user, page in pages.items():
+        x, y = page.get(
+            f"(() => {{ const box = view.stage.canvas.getBoundingClientRect();"
+            f" const [x, y] = view.stage.toScreen({places[user]});"
+            " return [box.left + x, box.top + y]; })()"
+        )
+        page.page.mouse.move(x, y)
+        page.page.mouse.down()
+        page.page.mouse.move(x + (-120 if user else 120), y, steps=5)
+        assert page.get("[...view.stage.pulls.values()].map((p) => p.user)") == [user]
+    pages[""].get("document.getElementById('pause').click()")
+    for page in pages.values():
+        force = "Math.hypot(...{}.F_hand.slice(0, 2)) > 0.2"
+        page.until(force.format("view.frame"))
+        page.until(force.format("view.frame.others.left"))
+    captions = "[...document.querySelectorAll('figcaption')].map((c) => c.innerText).join()"
+    assert "left: error" in pages["left"].get(captions)
+    pages[""].page.close()
+    pages["left"].until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.05")
+    assert pages["left"].get("view.stage.pulls.size") == 1

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.patches import Polygon
+from numpy.typing import NDArray
 
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.visualization.mechanism import drawing
-from tests.shared_fixtures import status
+from hapticlink.visualization.mechanism.picture import Part, directions
+from tests.shared_fixtures import run_once, status
 
 
 def test_the_operational_point_is_drawn_where_it_is() -> None:
@@ -71,15 +74,9 @@ def test_info_draws_and_names_what_it_drew(
     assert all(str(tmp_path / name) in capsys.readouterr().out for name in sorted(files)[:1])
 
 
-def test_the_terminal_ends_with_the_numbers_of_the_tables(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert (
-        status("run", "closed-loop", "--set", "duration=0.2", "--no-figures", "--out", tmp_path)
-        == 0
-    )
-    told = capsys.readouterr().out
-    run = hl.load(tmp_path)
+def test_what_is_printed_of_a_run_has_the_numbers_of_its_tables() -> None:
+    run = run_once("closed-loop", {"duration": 0.2})
+    told = str(run)
     apart = run.haptics["virtual_mechanism.x"] - run.haptics["haptic_device.x_true"]
     largest = np.hypot(apart[:, 0], apart[:, 1]).max() * 1e3
     assert f"handle at most {largest:.3g} mm from the operational point" in told
@@ -99,3 +96,24 @@ def test_what_the_device_cannot_reach_is_shaded(scene: str, reaches: bool) -> No
     (axes,) = drawing.figure(found, start).axes  # type: ignore[arg-type]
     labels = axes.get_legend_handles_labels()[1]
     assert ("outside the device's workspace" not in labels) == reaches
+
+
+def test_constrained_directions_are_those_of_the_projector() -> None:
+    """Against the singular vectors of the projector's range, also where it has rank 2 out of the
+    plane."""
+    part = Part("", "directions", ("P_c",), (9,), directions(), sparse=True)
+
+    def shown(projector: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array(part.value({"P_c": projector.ravel().tolist()})).reshape(-1, 2)
+
+    line = np.array([math.cos(0.3), math.sin(0.3), 0.0])
+    (found,) = shown(np.outer(line, line))
+    assert abs(np.dot(found, line[:2])) == pytest.approx(1.0)
+    assert len(shown(np.diag([0.0, 0.0, 1.0]))) == 0
+    both = shown(np.diag([1.0, 1.0, 0.0]))
+    assert np.allclose(both @ both.T, np.eye(2))
+    basis, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 2)))
+    _, sizes, axes = np.linalg.svd(basis[:2].T)
+    found = shown(basis @ basis.T)
+    assert np.hypot(*found.T) == pytest.approx(sizes)
+    assert np.abs(np.sum(found * axes, axis=1)) == pytest.approx(sizes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.visualization.replay import replay_page
 from hapticlink.visualization.replay.recorded_frames import Recorded
-from tests.visualization.browser_code.chromium import Page, chromium
+from tests.visualization.browser_code.chromium import Page
 
 LINK = 0.042
 """Length (m) of link 1 of Table 6.1, which turns about the origin."""
@@ -41,13 +41,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as opened:
-        opened.set_offline(True)
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def file(runs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "replay.html"
     replay_page.write([Recorded(str(folder)) for folder in runs], path)
@@ -55,11 +48,9 @@ def file(runs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> P
 
 
 @pytest.fixture
-def page(browser: Any, file: Path) -> Iterator[Page]:
-    opened = Page(browser, file.as_uri(), dark=True)
-    yield opened
-    assert opened.faults == []
-    opened.page.close()
+def page(browser: Any, window: Callable[..., Page], file: Path) -> Page:
+    browser.set_offline(True)
+    return window(file.as_uri(), dark=True)
 
 
 def elbow(folder: Path, t: float) -> tuple[np.ndarray, float]:

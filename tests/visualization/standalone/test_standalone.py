@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,24 +12,18 @@ import pytest
 
 import hapticlink as hl
 from benchmarks import standalone as bench
-from hapticlink.commands import main
-from tests.visualization.browser_code.chromium import AT, Page, chromium
-from tests.visualization.browser_code.compared_runs import differ_without_topology
+from tests.shared_fixtures import status
+from tests.visualization.browser_code.chromium import AT, Page, differ_without_topology
 from tests.visualization.browser_code.javascript import NODE
 
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium(bypass_csp=False) as opened:
-        yield opened
+BYPASS_CSP = False
+Window = Callable[..., Page]
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("standalone") / "demo.html"
-    with pytest.raises(SystemExit) as ended:
-        main(["view", "closed-loop", "--standalone", str(path)])
-    assert ended.value.code == 0
+    assert status("view", "closed-loop", "--standalone", path) == 0
     return path
 
 
@@ -55,13 +49,11 @@ def dragged(page: Page, folder: Path) -> tuple[list[str], np.ndarray]:
 
 
 def test_a_drag_gives_the_numbers_of_a_run_with_the_same_forces(
-    file: Path, browser: Any, tmp_path: Path
+    file: Path, window: Window, tmp_path: Path
 ) -> None:
     """The run's hand is the force that was recorded, at each tick."""
-    page = Page(browser, f"file://{file}", dark=True)
+    page = window(f"file://{file}", dark=True)
     names, rows = dragged(page, tmp_path)
-    assert page.faults == []
-    page.page.close()
     rows = rows[: 1 + 512]
     force = [names.index(f"hand.F[{i}]") for i in (1, 2, 3)]
     assert np.abs(rows[:, force]).max() > 1
@@ -75,22 +67,20 @@ def test_a_drag_gives_the_numbers_of_a_run_with_the_same_forces(
         assert rows[:, names.index(name)] == pytest.approx(table[name], rel=1e-9, abs=1e-9), name
 
 
-def test_no_request_leaves_the_page(file: Path, browser: Any) -> None:
+def test_no_request_leaves_the_page(file: Path, browser: Any, window: Window) -> None:
     """Nor is anything asked for that its content security policy forbids, which is in force."""
     asked: list[str] = []
     browser.on("request", lambda request: asked.append(request.url))
-    page = Page(browser, f"file://{file}")
+    page = window(f"file://{file}")
     page.pull(0.01, -0.01)
     page.run_for(0.3)
     page.page.mouse.up()
-    page.page.close()
-    assert page.faults == []
     assert len(asked) == 2
     assert {url.partition(":")[0] for url in asked} == {"file", "blob"}
 
 
-def test_nothing_is_cut_off_in_wide_and_narrow_windows(file: Path, browser: Any) -> None:
-    page = Page(browser, f"file://{file}")
+def test_nothing_is_cut_off_in_wide_and_narrow_windows(file: Path, window: Window) -> None:
+    page = window(f"file://{file}")
     for width, height in ((1600, 900), (390, 844)):
         page.page.set_viewport_size({"width": width, "height": height})
         page.run_for(0.1)
@@ -99,11 +89,10 @@ def test_nothing_is_cut_off_in_wide_and_narrow_windows(file: Path, browser: Any)
             box = page.page.locator(name).bounding_box()
             assert box["x"] >= 0
             assert box["x"] + box["width"] <= width
-    page.page.close()
 
 
-def test_a_link_carries_the_settings(file: Path, browser: Any) -> None:
-    page = Page(browser, f"file://{file}#graphics.rate=10&hold=foh&delay=0.02&weather=fine")
+def test_a_link_carries_the_settings(file: Path, window: Window) -> None:
+    page = window(f"file://{file}#graphics.rate=10&hold=foh&delay=0.02&weather=fine")
     rate = "document.querySelector('[data-control=rate]').parentNode.textContent"
     page.until(f"{rate}.includes('10.0 Hz')")
     holds = page.get("[...document.querySelectorAll('#controls select')].map((each) => each.value)")
@@ -113,19 +102,16 @@ def test_a_link_carries_the_settings(file: Path, browser: Any) -> None:
     page.page.uncheck("[data-control=topology]")
     page.until("location.hash.includes('controller.topology=false')")
     link = page.get("location.href")
-    page.page.close()
     assert "weather" not in link
-    again = Page(browser, link)
+    again = window(link)
     again.until("!document.querySelector('[data-control=topology]').checked")
     again.until("document.querySelector('#controls select').value === 'foh'")
-    assert again.faults == []
-    again.page.close()
 
 
-def test_two_settings_run_under_one_mouse(file: Path, browser: Any) -> None:
+def test_two_settings_run_under_one_mouse(file: Path, window: Window) -> None:
     """With the same settings both have the same bits; without its topology controller B follows the
     mouse further, and has energies of its own."""
-    page = Page(browser, f"file://{file}")
+    page = window(f"file://{file}")
     page.page.click("#compare")
     page.until("view.frame?.b && view.stage.limits")
     page.pull(0.03, 0.03)
@@ -136,8 +122,6 @@ def test_two_settings_run_under_one_mouse(file: Path, browser: Any) -> None:
     differ_without_topology(page)
     assert not page.get(alike)
     page.page.mouse.up()
-    assert page.faults == []
-    page.page.close()
 
 
 LISTEN = """(() => {
@@ -151,8 +135,8 @@ LISTEN = """(() => {
 })()"""
 
 
-def test_a_drag_is_heard_once_it_is_asked_for(file: Path, browser: Any) -> None:
-    page = Page(browser, f"file://{file}")
+def test_a_drag_is_heard_once_it_is_asked_for(file: Path, window: Window) -> None:
+    page = window(f"file://{file}")
     assert page.get("view.sound.context ?? null") is None
     page.page.select_option("#hear", "force")
     page.until("view.sound.node && view.sound.context.state === 'running'")
@@ -167,8 +151,6 @@ def test_a_drag_is_heard_once_it_is_asked_for(file: Path, browser: Any) -> None:
     page.until("view.loudest > 0.01")
     page.page.select_option("#hear", "")
     page.until("!view.sound.context")
-    assert page.faults == []
-    page.page.close()
 
 
 @pytest.mark.skipif(not NODE, reason="node is not installed")

@@ -1,4 +1,4 @@
-"""The warning of friction that steps do not resolve: a slider whose friction stops its spring."""
+"""Warnings of a run: contacts that the hand does not feel, friction that steps do not resolve."""
 
 from __future__ import annotations
 
@@ -8,6 +8,26 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+
+
+def warned(options: dict[str, object]) -> list[str]:
+    made = hl.run("obstacles", {"duration": 0.6, **options})
+    return [line for line in made.run["warnings"] if "controller.contact = true" in line]
+
+
+def test_contacts_without_a_controller_that_renders_them() -> None:
+    (line,) = warned({"controller.contact": False})
+    assert "contacts act on the mechanism from 0." in line
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"controller.contact": False, "duration": 0.01}],
+    ids=["rendered", "nothing is touched"],
+)
+def test_no_warning_without_cause(options: dict[str, object]) -> None:
+    assert not warned(options)
+
 
 SLIDER = {
     "duration": 1.4,
@@ -20,8 +40,9 @@ SLIDER = {
 }
 
 
-def rate(t: np.ndarray) -> np.ndarray:
-    """Half cycles about f/k = 0.005 m on alternating sides, each of an amplitude 2 f/k smaller."""
+def slid(t: np.ndarray) -> np.ndarray:
+    """The rate (m/s) of a slider whose friction f stops its spring k: half cycles about f/k = 0.005
+    m on alternating sides, each of an amplitude 2 f/k smaller."""
     turns = np.floor(20 * t / np.pi)
     return -20 * (0.098 - 0.01 * turns) * np.sin(20 * t)
 
@@ -33,7 +54,7 @@ def test_turns_that_cost_the_rate_are_told(
     run = hl.run(bar, SLIDER | {"mechanism.substeps": substeps})
     assert run.run["friction_speeds"] == {"slide": pytest.approx(4 * 1.0 / 0.5 / 128 / substeps)}
     table = run["haptics"]
-    exact = rate(table["time"])
+    exact = slid(table["time"])
     error = np.abs(table["virtual_mechanism.qd"][:, 0] - exact).max() / np.abs(exact).max()
     assert low < error < high
     told = [line for line in run.run["warnings"] if "friction of slide" in line]
