@@ -24,7 +24,6 @@ from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.plan.operations import Event, Push
 from hapticlink.orchestrator.plan.plan import Plan, moments
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.bind_operations import Binder
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
@@ -33,7 +32,7 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
-from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample
+from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample, instructions
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
@@ -193,13 +192,12 @@ def _resolved(
     samples: list[Instruction] = [Push(c.name) for c in system.connections if c.hold]
     for name in simulation.meters.of:
         samples += [Sample(name, 0), Move(name, 0)]
-    start = machine.block([(instruction, _nothing) for instruction in samples])
-    binder = Binder(simulation, machine.joined)
+    start = machine.block(samples)
     kinds = dict[Event, tuple[int, int]]()
     for event in _kinds(system.timeline):
-        bound = binder.instructions(plan.block(event))
-        kinds[event] = machine.block([b for b in bound if getattr(b[0], "fmu", "") != outside])
-    possible = changes(machine, simulation, plan, binder, kinds) if changing else NONE
+        every = instructions(plan.block(event), simulation)
+        kinds[event] = machine.block([i for i in every if getattr(i, "fmu", "") != outside])
+    possible = changes(machine, simulation, plan, kinds) if changing else NONE
     refusals.of_machine(machine.in_python, scene.title)
     events = Events(system.timeline, kinds, possible)
     fmus, memory = machine.names("fmu"), Memory()
@@ -237,10 +235,6 @@ def _resolved(
         tables=machine.names("table"),
         kept=(machine, events, setters, kept, memory, rows),
     )
-
-
-def _nothing(tick: int) -> None:
-    """What stands for the call of an operation that a program carries out."""
 
 
 def _as_before_the_start(simulation: Simulation, outside: str | None, changing: bool) -> None:

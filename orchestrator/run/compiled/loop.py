@@ -20,9 +20,8 @@ class CompiledLoop(PythonLoop):
     """
 
     def __init__(self, plan: Plan, simulation: Simulation, library: ctypes.CDLL) -> None:
-        machine = Machine(library, simulation)
-        super().__init__(plan, simulation, machine.in_python, machine.joined)
-        self._machine = machine
+        self._machine = machine = Machine(library, simulation)
+        super().__init__(plan, machine.operations, machine.in_python)
         timeline, pace = plan.system.timeline, simulation.pace
         self.change_hold = machine.change_hold
         self.events = Events(machine, timeline, self._block, pace, simulation.sides)
@@ -38,4 +37,4 @@ class CompiledLoop(PythonLoop):
             self.complete = self.events.complete
 
     def _block(self, event: Event) -> tuple[int, int]:
-        return self._machine.block(self._binder.instructions(self._plan.block(event)))
+        return self._machine.block(self._instructions(event))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,6 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.run.bind_operations import Bound, Stop
 from hapticlink.orchestrator.run.compiled import fmus, structures
 from hapticlink.orchestrator.run.compiled.hold_structures import (
     CompiledHold,
@@ -44,6 +43,7 @@ from hapticlink.orchestrator.run.instructions import (
     Move,
     Sample,
 )
+from hapticlink.orchestrator.run.operations_in_python import OperationsInPython, Stop
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system.system import System
@@ -76,7 +76,8 @@ class Machine:
         self.loop.fill(simulation.signals, "values")
         self._memory = Memory()
         self._kept: list[object] = []
-        self._bound: Bound = []
+        self._instructions: list[Instruction] = []
+        self.operations = OperationsInPython(simulation, self._joined)
         self._ops = np.zeros(0, np.dtype(Op))
         self._points: list[tuple[float, float]] = []
         self._fmus = self._array("fmus", structures.Fmu, len(system.fmus))
@@ -150,22 +151,22 @@ class Machine:
 
     # --- records --------------------------------------------------------------------------
 
-    def block(self, bound: Bound) -> tuple[int, int]:
+    def block(self, sequence: Sequence[Instruction]) -> tuple[int, int]:
         """Adds a sequence of instructions; the indices of its first, and of the one after its
         last."""
-        first = len(self._bound)
-        self._bound += bound
-        for instruction, _ in bound:
+        first = len(self._instructions)
+        self._instructions += sequence
+        for instruction in sequence:  # kinds of events share most of theirs
             if instruction not in self._rows:
                 self._rows[instruction] = self._record(instruction)
-        rows = [self._rows[instruction] for instruction, _ in bound]
+        rows = [self._rows[instruction] for instruction in sequence]
         self._ops = np.concatenate([self._ops, np.array(rows, np.dtype(Op))])
         self.loop.fill(ops=self._ops)
-        return first, len(self._bound)
+        return first, len(self._instructions)
 
-    def joined(self, bound: Bound) -> Call:
+    def _joined(self, sequence: Sequence[Instruction]) -> Call:
         """One call that carries out a sequence of instructions at a tick."""
-        first, last = self.block(bound)
+        first, last = self.block(sequence)
         position, run = structures.At(), self.library.block
         loop, here = ctypes.addressof(self.loop), ctypes.addressof(position)
 
@@ -320,7 +321,7 @@ class Machine:
         try:
             return run(*arguments)
         except SystemError as error:
-            instruction, _ = self._bound[position.op]
+            instruction = self._instructions[position.op]
             assert isinstance(instruction, Get | Set | Step)
             instance = self._simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
@@ -330,11 +331,11 @@ class Machine:
 
     def serve(self, code: int, position: structures.At, tick: int) -> None:
         """Does what the loop cannot do at operation `position.op`, and sets where it goes on."""
-        instruction, call = self._bound[position.op]
+        instruction = self._instructions[position.op]
         simulation = self._simulation
         if code == structures.CALL:
             simulation.late = self.loop.late
-            call(tick)
+            self.operations(instruction, tick)
         elif code == structures.STOP:
             raise Stop
         elif code in (structures.DRAW, structures.GROW):
