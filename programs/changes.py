@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.holds.energy_account import Account
+from hapticlink.orchestrator.plan.event_kinds import key_of
 from hapticlink.orchestrator.plan.operations import Event, Firing, Record
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled import structures
@@ -160,9 +161,7 @@ def _family(machine: Machine, simulation: Simulation, plan: Plan, event: Event) 
         grown = [getattr(one, f) + 3 * s for f, s in zip(FIELDS, slopes[-1], strict=True)]
         if any(abs(g - getattr(four, f)) > 1e-12 for f, g in zip(FIELDS, grown, strict=True)):
             return None
-    fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
-    key = [int(event.first), *(fired.get(clock.name, 0) for clock in plan.system.timeline.clocks)]
-    return Family(key, blocks[0][0], n, 1, slopes)
+    return Family(key_of(plan.system.timeline, event), blocks[0][0], n, 1, slopes)
 
 
 def _op(machine: Machine, index: int) -> int:

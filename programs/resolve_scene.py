@@ -21,6 +21,7 @@ from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account
+from hapticlink.orchestrator.plan.event_kinds import key_of
 from hapticlink.orchestrator.plan.operations import Event, Push
 from hapticlink.orchestrator.plan.plan import Plan, moments
 from hapticlink.orchestrator.results.run_folder import RunFolder
@@ -345,8 +346,7 @@ class Events:
         self._keys = np.full((n_kinds, 1 + n), -1, np.int64)  # spare ones are no event's
         self._key, self._blocks = np.zeros(1 + n, np.int64), (structures.Block * n_kinds)()
         for key, block, (event, span) in zip(self._keys, self._blocks, kinds.items(), strict=False):
-            fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
-            key[:] = [event.first, *(fired.get(clock.name, 0) for clock in timeline.clocks)]
+            key[:] = key_of(timeline, event)
             block.first, block.last = span
         for i, block in enumerate(self._blocks[len(kinds) :]):
             block.first = block.last = possible.spare + i * possible.most

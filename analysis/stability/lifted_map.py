@@ -27,7 +27,7 @@ from hapticlink.orchestrator.plan.operations import Event, Operation, Record, Re
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.instructions import Feed, Instruction, Move, Sample, instructions
-from hapticlink.orchestrator.run.operations_in_python import OperationsInPython
+from hapticlink.orchestrator.run.python_loop import OperationsInPython
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System

@@ -22,8 +22,7 @@ from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.energy.balance import unstable
-from hapticlink.orchestrator.run.operations_in_python import OperationsInPython, Stop
-from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.python_loop import OperationsInPython, PythonLoop, Stop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from hapticlink.orchestrator.run.energy.balance import Balance
-from hapticlink.orchestrator.run.energy.meters import Meters
+from hapticlink.orchestrator.run.energy.meter import Meters
 from hapticlink.orchestrator.run.initialize import START_POSE_OUTPUTS
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -20,7 +20,7 @@ from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run import apply_timed_events
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
-from hapticlink.orchestrator.run.energy.meters import Meters
+from hapticlink.orchestrator.run.energy.meter import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.open_fmus import isolated, opened
@@ -36,8 +36,8 @@ Set = Callable[[Vector], object]
 class Simulation:
     """The objects of a run, which `stack` closes; rows are written to `results`.
 
-    setters, now_setters and derivative_setters set inputs of an FMU from the signals: with held
-    values, with the newest outputs of the sources, and the derivatives of held values.
+    setters set the inputs of an FMU from the signals: with held values, or `now` with the newest
+    outputs of the sources; derivative_setters the derivatives of held values.
 
     pace: the schedule of a run in real time. beside: the FMUs whose steps are then taken beside the
     loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock,
@@ -71,8 +71,7 @@ class Simulation:
         self.meters = Meters(system, self.signals)
         self.balance = Balance(system, self.signals)
         self.recorders: dict[str, Recorder] = {}
-        self.setters: dict[str, Set] = {}
-        self.now_setters: dict[str, Set] = {}
+        self.setters: dict[tuple[str, bool], Set] = {}
         self.derivative_setters: dict[str, Set] = {}
 
     def _dismiss(self) -> None:
@@ -97,17 +96,18 @@ class Simulation:
             connect = self.instances[fmu.name].connect
             scalars = [s for c in incoming for s in c.inputs]
             held = [p for c in incoming for p in self.signals.places(c)]
-            self.setters[fmu.name] = connect(scalars, held)
+            self.setters[fmu.name, False] = connect(scalars, held)
             if derived := self._derived(incoming):
+                orders, inputs, places = zip(*derived, strict=True)
                 derive = self.instances[fmu.name].connect_derivatives
-                self.derivative_setters[fmu.name] = derive(*derived)
+                self.derivative_setters[fmu.name] = derive(inputs, orders, places)
             if fmu.name in self.system.coupling.get_after_set:
                 sources = [p for c in incoming for p in self.signals.sources(c)]
-                self.now_setters[fmu.name] = connect(scalars, sources)
+                self.setters[fmu.name, True] = connect(scalars, sources)
         for clock in self.system.timeline.clocks:
             recorded = self.signals.recorded(clock.name)
             columns = None if recorded is None else [*recorded]
-            places = [] if recorded is None else [*recorded.values()]
+            places = [*(recorded or {}).values()]
             every = self.system.recording.every
             recorder = self._results.recorder(clock.name, columns, values, places, every)
             self.recorders[clock.name] = self._stack.enter_context(recorder)
@@ -115,15 +115,16 @@ class Simulation:
                 if fmu.clock == clock.name:
                     self.instances[fmu.name].due = recorder.due
         for side in self.sides:
-            sample, all_of_it = np.zeros(len(COLUMNS)), range(len(COLUMNS))
-            recorder = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, sample, all_of_it)
-            self.arrivals[side] = self._stack.enter_context(recorder)
-            recorder.row(0.0)  # the sample of t = 0 is there at once
+            self.arrivals[side] = self._beside(f"{side}_{SAMPLES}", COLUMNS)
         for name in self.remote if self.pace else ():
-            frame, all_of_it = np.zeros(len(FRAME)), range(len(FRAME))
-            recorder = self._results.recorder(f"{name}_{FRAMES}", FRAME, frame, all_of_it)
-            self.frames[name] = self._stack.enter_context(recorder)
-            recorder.row(0.0)  # of outputs that came with the initialisation
+            self.frames[name] = self._beside(f"{name}_{FRAMES}", FRAME)
+
+    def _beside(self, name: str, columns: Sequence[str]) -> Recorder:
+        """A table of what runs beside the loop; its row of t = 0 is there at once."""
+        row = np.zeros(len(columns)), range(len(columns))
+        recorder = self._stack.enter_context(self._results.recorder(name, columns, *row))
+        recorder.row(0.0)
+        return recorder
 
     def collect(self, clock: str, tick: int) -> None:
         """Take over the sample that the FMUs beside the loop have left for a tick, `late`."""
@@ -141,22 +142,15 @@ class Simulation:
         """The FMUs on other computers."""
         return {n: i for n, i in self.instances.items() if isinstance(i, Remote)}
 
-    def _derived(
-        self, incoming: Iterable[Connection]
-    ) -> tuple[list[Scalar], list[int], list[int]] | None:
-        """Inputs, orders and signal indices of the derivatives that an FMU gets with its inputs;
-        None if there are none."""
+    def _derived(self, incoming: Iterable[Connection]) -> list[tuple[int, Scalar, int]]:
+        """Order, input and signal index of each derivative that an FMU gets with its inputs, by
+        their order."""
         rows = []
         for c in incoming:
-            span = self.signals.derivatives(c.name)
+            span, n = self.signals.derivatives(c.name), len(c.inputs)
             places = [*self.signals.places(c), *range(span.start, span.stop)] if span.stop else []
-            for i, place in enumerate(places):
-                order, entry = divmod(i, len(c.inputs))
-                rows.append((c.inputs[entry], order, place))
-        if not rows:
-            return None
-        rows.sort(key=lambda row: row[1])
-        return [r[0] for r in rows], [r[1] for r in rows], [r[2] for r in rows]
+            rows += [(i // n, c.inputs[i % n], place) for i, place in enumerate(places)]
+        return sorted(rows, key=lambda row: row[0])
 
     def links(self) -> dict[str, LinkCounts]:
         """Per connection with a latency, the number of samples sent, lost and overtaken."""

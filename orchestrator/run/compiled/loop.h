@@ -128,6 +128,15 @@ typedef struct {
     int64_t n;
 } Reader;
 
+static inline double reading(const Reader *r, const double *board, int64_t i) {
+    const double value = board[r->where[i]];
+    return r->factor ? r->factor[i] * value + r->offset[i] : value;
+}
+
+static inline void read_all(const Reader *r, const double *board, double *into) {
+    for (int64_t i = 0; i < r->n; i++) into[i] = reading(r, board, i);
+}
+
 /* Vectors with their ticks, oldest first. */
 typedef struct {
     int64_t count, *ticks /* [room] */;
@@ -324,7 +333,14 @@ static inline int fmu_succeeded(int status) {
     return status == 0 || status == 1;
 }
 
-int loop_carry_out(Loop *l, int64_t tick, At *at);
+/* Those that Python calls: library.py. */
+EXPORT int hapticlink_events(Loop *l, Events *e);
+EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick);
+EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
+EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+EXPORT void hapticlink_guard(int on); /* while it is on, exit() ends the process with status 1 */
+EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
+
 int fmu_get(const Fmu *f, int64_t judged, At *at);
 int fmu_set(const Setter *s, const double *board, At *at);
 int fmu_do_step(const Fmu *f, double time, double size);
@@ -346,14 +362,10 @@ int64_t now(void);
 void wait_until(int64_t time);
 void watch_signals(int on);
 int signal_came(void);
-void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
 int exception_left(void);
 void note_arithmetic(void);      /* how numbers are rounded from here on */
 void keep_arithmetic(Place *p);  /* restored where an FMU has changed it, and counted */
-void guard_exit(int on);         /* while it is on, exit() ends the process with status 1 */
 double *hold_scratch(const Hold *h); /* (2, n) */
-int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
-int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 int manifold_push(Hold *h, const double *y);
 void manifold_value(const Hold *h, double *value);
 void tank_credit(Tank *t, double total);

@@ -43,7 +43,7 @@ from hapticlink.orchestrator.run.instructions import (
     Move,
     Sample,
 )
-from hapticlink.orchestrator.run.operations_in_python import OperationsInPython, Stop
+from hapticlink.orchestrator.run.python_loop import OperationsInPython, Stop
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system.system import System
@@ -52,6 +52,8 @@ EXACT = 2**53
 """Up to here every whole number is a double, and the quotient of two is rounded once."""
 PATIENCE = 20_000_000
 """ns after which Python gets a turn: signals, progress."""
+KINDS = ("fmu", "setter", "hold", "meter", "table")
+"""Of objects that operations refer to by the index in an array of `loop`."""
 
 
 def too_long(system: System) -> str:
@@ -78,15 +80,14 @@ class Machine:
         self._kept: list[object] = []
         self._instructions: list[Instruction] = []
         self.operations = OperationsInPython(simulation, self._joined)
-        self._ops = np.zeros(0, np.dtype(Op))
         self._points: list[tuple[float, float]] = []
         self._fmus = self._array("fmus", structures.Fmu, len(system.fmus))
         self._setters = self._array("setters", structures.Setter, 2 * len(system.fmus))
         self._tables = self._array("tables", structures.Table, len(system.timeline.clocks))
         self._holds = self._array("holds", ctypes.c_void_p, len(system.connections))
         self._meters = self._array("meters", ctypes.c_void_p, len(simulation.meters.of))
-        self._indices: dict[tuple[str, Any], int] = {}
-        self._rows: dict[Instruction, tuple[float, ...]] = {}
+        self._indices: dict[str, dict[Any, int]] = {kind: {} for kind in KINDS}
+        self._records: dict[Instruction, Op] = {}
         self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
@@ -139,15 +140,13 @@ class Machine:
     # --- what the arrays of `loop` hold -----------------------------------------------------
 
     def names(self, kind: str) -> list[Any]:
-        """The keys of the objects of a kind ("fmu", "setter", "hold", "meter" or "table"), in the
-        order of their array."""
-        return [key for of, key in self._indices if of == kind]
+        """The keys of the objects of one of KINDS, in the order of their array."""
+        return [*self._indices[kind]]
 
     def counts(self) -> dict[str, int]:
         """The number of entries of each array, by the names that loop.h uses."""
-        kinds = ("fmu", "setter", "hold", "meter", "table")
-        of_objects = {f"n_{kind}s": len(self.names(kind)) for kind in kinds}
-        return {**of_objects, "n_ops": len(self._ops), "n_points": len(self._points)}
+        of_objects = {f"n_{kind}s": len(indices) for kind, indices in self._indices.items()}
+        return {**of_objects, "n_ops": len(self._instructions), "n_points": len(self._points)}
 
     # --- records --------------------------------------------------------------------------
 
@@ -157,10 +156,10 @@ class Machine:
         first = len(self._instructions)
         self._instructions += sequence
         for instruction in sequence:  # kinds of events share most of theirs
-            if instruction not in self._rows:
-                self._rows[instruction] = self._record(instruction)
-        rows = [self._rows[instruction] for instruction in sequence]
-        self._ops = np.concatenate([self._ops, np.array(rows, np.dtype(Op))])
+            if instruction not in self._records:
+                self._records[instruction] = self._record(instruction)
+        records = [self._records[instruction] for instruction in self._instructions]
+        self._ops = (Op * len(records))(*records)
         self.loop.fill(ops=self._ops)
         return first, len(self._instructions)
 
@@ -177,53 +176,53 @@ class Machine:
 
         return call
 
-    def _record(self, instruction: Instruction) -> tuple[float, ...]:
+    def _record(self, instruction: Instruction) -> Op:
         record = self._coded(instruction)
-        if isinstance(record, str):
-            first = next(iter(vars(instruction).values()), "")
-            of = f" {first}" if isinstance(first, str) and first else ""
-            self.in_python[f"{type(instruction).__name__.lower()}{of}"] = record
-            return (structures.PYTHON, 0, 0, 0, 0, 0.0)
-        return (*record, *(0,) * (5 - len(record)), 0.0) if len(record) < 6 else record
+        if not isinstance(record, str):
+            return record
+        first = next(iter(vars(instruction).values()), "")
+        of = f" {first}" if isinstance(first, str) and first else ""
+        self.in_python[f"{type(instruction).__name__.lower()}{of}"] = record
+        return Op(structures.PYTHON)
 
-    def _coded(self, instruction: Instruction) -> tuple[float, ...] | str:
-        """Code, a, b, c, d and x of an operation; why it is carried out in Python where it is."""
+    def _coded(self, instruction: Instruction) -> Op | str:
+        """The record of an operation; why it is carried out in Python where it is."""
         simulation, system = self._simulation, self._simulation.system
         match instruction:
             case Get(fmu, judged=judged) if (index := self._fmu(fmu)) is not None:
-                return structures.GET, index, judged
+                return Op(structures.GET, index, judged)
             case Set(fmu, now, False) if (index := self._setter(fmu, now)) is not None:
-                return structures.SET, index
+                return Op(structures.SET, index)
             case Step(fmu) if fmu in simulation.beside:
                 return "the FMU runs beside the loop, in a thread"
             case Step(fmu, dticks, part, count) if (index := self._fmu(fmu)) is not None:
                 size = float(dticks * (system.timeline.base / count))
                 over = 0 if system.fmu[fmu].sampled and count == 1 else dticks
-                return structures.STEP, index, part * dticks, count, over, size
+                return Op(structures.STEP, index, part * dticks, count, over, size)
             case Push(connection, ahead) if (index := self._hold(connection)) is not None:
-                return structures.PUSH, index, ahead
+                return Op(structures.PUSH, index, ahead)
             case Evaluate(connection, ahead, 0) if (index := self._hold(connection)) is not None:
-                return structures.EVALUATE, index, 0, 0, 0, float(ahead)
+                return Op(structures.EVALUATE, index, x=float(ahead))
             case Blend(connection, points) if (index := self._hold(connection)) is not None:
                 first = len(self._points)
                 self._points += [(weight, float(ahead)) for weight, ahead in points]
                 self._kept.append(of := np.array(self._points))
                 self.loop.fill(points=of)
-                return structures.BLEND, index, first, len(self._points)
+                return Op(structures.BLEND, index, first, len(self._points))
             case Sample(connection, ahead):
-                return structures.SAMPLE, self._meter(connection), ahead
+                return Op(structures.SAMPLE, self._meter(connection), ahead)
             case Move(connection, ahead):
-                return structures.MOVE, self._meter(connection), ahead
+                return Op(structures.MOVE, self._meter(connection), ahead)
             case Feed(connection, share):
-                return structures.FEED, self._meter(connection), 0, 0, 0, share
+                return Op(structures.FEED, self._meter(connection), x=share)
             case Record(clock):
-                return structures.RECORD, self._table(clock)
+                return Op(structures.RECORD, self._table(clock))
             case StopWhen():
                 condition = system.ends_when
                 assert condition is not None
                 place = simulation.signals.scalar(condition.fmu, condition.variable)
                 comparison = [*COMPARISONS].index(condition.comparison)
-                return structures.STOP_WHEN, place, comparison, 0, 0, condition.value
+                return Op(structures.STOP_WHEN, place, comparison, x=condition.value)
             case Evaluate(order=order) if order:
                 return "the FMU takes derivatives of its inputs"
             case Set(derivatives=True):
@@ -243,11 +242,11 @@ class Machine:
 
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
         """The index of an object of `kind`, made at its first use."""
-        if (kind, key) not in self._indices:
-            index = sum(k == kind for k, _ in self._indices)
-            self._kept.append(make(index))
-            self._indices[kind, key] = index
-        return self._indices[kind, key]
+        indices = self._indices[kind]
+        if key not in indices:
+            self._kept.append(make(len(indices)))
+            indices[key] = len(indices)
+        return indices[key]
 
     def _fmu(self, name: str) -> int | None:
         instance = self._simulation.instances[name]
@@ -261,9 +260,7 @@ class Machine:
         )
 
     def _setter(self, name: str, now: bool) -> int | None:
-        simulation = self._simulation
-        setter = (simulation.now_setters if now else simulation.setters)[name]
-        instance = simulation.instances[name]
+        setter, instance = self._simulation.setters[name, now], self._simulation.instances[name]
         if not isinstance(setter, Setter) or not isinstance(instance, InProcess):
             return None
         if instance.texts or any(transfer.exact for transfer in setter.transfers):
@@ -370,9 +367,7 @@ class Machine:
             return instance.do_step
         transfers = instance.asked
         if isinstance(instruction, Set):
-            simulation = self._simulation
-            setters = simulation.now_setters if instruction.now else simulation.setters
-            setter = setters[instruction.fmu]
+            setter = self._simulation.setters[instruction.fmu, instruction.now]
             assert isinstance(setter, Setter)
             transfers = [*setter.transfers]
         return transfers[number].name
