@@ -119,7 +119,7 @@ def _holds(machine: Machine, simulation: Simulation) -> Iterator[tuple[Choice, C
         for hold in holds:
             other = replace(held_by(connection, hold, None), latency=latency)
             with suppress(InputFault):  # a hold of a plugin
-                new = machine.other_hold(name, make_hold(other, system, simulation.signals, {}))
+                new = machine.other_hold(name, make_hold(other, simulation.signals, {}))
                 longest = MOST_DELAY + (1 / LEAST_RATE if isinstance(new.own, Account) else 0.0)
                 while new.room < math.ceil(longest / haptic) + 8:
                     new.grow()

@@ -27,10 +27,10 @@ from hapticlink.orchestrator.plan.plan import Plan, moments
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
 from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
 from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample, instructions
@@ -291,9 +291,8 @@ def _start_setter(simulation: Simulation, fmu: str, c: structures.Setter, memory
     instance = simulation.instances[fmu]
     assert isinstance(instance, InProcess)
     incoming = [c for c in simulation.system.connections if c.target == fmu]
-    scalars = [s for c in incoming for s in c.inputs]
-    places = [p for c in incoming for p in simulation.signals.places(c)]
-    setter = instance.connect(scalars, places)
+    setter = simulation.setter(incoming, simulation.signals.places)
+    assert isinstance(setter, Setter)
     compiled_fmus.of_setter(setter, instance, c, memory)
     return setter
 

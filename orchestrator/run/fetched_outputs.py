@@ -52,9 +52,9 @@ def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
 def _read(system: System) -> Iterator[str]:
     """The outputs, `fmu.output`, that are read at each communication point."""
     signals = SignalVector(system)
-    Meters(system, signals)
-    Balance(system, signals)
-    make_holds(system, signals)
+    Meters(signals)
+    Balance(signals)
+    make_holds(signals)
     for c in system.connections:
         signals.sources(c)
     if system.ends_when:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from hapticlink.orchestrator.base.errors import Fault
-from hapticlink.orchestrator.plan.operations import Blend, Operation, Repeat
+from hapticlink.orchestrator.plan.operations import Blend, Get, Operation, Repeat
 from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
@@ -36,39 +37,38 @@ class Unconverged(Fault):
 
 
 class FixedPoint:
-    """One Repeat, with its solver's state. sequence: makes one call of operations; not `judged`,
-    outputs need not be finite, as within an iteration. Raises Unconverged unless the scene accepts
-    unconverged steps."""
+    """One Repeat, with its solver's state. sequence: makes one call of operations. Raises
+    Unconverged unless the scene accepts unconverged steps."""
 
     def __init__(
         self,
         operation: Repeat,
         simulation: Simulation,
-        sequence: Callable[[Iterable[Operation], bool], Call],
+        sequence: Callable[[Iterable[Operation]], Call],
     ) -> None:
         system, signals = simulation.system, simulation.signals
-        self._guess, self._again = sequence(operation.guess, True), sequence(operation.again, True)
-        self._body = sequence(operation.body, False)
-        self._ask = sequence([op for op in operation.body if isinstance(op, Blend)], True)
+        self._guess, self._again = sequence(operation.guess), sequence(operation.again)
+        self._body = sequence(
+            replace(op, judged=False) if isinstance(op, Get) else op for op in operation.body
+        )
+        self._ask = sequence(op for op in operation.body if isinstance(op, Blend))
         self._settings: Iteration = system.coupling.iteration
         self._signals, self._meters, self._dticks = signals, simulation.meters, operation.dticks
         self.counts = Iterations()
         self._seconds = system.timeline.seconds
         connections = [c for c in system.connections if c.name in operation.connections]
         self._held = [(simulation.holds[c.name], signals.sources(c)) for c in connections if c.hold]
-        self._places: list[int] = []
-        self._names: list[str] = []
+        names: dict[int, str] = {}
         for c in connections:
             for place in _read(c, system, signals):
-                if place not in self._places:
-                    self._places.append(place)
-                    self._names.append(c.name)
+                names.setdefault(place, c.name)
+        self._places, self._names = [*names], [*names.values()]
         self._solver = SOLVERS[self._settings.method]()
         self._tick = 0
         self._ways: list[Through] | None = None
         if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
-            ways = jacobians.ways(system, signals, simulation.instances, connections, self._places)
-            self._ways, self._solver.supplied = ways, self._jacobian
+            self._ways = jacobians.ways(simulation, connections, self._places)
+            self._solver.supplied = self._jacobian
 
     def __call__(self, tick: int) -> None:
         values, places, counts = self._signals.values, self._places, self.counts

@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.errors import Fault, shortened
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.hold import Hold, Needs, Vector
 from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run import spring_holds
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
@@ -22,26 +22,24 @@ from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
 
-def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
+def make_holds(signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
     """The hold of each connection by name, and the energy tanks, each shared by the holds of one
     spring-damper."""
     shared: dict[SetSpring, EnergyTank] = {}
-    holds = {c.name: make_hold(c, system, signals, shared) for c in system.connections if c.hold}
-    spring_holds.join_sides(holds, shared, system, signals)
+    connections = signals.system.connections
+    holds = {c.name: make_hold(c, signals, shared) for c in connections if c.hold}
+    spring_holds.join_sides(holds, shared, signals)
     return holds, [*shared.values()]
 
 
 def make_hold(
-    connection: Connection,
-    system: System,
-    signals: SignalVector,
-    shared: dict[SetSpring, EnergyTank],
+    connection: Connection, signals: SignalVector, shared: dict[SetSpring, EnergyTank]
 ) -> Hold:
     """The hold of `connection`, wrapped for its kind, its latency and what it reads beside its
     samples; `shared` are the energy tanks so far."""
     assert connection.hold is not None
-    made_by, size = HOLDS[connection.hold], len(connection.inputs)
-    context = _context(connection, system, signals, shared)
+    made_by, size, system = HOLDS[connection.hold], len(connection.inputs), signals.system
+    context = _context(connection, made_by.needs, signals, shared)
 
     def make() -> Hold:
         own = made_by(context)
@@ -60,7 +58,7 @@ def make_hold(
         hold = Late(hold, Link(connection.latency, system.timeline.base))
     if further := beside(connection, system.fmu):
         places = [signals.scalar(connection.source, s.name) for s in further]
-        hold = spring_holds.WithFurther(hold, spring_holds.reader(signals, places))
+        hold = spring_holds.WithFurther(hold, Reader(signals, places))
     return hold
 
 
@@ -86,14 +84,13 @@ def _turns(connection: Connection, system: System) -> dict[int, float]:
 
 def _context(
     connection: Connection,
-    system: System,
+    needs: Needs | None,
     signals: SignalVector,
     shared: dict[SetSpring, EnergyTank],
 ) -> HoldContext:
     """The context of a hold; displacement, velocity and tank only if the hold needs them."""
     size, moved, moving, tank = len(connection.inputs), None, None, None
-    power = bond(connection, system, signals)
-    if HOLDS[connection.hold or ""].needs == "power" and power:
+    if needs == "power" and (power := bond(connection, signals)):
         # Samples are converted to the target's units behind the hold, so that the displacement is
         # scaled instead.
         entries, work, places = list(power.entries), np.zeros(size), np.zeros(size, np.intp)
@@ -102,14 +99,14 @@ def _context(
         if power.moving:
             places[entries] = power.moving
             moving = Reader(signals, places.tolist(), work)
-    if HOLDS[connection.hold or ""].needs == "spring":
-        of = spring(connection, system.energy.springs)
+    if needs == "spring":
+        of = spring(connection, signals.system.energy.springs)
         assert of is not None
         if of not in shared:
-            shared[of] = spring_holds.tank(of, system, signals)
+            shared[of] = spring_holds.tank(of, signals)
         row = of.ports.index(f"{connection.target}.{connection.target_port}")
         tank = shared[of], row
-    return HoldContext(size, system.timeline.seconds, moved, moving, tank)
+    return HoldContext(size, signals.system.timeline.seconds, moved, moving, tank)
 
 
 class CheckedHold(Hold):

@@ -97,7 +97,11 @@ class OperationsInPython:
             case Record(clock):
                 simulation.recorders[clock].row(simulation.seconds(tick))
             case StopWhen():
-                self._stop_when()
+                condition = simulation.system.ends_when
+                assert condition is not None
+                value = values[simulation.signals.scalar(condition.fmu, condition.variable)]
+                if COMPARISONS[condition.comparison](value, condition.value):
+                    raise Stop
             case Save(fmu):
                 instances[fmu].save()
             case Rollback(fmu):
@@ -112,8 +116,8 @@ class OperationsInPython:
             case Collect(clock):
                 simulation.collect(clock, tick)
 
-    def _sequence(self, operations: Iterable[Operation], judged: bool) -> Call:
-        return self._joined([*instructions(operations, self.simulation, judged)])
+    def _sequence(self, operations: Iterable[Operation]) -> Call:
+        return self._joined([*instructions(operations, self.simulation)])
 
     def _one_after_the_other(self, sequence: Sequence[Instruction]) -> Call:
         def call(tick: int) -> None:
@@ -164,13 +168,6 @@ class OperationsInPython:
         derivatives, mean = held_polynomials.split(samples, simulation.seconds(width))
         values[span] = derivatives.ravel()
         values[span.stop : span.stop + len(held)] = mean
-
-    def _stop_when(self) -> None:
-        signals, condition = self.simulation.signals, self.simulation.system.ends_when
-        assert condition is not None
-        value = signals.values[signals.scalar(condition.fmu, condition.variable)]
-        if COMPARISONS[condition.comparison](value, condition.value):
-            raise Stop
 
 
 class PythonLoop:

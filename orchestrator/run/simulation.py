@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_account import Account
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.files import Recorder
@@ -23,9 +23,8 @@ from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meter import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
-from hapticlink.orchestrator.run.open_fmus import isolated, opened
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.pace import Pace
-from hapticlink.orchestrator.run.signals import SignalVector, Vector
 from hapticlink.orchestrator.run.step_check import StepCheck
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -33,7 +32,7 @@ Call = Callable[[int], object]
 Set = Callable[[Vector], object]
 
 
-class Simulation:
+class Simulation(LoadedFmus):
     """The objects of a run, which `stack` closes; rows are written to `results`.
 
     setters set the inputs of an FMU from the signals: with held values, or `now` with the newest
@@ -46,30 +45,26 @@ class Simulation:
     """
 
     def __init__(self, system: System, results: RunResults[Any], stack: ExitStack) -> None:
-        self.system, self.signals = system, SignalVector(system)
+        super().__init__(system, stack)
+        stack.callback(self._dismiss)
         self.pace: Pace | None = None
         self.beside: Mapping[str, str] = {}
-        self.sides: Mapping[str, Side] = {}
+        self.sides: dict[str, Side] = {}
         self.arrivals: dict[str, Recorder] = {}
         self.frames: dict[str, Recorder] = {}
         self.late = 0
         self.swept = False
         self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
-        self.isolated = isolated(system.fmus)
-        self.instances = opened(system, self.signals, self.isolated, stack)
-        stack.callback(self._dismiss)
         repeated = system.coupling.scheme == "iterated"
         self.step_checks = {
             fmu.name: StepCheck(self.instances[fmu.name])
             for fmu in (() if repeated else system.fmus)
             if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
         }
-        self.holds: dict[str, Hold]
-        self.springs: list[EnergyTank]
-        self.holds, self.springs = make_holds(system, self.signals)
-        self.meters = Meters(system, self.signals)
-        self.balance = Balance(system, self.signals)
+        self.holds, self.springs = make_holds(self.signals)
+        self.meters = Meters(self.signals)
+        self.balance = Balance(self.signals)
         self.recorders: dict[str, Recorder] = {}
         self.setters: dict[tuple[str, bool], Set] = {}
         self.derivative_setters: dict[str, Set] = {}
@@ -81,29 +76,25 @@ class Simulation:
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
         create the recorders."""
-        self.swept = initialize(self.system, self.instances, self.signals)
+        self.swept = initialize(self)
         values = self.signals.values
         for c in self.system.connections:
             if c.hold:
                 self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
         self.meters.start()
         self.balance.start()
-        apply_timed_events.arm(self.system, self.instances, self.signals)
+        apply_timed_events.arm(self)
         for fmu in self.system.fmus:
             incoming = self.system.into(fmu.name)
             if not incoming:
                 continue
-            connect = self.instances[fmu.name].connect
-            scalars = [s for c in incoming for s in c.inputs]
-            held = [p for c in incoming for p in self.signals.places(c)]
-            self.setters[fmu.name, False] = connect(scalars, held)
+            self.setters[fmu.name, False] = self.setter(incoming, self.signals.places)
             if derived := self._derived(incoming):
-                orders, inputs, places = zip(*derived, strict=True)
+                orders, inputs, derivatives = zip(*derived, strict=True)
                 derive = self.instances[fmu.name].connect_derivatives
-                self.derivative_setters[fmu.name] = derive(inputs, orders, places)
+                self.derivative_setters[fmu.name] = derive(inputs, orders, derivatives)
             if fmu.name in self.system.coupling.get_after_set:
-                sources = [p for c in incoming for p in self.signals.sources(c)]
-                self.setters[fmu.name, True] = connect(scalars, sources)
+                self.setters[fmu.name, True] = self.setter(incoming, self.signals.sources)
         for clock in self.system.timeline.clocks:
             recorded = self.signals.recorded(clock.name)
             columns = None if recorded is None else [*recorded]
@@ -159,25 +150,23 @@ class Simulation:
 
     def premises(self) -> dict[str, Premises]:
         """Per connection with a hold that observes its energy, what was outside its premises."""
-        accounts = {n: own for n, h in self.holds.items() if isinstance(own := _own(h), Account)}
         return {
             name: Premises(int(steps), int(outside), float(stake))
-            for name, account in accounts.items()
-            for steps, outside, stake in [account.premises]
+            for name, own in self._without_wrappers()
+            if isinstance(own, Account)
+            for steps, outside, stake in [own.premises]
         }
 
     def overdrawn(self) -> dict[str, float]:
         """Per set position, the energy (J) that the tank of its spring was short of at most."""
-        owns = {name: _own(hold) for name, hold in self.holds.items()}
         return {
             name: 0.0 - float(own.tank.least[0])
-            for name, own in owns.items()
+            for name, own in self._without_wrappers()
             if isinstance(own, PassiveSetPosition) and own.row == 0
         }
 
-
-def _own(hold: Hold) -> Hold:
-    """The hold itself, without what wraps it."""
-    while inner := getattr(hold, "own", None) or getattr(hold, "hold", None):
-        hold = inner
-    return hold
+    def _without_wrappers(self) -> Iterator[tuple[str, Hold]]:
+        for name, hold in self.holds.items():
+            while inner := getattr(hold, "own", None) or getattr(hold, "hold", None):
+                hold = inner
+            yield name, hold

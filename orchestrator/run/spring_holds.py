@@ -13,7 +13,7 @@ from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.system.ports import turns
-from hapticlink.orchestrator.system.system import Connection, System
+from hapticlink.orchestrator.system.system import Connection
 
 
 class WithFurther(Hold):
@@ -37,14 +37,14 @@ class WithFurther(Hold):
         return self.hold.value(tick, ahead)
 
 
-def tank(of: SetSpring, system: System, signals: SignalVector) -> EnergyTank:
-    timeline, unit = system.timeline, system.fmu[of.position.partition(".")[0]]
-    places, turned = _places(of.position, system, signals)
+def tank(of: SetSpring, signals: SignalVector) -> EnergyTank:
+    timeline, unit = signals.system.timeline, signals.system.fmu[of.position.partition(".")[0]]
+    places, turned = _places(of.position, signals)
     stiffness, velocity = np.array(of.stiffness), None
     if of.velocity:
-        velocity = reader(signals, _places(of.velocity, system, signals)[0])
+        velocity = Reader(signals, _places(of.velocity, signals)[0])
     near = NearEnd(
-        reader(signals, places),
+        Reader(signals, places),
         np.array([turned.get(i, 0.0) for i in range(len(places))]),
         timeline.seconds(timeline.clock(unit.clock).longest),
         timeline.seconds,
@@ -55,11 +55,10 @@ def tank(of: SetSpring, system: System, signals: SignalVector) -> EnergyTank:
     return EnergyTank(stiffness, damping, near)
 
 
-def _places(
-    port: str, system: System, signals: SignalVector
-) -> tuple[Sequence[int], Mapping[int, float]]:
+def _places(port: str, signals: SignalVector) -> tuple[Sequence[int], Mapping[int, float]]:
     """Indices of the signals of an input or output, and a full turn of its wrapped angles."""
     fmu, _, name = port.partition(".")
+    system = signals.system
     unit = system.fmu[fmu]
     if c := next((c for c in system.into(fmu) if c.target_port == name), None):
         return signals.sources(c), turns(c, system.fmu) if c.kind == "angle" else {}
@@ -70,14 +69,12 @@ def _places(
 
 
 def join_sides(
-    holds: dict[str, Hold],
-    tanks: Mapping[SetSpring, EnergyTank],
-    system: System,
-    signals: SignalVector,
+    holds: dict[str, Hold], tanks: Mapping[SetSpring, EnergyTank], signals: SignalVector
 ) -> None:
     """Give the energy tank of each spring both sides: where its force goes back to the FMU that
     sets its far end, to act on that displacement, and the hold observes the work of it. A force
     that is late or converted is left out."""
+    system = signals.system
     for i, s in enumerate(system.energy.springs):
         fmu, _, port = s.set_position.partition(".")
         sets = next((c for c in system.into(fmu) if c.target_port == port), None)
@@ -87,15 +84,10 @@ def join_sides(
                 continue
             if f"{fmu}.{c.source_port}" != s.force or c.target != sets.source:
                 continue
-            power = bond(c, system, signals)
+            power = bond(c, signals)
             if not power or np.any(power.factor != 1.0) or np.any(power.offset != 0.0):
                 continue
             if list(power.moved) == signals.sources(sets):
                 observer.tank, place = tanks[s], signals.credit(i)
-                credit = reader(signals, [place]), (observer, signals.values[place : place + 1])
+                credit = Reader(signals, [place]), (observer, signals.values[place : place + 1])
                 holds[sets.name] = WithFurther(holds[sets.name], *credit)
-
-
-def reader(signals: SignalVector, places: Sequence[int]) -> Reader:
-    """Reads the values at `places` as they are."""
-    return Reader(signals, places, np.ones(len(places)))

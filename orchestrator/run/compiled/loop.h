@@ -2,7 +2,7 @@
  *
  * All arrays belong to Python, which resolves everything that does not change during a run into
  * them. Every field has 8 bytes, so that there is no padding to agree on. What one operation reads
- * lies together (memory.py), the fields of each step first: the cost of a loop over many FMUs is
+ * lies together (fmus.Memory), the fields of each step first: the cost of a loop over many FMUs is
  * that of the cache lines that it touches.
  *
  * A comment [n] behind a pointer is the number of entries that it points to, where that is not one:

@@ -39,13 +39,11 @@ class Events:
         self._machine, self._timeline, self._block = machine, timeline, block
         self._starts = [clock.starts for clock in timeline.clocks]
         n = len(timeline.clocks)
-        self._clocks = (structures.Clock * n)()
-        self._given = [0] * n
-        self._windows = [np.zeros(0, np.int64)] * n
-        self._key = np.zeros(1 + n, np.int64)
+        clocks, self._key = (structures.Clock * n)(), np.zeros(1 + n, np.int64)
+        self._clocks, self._given = [*clocks], [0] * n
         self._kinds: dict[Event, tuple[int, int]] = {}
         self._c = c = structures.Events()
-        c.fill(timeline, "end", clocks=self._clocks, n_clocks=n, key=self._key, patience=PATIENCE)
+        c.fill(timeline, "end", clocks=clocks, n_clocks=n, key=self._key, patience=PATIENCE)
         c.at.op = -1
         if pace:
             pace.take(machine.library)
@@ -103,14 +101,11 @@ class Events:
 
     def _next_window(self, i: int) -> None:
         """The next communication points of clock i: the current one comes first."""
-        starts, clock = self._starts[i], self._clocks[i]
-        first = self._given[i] + clock.at
-        window = np.array(starts[first : first + WINDOW])
+        self._given[i] = first = self._given[i] + self._clocks[i].at
+        window = np.array(self._starts[i][first : first + WINDOW], np.int64)
         if len(window) < 2:
-            window = np.array([NEVER, NEVER])
-        window = np.ascontiguousarray(window, np.int64)
-        self._windows[i], self._given[i] = window, first
-        clock.fill(starts=window, n=len(window), at=0)
+            window = np.array([NEVER, NEVER], np.int64)
+        self._clocks[i].fill(starts=window, n=len(window), at=0)
 
     def _new_kind(self) -> None:
         self.prepare([event(self._timeline, self._key.tobytes())])
@@ -122,9 +117,9 @@ class Events:
     def prepare(self, kinds: Iterable[Event]) -> None:
         """Add the operations of kinds of events, those of `coming` before they occur."""
         self._kinds |= {kind: self._block(kind) for kind in kinds}
-        self._keys = np.array([key_of(self._timeline, kind) for kind in self._kinds], np.int64)
-        self._blocks = np.array([*self._kinds.values()], np.int64)
-        self._c.fill(keys=self._keys, kinds=self._blocks, n_kinds=len(self._kinds))
+        keys = [key_of(self._timeline, kind) for kind in self._kinds]
+        blocks = np.array([*self._kinds.values()], np.int64)
+        self._c.fill(keys=np.array(keys, np.int64), kinds=blocks, n_kinds=len(keys))
 
 
 class CompiledLoop(PythonLoop):

@@ -24,15 +24,14 @@ from hapticlink.orchestrator.plan.operations import (
     StopWhen,
 )
 from hapticlink.orchestrator.run.compiled import fmus, structures
+from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.hold_structures import (
     CompiledHold,
-    CompiledTank,
     can,
     fill_reader,
     parts,
     tanks,
 )
-from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.instructions import (
@@ -93,7 +92,6 @@ class Machine:
     def _array(self, name: str, kind: Any, n: int) -> Any:
         array = (kind * max(n, 1))()
         self.loop.fill(**{name: array})
-        self._kept.append(array)
         return array
 
     def _make_holds(self) -> None:
@@ -101,17 +99,15 @@ class Machine:
         repeats = system.coupling.scheme == "iterated"
         shared = tanks(simulation.holds.values(), repeats)
         for name, hold in simulation.holds.items():
-            own = parts(hold).own
-            needed = getattr(own, "tank", None)
+            needed = getattr(parts(hold).own, "tank", None)
             tank = shared.get(id(needed))
-            if not can(hold, repeats) or (needed and tank is None):
-                continue
-            simulation.holds[name] = self._compiled(name, hold, tank)
+            if can(hold, repeats) and (tank or not needed):
+                simulation.holds[name] = self._compiled(name, hold, tank)
         compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
         for hold in compiled:
             hold.join(compiled)
 
-    def _compiled(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:
+    def _compiled(self, name: str, hold: Hold, tank: structures.Tank | None = None) -> CompiledHold:
         signals = self._simulation.signals
         sources = signals.sources(self._simulation.system.connection[name])
         values, loop = signals.values[signals.hold(name)], ctypes.addressof(self.loop)
@@ -159,8 +155,7 @@ class Machine:
             if instruction not in self._records:
                 self._records[instruction] = self._record(instruction)
         records = [self._records[instruction] for instruction in self._instructions]
-        self._ops = (Op * len(records))(*records)
-        self.loop.fill(ops=self._ops)
+        self.loop.fill(ops=(Op * len(records))(*records))
         return first, len(self._instructions)
 
     def _joined(self, sequence: Sequence[Instruction]) -> Call:
@@ -206,8 +201,7 @@ class Machine:
             case Blend(connection, points) if (index := self._hold(connection)) is not None:
                 first = len(self._points)
                 self._points += [(weight, float(ahead)) for weight, ahead in points]
-                self._kept.append(of := np.array(self._points))
-                self.loop.fill(points=of)
+                self.loop.fill(points=np.array(self._points))
                 return Op(structures.BLEND, index, first, len(self._points))
             case Sample(connection, ahead):
                 return Op(structures.SAMPLE, self._meter(connection), ahead)
@@ -346,9 +340,8 @@ class Machine:
             instance = simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
             if code == structures.FAILED:
-                raise instance.failed(
-                    self._called(instruction, position.what, instance), position.status
-                )
+                called = self._called(instruction, position.what, instance)
+                raise instance.failed(called, position.status)
             if code == structures.UNRESTORED:
                 called = f"fmi{instance.description.fmi}SetFMUstate"
                 raise instance.failed(called, position.status)
@@ -365,12 +358,11 @@ class Machine:
         """The name of the failed call of a get, a set or a step."""
         if number < 0:
             return instance.do_step
-        transfers = instance.asked
-        if isinstance(instruction, Set):
-            setter = self._simulation.setters[instruction.fmu, instruction.now]
-            assert isinstance(setter, Setter)
-            transfers = [*setter.transfers]
-        return transfers[number].name
+        if not isinstance(instruction, Set):
+            return instance.asked[number].name
+        setter = self._simulation.setters[instruction.fmu, instruction.now]
+        assert isinstance(setter, Setter)
+        return setter.transfers[number].name
 
 
 def _fill_meter(c: structures.Meter, meter: Meter) -> None:

@@ -19,7 +19,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.system.ports import paired
-from hapticlink.orchestrator.system.system import Connection, System
+from hapticlink.orchestrator.system.system import Connection
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Bond:
         return self.factor * self.scale
 
 
-def bond(c: Connection, system: System, signals: SignalVector) -> Bond | None:
-    target = system.fmu[c.target].description
-    pairs = ((i, s, paired(c, s, system.energy.power)) for i, s in enumerate(c.inputs))
+def bond(c: Connection, signals: SignalVector) -> Bond | None:
+    target = signals.system.fmu[c.target].description
+    pairs = ((i, s, paired(c, s, signals.system.energy.power)) for i, s in enumerate(c.inputs))
     carrying = [(i, s, p.sign, _displacement(target, s, p)) for i, s, p in pairs if p]
     if not carrying or c.initial:
         return None
@@ -91,18 +91,17 @@ class Reader:
         self,
         signals: SignalVector,
         places: Sequence[int],
-        factor: Vector,
+        factor: Vector | float = 1.0,
         offset: Vector | float = 0.0,
     ) -> None:
-        self._values, self._view = signals.values, signals.view(places)
-        self.where = np.array(places, dtype=np.intp)
+        self._values, self.where = signals.values, np.array(places, np.intp)
         self.factor: Vector | None = None
         self.offset: Vector | None = None
         if np.any(factor != 1.0) or np.any(offset != 0.0):
-            self.factor = np.array(factor, dtype=np.float64)
-            self.offset = np.full(len(self.where), offset, dtype=np.float64)
+            self.factor, self.offset = (np.full(len(places), v) for v in (factor, offset))
 
     def __call__(self) -> Vector:
-        if self.factor is not None and self.offset is not None:
-            return self.factor * self._values[self.where] + self.offset
-        return self._values[self.where] if self._view is None else self._view.copy()
+        read: Vector = self._values[self.where]
+        if self.factor is None or self.offset is None:
+            return read
+        return self.factor * read + self.offset

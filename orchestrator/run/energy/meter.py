@@ -25,7 +25,6 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import System
 
 Read = Callable[[], Vector]
 Rows = TypeVar("Rows", NDArray[np.float64], NDArray[np.int64])
@@ -199,14 +198,15 @@ class Meters:
     the gets and sets of a run update (`instructions`): `of` by the connection's name, of_source and
     of_target the names by FMU. shares: of a step, that a doStep of a plant with substeps takes."""
 
-    def __init__(self, system: System, signals: SignalVector) -> None:
+    def __init__(self, signals: SignalVector) -> None:
+        system = signals.system
         self.of: dict[str, Meter] = {}
         self.of_source: dict[str, list[str]] = {}
         self.of_target: dict[str, list[str]] = {}
         self._seconds = float(system.timeline.base)
         self.shares = {name: 1.0 / parts for name, parts in system.coupling.substeps.items()}
         for c in system.connections:
-            power = bond(c, system, signals)
+            power = bond(c, signals)
             if power is None:
                 continue
             source, held = (
