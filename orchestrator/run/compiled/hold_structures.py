@@ -17,7 +17,7 @@ from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
-from hapticlink.orchestrator.run.spring_holds import WithFurther
+from hapticlink.orchestrator.run.make_holds import WithFurther
 from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 KINDS: Mapping[type[Hold], int] = {

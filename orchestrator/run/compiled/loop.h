@@ -237,8 +237,8 @@ enum {
     STOP_WHEN,   /* signal a, comparison b, limit x */
 };
 
-/* The steps of a clock's FMUs that are taken beside the loop: beside.py. awaited: they were not done
- * when their end came. longer: a step may go on to the first end that is not past. */
+/* The steps of a clock's FMUs that are taken beside the loop: concurrent_fmus.py. awaited: they were not
+ * done when their end came. longer: a step may go on to the first end that is not past. */
 typedef struct {
     int64_t started, done, awaited, longer;
 } Side;

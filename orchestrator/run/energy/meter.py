@@ -194,29 +194,19 @@ def _grown(array: Rows, rows: int) -> Rows:
 
 
 class Meters:
-    """One meter for each connection that carries power, of the efforts that its target gets, which
-    the gets and sets of a run update (`instructions`): `of` by the connection's name, of_source and
-    of_target the names by FMU. shares: of a step, that a doStep of a plant with substeps takes."""
+    """One meter for each connection that carries power, of the efforts that its target gets, by its
+    name; the gets and sets of a run update them (`instructions`)."""
 
     def __init__(self, signals: SignalVector) -> None:
-        system = signals.system
         self.of: dict[str, Meter] = {}
-        self.of_source: dict[str, list[str]] = {}
-        self.of_target: dict[str, list[str]] = {}
-        self._seconds = float(system.timeline.base)
-        self.shares = {name: 1.0 / parts for name, parts in system.coupling.substeps.items()}
-        for c in system.connections:
-            power = bond(c, signals)
-            if power is None:
-                continue
-            source, held = (
-                Reader(signals, power.of(places), power.factor, power.offset)
-                for places in (signals.sources(c), signals.mean(c))
-            )
-            meter = Meter(source, held, Reader(signals, power.moved, power.scale))
-            self.of[c.name] = meter
-            self.of_source.setdefault(c.source, []).append(c.name)
-            self.of_target.setdefault(c.target, []).append(c.name)
+        self._seconds = float(signals.system.timeline.base)
+        for c in signals.system.connections:
+            if power := bond(c, signals):
+                source, held = (
+                    Reader(signals, power.of(places), power.factor, power.offset)
+                    for places in (signals.sources(c), signals.mean(c))
+                )
+                self.of[c.name] = Meter(source, held, Reader(signals, power.moved, power.scale))
 
     def start(self) -> None:
         for meter in self.of.values():
