@@ -61,6 +61,7 @@ class OperationsInPython:
         connections, sources = simulation.system.connections, simulation.signals.sources
         self._sources = {c.name: sources(c) for c in connections if c.hold}
         self.loops: dict[Repeat, FixedPoint] = {}
+        self._loop_of: dict[int, FixedPoint] = {}  # a Repeat's hash takes as long as a step
 
     def __call__(self, instruction: Instruction, tick: int) -> None:
         simulation = self.simulation
@@ -107,14 +108,20 @@ class OperationsInPython:
             case Rollback(fmu):
                 instances[fmu].rollback()
             case Repeat():
-                if instruction not in self.loops:
-                    self.loops[instruction] = FixedPoint(instruction, simulation, self._sequence)
-                self.loops[instruction](tick)
+                if (loop := self._loop_of.get(id(instruction))) is None:
+                    loop = self._loop_of[id(instruction)] = self._loop(instruction)
+                loop(tick)
             case Finish(fmus):
                 for fmu in fmus:
                     instances[fmu].finish()
             case Collect(clock):
                 simulation.collect(clock, tick)
+
+    def _loop(self, repeat: Repeat) -> FixedPoint:
+        """The iteration of a Repeat, which all events share with its solver's state."""
+        if repeat not in self.loops:
+            self.loops[repeat] = FixedPoint(repeat, self.simulation, self._sequence)
+        return self.loops[repeat]
 
     def _sequence(self, operations: Iterable[Operation]) -> Call:
         return self._joined([*instructions(operations, self.simulation)])
