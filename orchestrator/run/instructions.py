@@ -65,7 +65,7 @@ def instructions(operations: Iterable[Operation], simulation: Simulation) -> Ite
 def _with_meters(operations: Iterable[Operation], simulation: Simulation) -> Iterator[Instruction]:
     """The operations, each followed by what the meters take of it, with a Collect before the first
     outputs of a clock whose FMUs step beside the loop."""
-    system, meters, collected = simulation.system, simulation.meters.of, set[str]()
+    meters, collected = simulation.meters, set[str]()
     for operation in operations:
         match operation:
             case Get(fmu, ahead):
@@ -74,12 +74,12 @@ def _with_meters(operations: Iterable[Operation], simulation: Simulation) -> Ite
                     collected.add(clock)
                     yield Collect(clock)
                 yield operation
-                yield from (Sample(c.name, ahead) for c in system.out_of(fmu) if c.name in meters)
-                yield from (Move(c.name, ahead) for c in system.into(fmu) if c.name in meters)
+                yield from (Sample(c, ahead) for c in meters.of_source.get(fmu, ()))
+                yield from (Move(c, ahead) for c in meters.of_target.get(fmu, ()))
             case Set(fmu, now=False):
                 yield operation
-                share = 1.0 / system.coupling.substeps.get(fmu, 1)
-                yield from (Feed(c.name, share) for c in system.into(fmu) if c.name in meters)
+                share = 1.0 / simulation.system.coupling.substeps.get(fmu, 1)
+                yield from (Feed(c, share) for c in meters.of_target.get(fmu, ()))
             case _:
                 yield operation
 

@@ -87,6 +87,7 @@ class Machine:
         self._meters = self._array("meters", ctypes.c_void_p, len(simulation.meters.of))
         self._indices: dict[str, dict[Any, int]] = {kind: {} for kind in KINDS}
         self._records: dict[Instruction, Op] = {}
+        self._ops: list[Op] = []
         self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
@@ -154,8 +155,8 @@ class Machine:
         for instruction in sequence:  # kinds of events share most of theirs
             if instruction not in self._records:
                 self._records[instruction] = self._record(instruction)
-        records = [self._records[instruction] for instruction in self._instructions]
-        self.loop.fill(ops=(Op * len(records))(*records))
+            self._ops.append(self._records[instruction])
+        self.loop.fill(ops=(Op * len(self._ops))(*self._ops))
         return first, len(self._instructions)
 
     def _joined(self, sequence: Sequence[Instruction]) -> Call:

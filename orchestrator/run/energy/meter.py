@@ -194,11 +194,14 @@ def _grown(array: Rows, rows: int) -> Rows:
 
 
 class Meters:
-    """One meter for each connection that carries power, of the efforts that its target gets, by its
-    name; the gets and sets of a run update them (`instructions`)."""
+    """One meter for each connection that carries power, of the efforts that its target gets: `of`
+    by its name, of_source and of_target the names by FMU. The gets and sets of a run update them
+    (`instructions`)."""
 
     def __init__(self, signals: SignalVector) -> None:
         self.of: dict[str, Meter] = {}
+        self.of_source: dict[str, list[str]] = {}
+        self.of_target: dict[str, list[str]] = {}
         self._seconds = float(signals.system.timeline.base)
         for c in signals.system.connections:
             if power := bond(c, signals):
@@ -207,6 +210,8 @@ class Meters:
                     for places in (signals.sources(c), signals.mean(c))
                 )
                 self.of[c.name] = Meter(source, held, Reader(signals, power.moved, power.scale))
+                self.of_source.setdefault(c.source, []).append(c.name)
+                self.of_target.setdefault(c.target, []).append(c.name)
 
     def start(self) -> None:
         for meter in self.of.values():
