@@ -19,8 +19,8 @@ from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.run.compiled import structures
-from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.library import load
+from hapticlink.orchestrator.run.compiled.loop import Events
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.visualization.figures.real_time_figure import real_time

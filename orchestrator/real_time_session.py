@@ -148,7 +148,7 @@ class LiveRun:
             raise InputFault(unknown("connection with a hold", name, every))
         new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in connections]
         for connection in new:
-            held = make_hold(connection, system, self._simulation.signals, {})
+            held = make_hold(connection, self._simulation.signals, {})
             self._loop.change_hold(connection.name, held)
             self._connections[connection.name] = connection
             sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]

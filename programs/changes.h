@@ -41,7 +41,7 @@ static int change_hold(Model *m, int choice, int64_t microseconds) {
     double *sample = hold_scratch(h);
     const int64_t stamp = previous(m, hold_clocks[k]);
     for (int64_t i = 0; i < h->width; i++) sample[i] = l->values[h->sources[i]];
-    return !hold_push(h, sample, stamp, stamp);
+    return !hapticlink_push(h, sample, stamp, stamp);
 }
 
 /* --- rate ------------------------------------------------------------------------------------- */

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.holds.energy_account import Account
+from hapticlink.orchestrator.plan.event_kinds import key_of
 from hapticlink.orchestrator.plan.operations import Event, Firing, Record
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.run.bind_operations import Binder, Bound
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
+from hapticlink.orchestrator.run.instructions import instructions
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.records import Latency
@@ -82,7 +83,7 @@ NONE = Changes([], 0)
 
 
 def changes(
-    machine: Machine, simulation: Simulation, plan: Plan, binder: Binder, kinds: Iterable[Event]
+    machine: Machine, simulation: Simulation, plan: Plan, kinds: Iterable[Event]
 ) -> Changes:
     """The changes that are possible in a scene. kinds: of its events."""
     held = [*_holds(machine, simulation)]
@@ -98,13 +99,12 @@ def changes(
     timeline, index = simulation.system.timeline, names.index(CLOCK)
     families = []
     for event in _with_clock(kinds, timeline, index):
-        family = _family(machine, plan, binder, event, timeline)
+        family = _family(machine, simulation, plan, event)
         if family is None:
             return possible
         families.append(family)
     most = max(family.n for family in families)
-    nothing: Bound = [(Record(CLOCK), lambda tick: None)] * (SPARE_KINDS * most)
-    first, _ = machine.block(nothing)
+    first, _ = machine.block([Record(CLOCK)] * (SPARE_KINDS * most))
     return replace(possible, clock=index, families=tuple(families), spare=first, most=most)
 
 
@@ -119,7 +119,7 @@ def _holds(machine: Machine, simulation: Simulation) -> Iterator[tuple[Choice, C
         for hold in holds:
             other = replace(held_by(connection, hold, None), latency=latency)
             with suppress(InputFault):  # a hold of a plugin
-                new = machine.other_hold(name, make_hold(other, system, simulation.signals, {}))
+                new = machine.other_hold(name, make_hold(other, simulation.signals, {}))
                 longest = MOST_DELAY + (1 / LEAST_RATE if isinstance(new.own, Account) else 0.0)
                 while new.room < math.ceil(longest / haptic) + 8:
                     new.grow()
@@ -139,16 +139,14 @@ def _with_clock(kinds: Iterable[Event], timeline: Timeline, index: int) -> Itera
     yield from found
 
 
-def _family(
-    machine: Machine, plan: Plan, binder: Binder, event: Event, timeline: Timeline
-) -> Family | None:
+def _family(machine: Machine, simulation: Simulation, plan: Plan, event: Event) -> Family | None:
     """The operations of an event as a function of the length of the clock's step; None where they
     are not linear in it."""
     blocks = []
     for dticks in (1, 2, 4):
         firings = tuple(f._replace(dticks=dticks) if f.clock == CLOCK else f for f in event.firings)
-        bound = binder.instructions(plan.block(event._replace(firings=firings)))
-        first, last = machine.block(bound)
+        block = plan.block(event._replace(firings=firings))
+        first, last = machine.block([*instructions(block, simulation)])
         blocks.append((first, last - first))
     sizes = {n for _, n in blocks}
     if len(sizes) > 1:
@@ -163,9 +161,7 @@ def _family(
         grown = [getattr(one, f) + 3 * s for f, s in zip(FIELDS, slopes[-1], strict=True)]
         if any(abs(g - getattr(four, f)) > 1e-12 for f, g in zip(FIELDS, grown, strict=True)):
             return None
-    fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
-    key = [int(event.first), *(fired.get(clock.name, 0) for clock in timeline.clocks)]
-    return Family(key, blocks[0][0], n, 1, slopes)
+    return Family(key_of(plan.system.timeline, event), blocks[0][0], n, 1, slopes)
 
 
 def _op(machine: Machine, index: int) -> int:

@@ -15,9 +15,9 @@ void note_arithmetic(void) {}
 
 void keep_arithmetic(Place *p) { (void)p; }
 
-void guard_exit(int on) { (void)on; }
+void hapticlink_guard(int on) { (void)on; }
 
-void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
+void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
     (void)ensure, (void)occurred, (void)release;
 }
 

@@ -93,8 +93,6 @@ MEMBERS(DECLARE)
 #define ROW(id, name, guid) {#id, name, guid, FUNCTIONS(NAME, id)},
 static const Member members[] = {MEMBERS(ROW)};
 
-int hapticlink_events(Loop *l, Events *e);
-
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP_MODE = 4, ENDED = 8, FAILURE = 16, TERMINATED = 32 };
 enum { SWEEPS = 50 };
 static const double TOLERANCE = 1e-12; /* of start values: run/initialize.py */
@@ -290,7 +288,7 @@ static int begin(Model *m) {
         if (f->good) memcpy(f->good, f->outputs, f->n_outputs * sizeof(double));
     }
     At at = {START_FIRST, START_LAST, 0, 0};
-    return loop_carry_out(l, 0, &at);
+    return hapticlink_block(l, &at, 0);
 }
 
 #include "changes.h"

@@ -21,19 +21,19 @@ from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account
+from hapticlink.orchestrator.plan.event_kinds import key_of
 from hapticlink.orchestrator.plan.operations import Event, Push
 from hapticlink.orchestrator.plan.plan import Plan, moments
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.bind_operations import Binder
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
 from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
-from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample
+from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample, instructions
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
@@ -193,13 +193,12 @@ def _resolved(
     samples: list[Instruction] = [Push(c.name) for c in system.connections if c.hold]
     for name in simulation.meters.of:
         samples += [Sample(name, 0), Move(name, 0)]
-    start = machine.block([(instruction, _nothing) for instruction in samples])
-    binder = Binder(simulation, machine.joined)
+    start = machine.block(samples)
     kinds = dict[Event, tuple[int, int]]()
     for event in _kinds(system.timeline):
-        bound = binder.instructions(plan.block(event))
-        kinds[event] = machine.block([b for b in bound if getattr(b[0], "fmu", "") != outside])
-    possible = changes(machine, simulation, plan, binder, kinds) if changing else NONE
+        every = instructions(plan.block(event), simulation)
+        kinds[event] = machine.block([i for i in every if getattr(i, "fmu", "") != outside])
+    possible = changes(machine, simulation, plan, kinds) if changing else NONE
     refusals.of_machine(machine.in_python, scene.title)
     events = Events(system.timeline, kinds, possible)
     fmus, memory = machine.names("fmu"), Memory()
@@ -237,10 +236,6 @@ def _resolved(
         tables=machine.names("table"),
         kept=(machine, events, setters, kept, memory, rows),
     )
-
-
-def _nothing(tick: int) -> None:
-    """What stands for the call of an operation that a program carries out."""
 
 
 def _as_before_the_start(simulation: Simulation, outside: str | None, changing: bool) -> None:
@@ -296,9 +291,8 @@ def _start_setter(simulation: Simulation, fmu: str, c: structures.Setter, memory
     instance = simulation.instances[fmu]
     assert isinstance(instance, InProcess)
     incoming = [c for c in simulation.system.connections if c.target == fmu]
-    scalars = [s for c in incoming for s in c.inputs]
-    places = [p for c in incoming for p in simulation.signals.places(c)]
-    setter = instance.connect(scalars, places)
+    setter = simulation.setter(incoming, simulation.signals.places)
+    assert isinstance(setter, Setter)
     compiled_fmus.of_setter(setter, instance, c, memory)
     return setter
 
@@ -351,8 +345,7 @@ class Events:
         self._keys = np.full((n_kinds, 1 + n), -1, np.int64)  # spare ones are no event's
         self._key, self._blocks = np.zeros(1 + n, np.int64), (structures.Block * n_kinds)()
         for key, block, (event, span) in zip(self._keys, self._blocks, kinds.items(), strict=False):
-            fired = {f.clock: 2 * f.dticks + f.final for f in event.firings}
-            key[:] = [event.first, *(fired.get(clock.name, 0) for clock in timeline.clocks)]
+            key[:] = key_of(timeline, event)
             block.first, block.last = span
         for i, block in enumerate(self._blocks[len(kinds) :]):
             block.first = block.last = possible.spare + i * possible.most

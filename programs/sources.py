@@ -28,7 +28,7 @@ from hapticlink.programs.typed_data import TypedData
 
 HERE = Path(__file__).parent
 OWN = ("program.h", "program.c", "changes.h", "platform.c", "latencies.c")
-REPLACED = ("platform.c", "process_state.c", "python_errors.c")
+REPLACED = ("platform.c", "process_state.c")
 """Files of the loop in whose place a program has its own platform.c."""
 FUNCTIONS = {
     "fmi2GetReal": "GET_REAL",

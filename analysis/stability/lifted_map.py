@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import takewhile
 
 import numpy as np
@@ -26,8 +26,8 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Event, Operation, Record, Repeat, StopWhen
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.run.bind_operations import Binder, Bound
-from hapticlink.orchestrator.run.instructions import Feed, Move, Sample
+from hapticlink.orchestrator.run.instructions import Feed, Instruction, Move, Sample, instructions
+from hapticlink.orchestrator.run.python_loop import OperationsInPython
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -74,9 +74,9 @@ class LiftedMap:
         window: tuple[int, int] | None = None,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
-        self._bound: dict[Event, Bound] = {}
+        self._known: dict[Event, list[Instruction]] = {}
         self._plan, self.system = plan, plan.system
-        self._binder = Binder(simulation)
+        self._carry_out = OperationsInPython(simulation)
         self._sensitivity = sensitivity
         self._state = StateVector(simulation)
         length = window[1] if window else hyperperiod(time)
@@ -120,7 +120,10 @@ class LiftedMap:
         moving, moved, ran = self.moving, 0.0, False
         events, known = [], dict[tuple[int, ...], tuple[Applied, ...]]()
         for k, (tick, event) in enumerate(self._moments):
-            each = (self._sensitivity.applied(tick, *both) for both in self._instructions(event))
+            each = (
+                self._sensitivity.applied(tick, operation, partial(self._carry_out, operation))
+                for operation in self._instructions(event)
+            )
             acting = tuple(applied for applied in each if applied)
             key = tuple(map(id, acting))
             ran = ran or key not in known or any(isinstance(a.operation, Repeat) for a in acting)
@@ -164,7 +167,7 @@ class LiftedMap:
         return sum(
             isinstance(operation, kind) and getattr(operation, "fmu", None) == fmu
             for _, event in self._moments
-            for operation, _ in self._instructions(event)
+            for operation in self._instructions(event)
         )
 
     def outputs(self, fmu: str) -> slice:
@@ -194,21 +197,19 @@ class LiftedMap:
         return found
 
     def _run(self, tick: int, event: Event) -> None:
-        for _, call in self._instructions(event):
-            call(tick)
+        for instruction in self._instructions(event):
+            self._carry_out(instruction, tick)
 
-    def _instructions(self, kind: Event) -> Bound:
-        """The operations of a kind of event, without those that write rows, measure energy or end a
-        run, and their calls."""
-        if kind not in self._bound:
-            operations: list[Operation] = [
-                operation
-                for operation in self._plan.block(kind)
-                if not isinstance(operation, Record | StopWhen)
+    def _instructions(self, kind: Event) -> list[Instruction]:
+        """The instructions of a kind of event, without those that write rows, measure energy or end
+        a run."""
+        if kind not in self._known:
+            self._known[kind] = [
+                instruction
+                for instruction in instructions(self._plan.block(kind), self._simulation)
+                if not isinstance(instruction, Record | StopWhen | Sample | Move | Feed)
             ]
-            bound = self._binder.instructions(operations)
-            self._bound[kind] = [b for b in bound if not isinstance(b[0], Sample | Move | Feed)]
-        return self._bound[kind]
+        return self._known[kind]
 
 
 def behind_start(system: System) -> int:

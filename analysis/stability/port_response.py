@@ -77,7 +77,7 @@ def hand_port(system: System) -> HandPort:
     """Raises InputFault where no hand pushes on an FMU."""
     signals = SignalVector(system)
     for c in system.connections:
-        found = bond(c, system, signals) if system.block(c.source) == HAND else None
+        found = bond(c, signals) if system.block(c.source) == HAND else None
         if found:
             inputs = tuple(c.inputs[i].name for i in found.entries)
             forces = tuple(found.of(signals.sources(c)))
@@ -92,7 +92,7 @@ def mechanism_port(system: System, hand: HandPort) -> MechanismPort | None:
     fmu = next((f.name for f in system.fmus if system.block(f.name) == MECHANISM), None)
     if fmu is None or fmu == hand.handle:
         return None
-    bonds = [(c, b) for c in system.into(fmu) if (b := bond(c, system, signals))]
+    bonds = [(c, b) for c in system.into(fmu) if (b := bond(c, signals))]
     point = next(((b.moved, b.moving) for c, b in bonds if c.source != hand.hand), None)
     if point is None or not point[1]:
         return None

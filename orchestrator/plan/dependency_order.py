@@ -19,14 +19,18 @@ class AlgebraicLoop:
 
 
 def groups(system: System, fmus: Iterable[Fmu]) -> list[list[Fmu]]:
-    """`units` in groups, each after those that feed it; a group of several FMUs is a loop."""
-    names = {u.name for u in fmus}
-    feeds = {u.name: [c.source for c in system.into(u.name) if c.source in names] for u in fmus}
+    """FMUs in groups, each after those that feed it; a group of several FMUs is a loop."""
+    feeds = _feeds(system, [u.name for u in fmus])
     return [[system.fmu[n] for n in group] for group in components(feeds)]
 
 
+def _feeds(system: System, names: Collection[str]) -> dict[str, list[str]]:
+    """For each of these FMUs, those of them that feed it."""
+    return {n: [c.source for c in system.into(n) if c.source in names] for n in names}
+
+
 def direct(system: System, fmus: Iterable[Fmu]) -> dict[str, set[str]]:
-    """For each unit, those of `units` on which its used outputs depend by direct feed-through
+    """For each of these FMUs, those of them on which its used outputs depend by direct feed-through
     (ModelStructure, FMI 2.0.5 section 2.2.8)."""
     names = {u.name for u in fmus}
     return {
@@ -60,9 +64,8 @@ def loops(system: System, ordered: Iterable[Iterable[Fmu]]) -> Iterator[Algebrai
     for fmus in ordered:
         for group in plants(system, fmus):
             names = tuple(u.name for u in group)
-            feeds = {n: [c.source for c in system.into(n) if c.source in names] for n in names}
             if len(names) > 1:
-                yield AlgebraicLoop(names, ring(feeds, names))
+                yield AlgebraicLoop(names, ring(_feeds(system, names), names))
 
 
 def components(feeds: Mapping[str, Collection[str]]) -> list[list[str]]:

@@ -7,7 +7,6 @@ An event's key: whether it is the first, then for each clock twice the step (tic
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,26 +25,25 @@ def keyed_events(
     every = [clock.starts for clock in timeline.clocks]
     until = min(until, *(starts[most] for starts in every if len(starts) > most), timeline.end)
     begun = [np.array(starts[: bisect_right(starts, until) + 1], np.int64) for starts in every]
-    ticks, keys = keyed(begun, until, timeline.end)
+    # With an index, since NumPy loads its masked arrays otherwise.
+    ticks, _ = np.unique(np.concatenate([starts[:-1] for starts in begun]), return_index=True)
+    ticks = ticks[ticks <= until]
+    keys = np.zeros((len(ticks), 1 + len(begun)), np.int64)
+    keys[:, 0] = ticks == 0
+    for i, starts in enumerate(begun):
+        start = starts[:-1][starts[:-1] <= until]
+        after = starts[1 : len(start) + 1]
+        keys[np.searchsorted(ticks, start), 1 + i] = 2 * (after - start) + (after > timeline.end)
     kinds: dict[bytes, list[int]] = {}
     for i, key in enumerate(map(bytes, keys[:most])):
         kinds.setdefault(key, []).append(i)
     return ticks[:most], {event(timeline, key): np.array(rows) for key, rows in kinds.items()}
 
 
-def keyed(starts: Sequence[Ticks], known: int, end: int) -> tuple[Ticks, NDArray[np.int64]]:
-    """The ticks of the events up to `known` with their keys; `starts` are communication points of
-    each clock as far as the one after that, `end` is that of the run."""
-    # With an index, since NumPy loads its masked arrays otherwise.
-    ticks, _ = np.unique(np.concatenate([each[:-1] for each in starts]), return_index=True)
-    ticks = ticks[ticks <= known]
-    keys = np.zeros((len(ticks), 1 + len(starts)), np.int64)
-    keys[:, 0] = ticks == 0
-    for i, each in enumerate(starts):
-        start = each[:-1][each[:-1] <= known]
-        after = each[1 : len(start) + 1]
-        keys[np.searchsorted(ticks, start), 1 + i] = 2 * (after - start) + (after > end)
-    return ticks, keys
+def key_of(timeline: Timeline, kind: Event) -> list[int]:
+    """The key of a kind of event."""
+    fired = {f.clock: 2 * f.dticks + f.final for f in kind.firings}
+    return [int(kind.first), *(fired.get(clock.name, 0) for clock in timeline.clocks)]
 
 
 def event(timeline: Timeline, key: bytes) -> Event:

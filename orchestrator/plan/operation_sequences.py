@@ -29,11 +29,6 @@ def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
     return [u for u in due if u.sampled], [u for u in due if not u.sampled]
 
 
-def without_steps(event: Event) -> Event:
-    """The event with the steps of all plants left out."""
-    return event._replace(firings=tuple(f._replace(final=True) for f in event.firings))
-
-
 def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
     """The plants that start a step; steps that would pass the end of the run are not started."""
     started = {f.clock for f in event.firings if not f.final}

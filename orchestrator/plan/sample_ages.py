@@ -46,13 +46,13 @@ def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
     system, seconds = plan.system, plan.system.timeline.seconds
     ticks, kinds = keyed_events(system.timeline, pattern_end(system), events)
     found: dict[str, list[NDArray[np.int64]]] = {}
-    if any(c.latency for c in system.connections) and len(ticks):
-        for tick, connection, stamp in uses(plan, int(ticks[-1])):
-            if tick:
-                found.setdefault(connection, []).append(np.array([tick - stamp]))
-    else:
-        for connection, ages in _ages(plan, ticks, kinds):
+    late = {c.name for c in system.connections if c.latency}
+    for connection, ages in _ages(plan, ticks, kinds):
+        if connection not in late:
             found.setdefault(connection, []).append(ages)
+    for tick, connection, stamp in uses(plan, int(ticks[-1]), late) if late and len(ticks) else ():
+        if tick:
+            found.setdefault(connection, []).append(np.array([tick - stamp]))
     joined = {name: np.concatenate(parts) for name, parts in found.items()}
     return {
         name: Delay(seconds(int(a.min())), seconds(int(a.max())), seconds(int(a.sum())) / len(a))

@@ -7,20 +7,20 @@ loop; a step of an FMU without a change that is due costs one comparison of two 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import Change, System
+from hapticlink.orchestrator.system.system import Change
 
 
-def arm(system: System, instances: Mapping[str, Instance], signals: SignalVector) -> None:
+def arm(fmus: LoadedFmus) -> None:
     """Have each FMU take its changes before the steps that these are for."""
-    for change in system.changes:
+    for change in fmus.system.changes:
         if change.fmu:
-            _Setting(change, instances[change.fmu], signals).wait(change.begin)
+            _Setting(change, fmus.instances[change.fmu], fmus.signals).wait(change.begin)
 
 
 class _Setting:

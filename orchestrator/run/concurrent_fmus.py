@@ -11,13 +11,12 @@ fixed, to the next one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from queue import SimpleQueue
 from threading import Thread
 from typing import Protocol
 
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
-from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.plan.operations import Event, Firing, Step
 from hapticlink.orchestrator.plan.plan import Plan
@@ -65,8 +64,9 @@ class ThreadWorker:
 
 
 class Side:
-    """The FMUs of a clock whose steps are taken beside the loop. `c` is shared with the compiled
-    loop; clock: ns."""
+    """The FMUs of a clock whose steps are taken beside the loop; longer: whether these may go on to
+    the first communication point that is not past. `c` is shared with the compiled loop; clock: ns.
+    """
 
     def __init__(self, longer: bool, clock: Callable[[], int], worker: Worker) -> None:
         self.c = structures.Side(longer=longer)
@@ -160,18 +160,3 @@ def beside_or_refused(plan: Plan) -> dict[str, str]:
             why = unable.get(fmu.name, "it is at the haptic rate")
             raise InputFault(f"{fmu.name} cannot be remote in real time: {why}")
     return able
-
-
-def sides(
-    plan: Plan, able: Mapping[str, str], clock: Callable[[], int], worker: Callable[[str], Worker]
-) -> dict[str, Side]:
-    """The side of each clock that has FMUs beside the loop; `worker` makes that of a clock."""
-    fmus, clocks = plan.system.fmu, dict.fromkeys(able.values())
-    return {
-        name: Side(
-            all(varies_step(fmus[f].description) for f, of in able.items() if of == name),
-            clock,
-            worker(name),
-        )
-        for name in clocks
-    }

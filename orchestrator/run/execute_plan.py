@@ -18,12 +18,11 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal, delays
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run.bind_operations import Stop
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.energy.balance import unstable
-from hapticlink.orchestrator.run.python_loop import PythonLoop
+from hapticlink.orchestrator.run.python_loop import OperationsInPython, PythonLoop, Stop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
@@ -120,7 +119,7 @@ def run(
             loop = (
                 CompiledLoop(plan, simulation, library)
                 if library
-                else PythonLoop(plan, simulation, {"everything": why})
+                else PythonLoop(plan, OperationsInPython(simulation), {"everything": why})
             )
             simulation.start()
             if isinstance(loop, CompiledLoop):

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from hapticlink.orchestrator.run.energy.balance import Balance
-from hapticlink.orchestrator.run.energy.meters import Meters
+from hapticlink.orchestrator.run.energy.meter import Meters
 from hapticlink.orchestrator.run.initialize import START_POSE_OUTPUTS
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector
@@ -27,21 +27,19 @@ def with_fetched(system: System) -> System:
     every = tuple(f"{u.name}.{s.name}" for u in system.fmus for s in u.description.outputs)
     written = every if recording.outputs is None else recording.outputs
     often, rows = {*_read(system)}, {*written}
-    fmus = tuple(
-        _with(u, _ports(u, often), _ports(u, rows), recording.every > 1) for u in system.fmus
-    )
+    fmus = tuple(_with(u, often, rows, recording.every > 1) for u in system.fmus)
     return replace(system, fmus=fmus, recording=replace(recording, outputs=written))
 
 
-def _ports(fmu: Fmu, names: set[str]) -> set[str]:
-    """The ports of which an entry is among `names`."""
-    return {s.port for s in fmu.description.outputs if f"{fmu.name}.{s.name}" in names}
-
-
 def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
-    """The FMU with these outputs; `separate`, those for rows alone come after the others."""
-    outputs = [s for s in fmu.description.outputs if s.port in often | rows]
-    seldom = frozenset(s.name for s in outputs if separate and s.port not in often)
+    """The FMU with the ports of which one of these has an entry; `separate`, those for rows alone
+    come after the others."""
+    every = fmu.description.outputs
+    read, written = (
+        {s.port for s in every if f"{fmu.name}.{s.name}" in names} for names in (often, rows)
+    )
+    outputs = [s for s in every if s.port in read | written]
+    seldom = frozenset(s.name for s in outputs if separate and s.port not in read)
     outputs.sort(key=lambda s: s.name in seldom)
     others = [s for s in fmu.description.scalars if s.causality != "output"]
     return replace(
@@ -52,9 +50,9 @@ def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
 def _read(system: System) -> Iterator[str]:
     """The outputs, `fmu.output`, that are read at each communication point."""
     signals = SignalVector(system)
-    Meters(system, signals)
-    Balance(system, signals)
-    make_holds(system, signals)
+    Meters(signals)
+    Balance(signals)
+    make_holds(signals)
     for c in system.connections:
         signals.sources(c)
     if system.ends_when:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from hapticlink.orchestrator.base.errors import Fault
-from hapticlink.orchestrator.plan.operations import Repeat
+from hapticlink.orchestrator.plan.operations import Blend, Get, Operation, Repeat
 from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.jacobians import Through
@@ -36,41 +37,38 @@ class Unconverged(Fault):
 
 
 class FixedPoint:
-    """The bound operations of one Repeat.
-
-    guess: push trial outputs into the holds. body: one co-simulation step. again: restore FMU
-    states. held: the operations of the body that evaluate holds. Raises Unconverged unless the
-    scene accepts unconverged steps.
-    """
+    """One Repeat, with its solver's state. sequence: makes one call of operations. Raises
+    Unconverged unless the scene accepts unconverged steps."""
 
     def __init__(
         self,
         operation: Repeat,
         simulation: Simulation,
-        calls: tuple[Sequence[Call], Sequence[Call], Sequence[Call]],
-        held: Sequence[Call],
+        sequence: Callable[[Iterable[Operation]], Call],
     ) -> None:
         system, signals = simulation.system, simulation.signals
-        self._guess, self._body, self._again = calls
+        self._guess, self._again = sequence(operation.guess), sequence(operation.again)
+        self._body = sequence(
+            replace(op, judged=False) if isinstance(op, Get) else op for op in operation.body
+        )
+        self._ask = sequence(op for op in operation.body if isinstance(op, Blend))
         self._settings: Iteration = system.coupling.iteration
         self._signals, self._meters, self._dticks = signals, simulation.meters, operation.dticks
         self.counts = Iterations()
         self._seconds = system.timeline.seconds
         connections = [c for c in system.connections if c.name in operation.connections]
         self._held = [(simulation.holds[c.name], signals.sources(c)) for c in connections if c.hold]
-        self._places: list[int] = []
-        self._names: list[str] = []
+        names: dict[int, str] = {}
         for c in connections:
             for place in _read(c, system, signals):
-                if place not in self._places:
-                    self._places.append(place)
-                    self._names.append(c.name)
+                names.setdefault(place, c.name)
+        self._places, self._names = [*names], [*names.values()]
         self._solver = SOLVERS[self._settings.method]()
-        self._ask, self._tick = held, 0
+        self._tick = 0
         self._ways: list[Through] | None = None
         if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
-            ways = jacobians.ways(system, signals, simulation.instances, connections, self._places)
-            self._ways, self._solver.supplied = ways, self._jacobian
+            self._ways = jacobians.ways(simulation, connections, self._places)
+            self._solver.supplied = self._jacobian
 
     def __call__(self, tick: int) -> None:
         values, places, counts = self._signals.values, self._places, self.counts
@@ -81,14 +79,12 @@ class FixedPoint:
             nonlocal began
             if began:
                 counts.rollbacks += 1
-                for call in self._again:
-                    call(tick)
+                self._again(tick)
                 self._meters.rollback(mark)
             began = True
             values[places] = point
-            for calls in (self._guess, self._body):
-                for call in calls:
-                    call(tick)
+            self._guess(tick)
+            self._body(tick)
             return values[places] - point
 
         for hold, sources in self._held:
@@ -120,8 +116,8 @@ class FixedPoint:
             values[:] = before
             if moved is not None:
                 values[moved] += 1.0
-            for call in (*self._guess, *self._ask):
-                call(self._tick)
+            self._guess(self._tick)
+            self._ask(self._tick)
             responses.append(values.copy())
         values[:] = before
         tangent = np.stack(responses[1:], axis=1) - responses[0][:, None]

@@ -16,16 +16,15 @@ from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.base.signal_names import DEVICE
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.run import jacobians
-from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.solvers import Matrix, Newton, Vector
 from hapticlink.orchestrator.scene.start_pose import outside
-from hapticlink.orchestrator.system.system import System
 
 SWEEPS = 50
 TOLERANCE = 1e-12
 
 
-def initialize(system: System, instances: Mapping[str, Instance], signals: SignalVector) -> bool:
+def initialize(fmus: LoadedFmus) -> bool:
     """Initialise every instance; the outputs of t = 0 are in the signal vector afterwards. Returns
     whether sweeps sufficed, without Newton's method.
 
@@ -33,6 +32,7 @@ def initialize(system: System, instances: Mapping[str, Instance], signals: Signa
     them. Raises FmuFault where they don't agree to 1e-12 within 50 sweeps and 50 steps of Newton,
     or aren't finite.
     """
+    system, instances, signals = fmus.system, fmus.instances, fmus.signals
     timeline = system.timeline
     holds = [(signals.hold(c.name), signals.sources(c)) for c in system.connections if c.hold]
     setters = []
@@ -43,9 +43,7 @@ def initialize(system: System, instances: Mapping[str, Instance], signals: Signa
         instance.enter_initialization(timeline.seconds(timeline.end + longest))
         incoming = [c for c in system.connections if c.target == fmu.name]
         if incoming:
-            scalars = [s for c in incoming for s in c.inputs]
-            places = [p for c in incoming for p in signals.places(c)]
-            setters.append((instance, instance.connect(scalars, places)))
+            setters.append((instance, fmus.setter(incoming, signals.places)))
     for instance in instances.values():
         instance.read()
     values = signals.values
@@ -65,24 +63,17 @@ def initialize(system: System, instances: Mapping[str, Instance], signals: Signa
         if agree.all():
             break
     else:
-        _solve(system, instances, signals, agree & np.isfinite(values), first, sweep)
+        _solve(fmus, agree & np.isfinite(values), first, sweep)
     require_finite(instances)
     for instance in instances.values():
         instance.exit_initialization()
     return bool(agree.all())
 
 
-def _solve(
-    system: System,
-    instances: Mapping[str, Instance],
-    signals: SignalVector,
-    settled: np.ndarray,
-    first: Vector,
-    sweep: Callable[[], None],
-) -> None:
+def _solve(fmus: LoadedFmus, settled: np.ndarray, first: Vector, sweep: Callable[[], None]) -> None:
     """Solve by Newton's method for the outputs that did not converge, from their first values."""
-    values = signals.values
-    sources = {p for c in system.connections for p in signals.sources(c)}
+    values = fmus.signals.values
+    sources = {p for c in fmus.system.connections for p in fmus.signals.sources(c)}
     places = sorted(p for p in sources if not settled[p])
 
     def residual(point: Vector) -> Vector:
@@ -91,24 +82,23 @@ def _solve(
         return values[places] - point
 
     newton = Newton()
-    newton.supplied = _jacobian(system, instances, signals, places)
+    newton.supplied = _jacobian(fmus, places)
     solution = newton.solve(residual, first[places], TOLERANCE, SWEEPS)
     if not solution.error <= TOLERANCE:
         agree = np.ones(len(values), bool)
         agree[places] = np.abs(solution.residual) <= TOLERANCE * (1.0 + np.abs(solution.point))
         before = values.copy()
         before[places] = solution.point
-        _raise_unsettled(system, signals, agree, before)
+        _raise_unsettled(fmus, agree, before)
 
 
-def _jacobian(
-    system: System, instances: Mapping[str, Instance], signals: SignalVector, places: list[int]
-) -> Callable[[], Matrix | None]:
+def _jacobian(fmus: LoadedFmus, places: list[int]) -> Callable[[], Matrix | None]:
     """A function for the Jacobian of a sweep's residual: unit changes of the signals at `places`
     are propagated from FMU to FMU by directional derivatives. It returns None where an FMU gives
     none."""
-    moved = [c for c in system.connections if {*places} & {*signals.sources(c)}]
-    ways = jacobians.ways(system, signals, instances, moved, places)
+    signals = fmus.signals
+    moved = [c for c in fmus.system.connections if {*places} & {*signals.sources(c)}]
+    ways = jacobians.ways(fmus, moved, places)
     held = [(signals.hold(c.name), signals.sources(c)) for c in moved if c.hold]
 
     def jacobian() -> Matrix | None:
@@ -128,10 +118,9 @@ def _jacobian(
     return jacobian
 
 
-def _raise_unsettled(
-    system: System, signals: SignalVector, agree: np.ndarray, before: Vector
-) -> None:
-    for fmu in system.fmus:
+def _raise_unsettled(fmus: LoadedFmus, agree: np.ndarray, before: Vector) -> None:
+    signals = fmus.signals
+    for fmu in fmus.system.fmus:
         span = signals.fmu(fmu.name)
         for i, scalar in enumerate(fmu.description.outputs, start=span.start):
             if not agree[i]:

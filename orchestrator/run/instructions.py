@@ -9,7 +9,7 @@ sequential execution.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Get, Operation, Set, Step
 from hapticlink.orchestrator.run.simulation import Simulation
@@ -56,17 +56,13 @@ class Finish:
 Instruction = Operation | Sample | Move | Feed | Collect | Finish
 
 
-def instructions(
-    operations: Iterable[Operation], simulation: Simulation, judged: bool = True
-) -> Iterator[Instruction]:
-    """The instructions of a block. Not `judged`, outputs need not be finite."""
+def instructions(operations: Iterable[Operation], simulation: Simulation) -> Iterator[Instruction]:
+    """The instructions of a block."""
     waited = {fmu for fmu in simulation.isolated if fmu not in simulation.beside}
-    return _with_barriers(_with_meters(operations, simulation, judged), waited)
+    return _with_barriers(_with_meters(operations, simulation), waited)
 
 
-def _with_meters(
-    operations: Iterable[Operation], simulation: Simulation, judged: bool
-) -> Iterator[Instruction]:
+def _with_meters(operations: Iterable[Operation], simulation: Simulation) -> Iterator[Instruction]:
     """The operations, each followed by what the meters take of it, with a Collect before the first
     outputs of a clock whose FMUs step beside the loop."""
     meters, collected = simulation.meters, set[str]()
@@ -77,12 +73,12 @@ def _with_meters(
                 if clock and clock not in collected:
                     collected.add(clock)
                     yield Collect(clock)
-                yield replace(operation, judged=judged)
+                yield operation
                 yield from (Sample(c, ahead) for c in meters.of_source.get(fmu, ()))
                 yield from (Move(c, ahead) for c in meters.of_target.get(fmu, ()))
             case Set(fmu, now=False):
                 yield operation
-                share = meters.shares.get(fmu, 1.0)
+                share = 1.0 / simulation.system.coupling.substeps.get(fmu, 1)
                 yield from (Feed(c, share) for c in meters.of_target.get(fmu, ()))
             case _:
                 yield operation

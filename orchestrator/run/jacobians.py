@@ -9,7 +9,7 @@ at its end by inputs that were held over it. Not every FMU interprets the standa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,8 @@ from hapticlink.orchestrator.fmi.capabilities import gives_directional_derivativ
 from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import Connection, System
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
+from hapticlink.orchestrator.system.system import Connection
 
 
 @dataclass(frozen=True)
@@ -45,24 +45,20 @@ class Through:
 
 
 def ways(
-    system: System,
-    signals: SignalVector,
-    instances: Mapping[str, Instance],
-    connections: Iterable[Connection],
-    places: Sequence[int],
+    fmus: LoadedFmus, connections: Sequence[Connection], places: Sequence[int]
 ) -> list[Through] | None:
     """Per FMU on the loop, the partial derivatives of the outputs at `places` with respect to the
     connected inputs, in the system's order; None where an FMU gives none."""
     partial = []
-    connections = list(connections)
-    for fmu in system.fmus:
+    signals = fmus.signals
+    for fmu in fmus.system.fmus:
         incoming = [c for c in connections if c.target == fmu.name]
         span, outputs = signals.fmu(fmu.name), fmu.description.outputs
         rows = tuple(p for p in places if span.start <= p < span.stop)
         if not incoming or not rows:
             continue
         through = Through(
-            instances[fmu.name],
+            fmus.instances[fmu.name],
             tuple(outputs[p - span.start] for p in rows),
             rows,
             tuple(s for c in incoming for s in c.inputs),

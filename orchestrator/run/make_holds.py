@@ -1,7 +1,9 @@
-"""Creates the hold of each connection, with its context."""
+"""Creates the hold of each connection, with its context, and the energy tanks of the spring-dampers
+that holds set."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +11,10 @@ import numpy as np
 from hapticlink.orchestrator.base.errors import Fault, shortened
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.energy_account import Account
+from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
+from hapticlink.orchestrator.holds.hold import Hold, Needs, Vector
 from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
-from hapticlink.orchestrator.run import spring_holds
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.records import SetSpring
@@ -22,26 +24,24 @@ from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
 
-def make_holds(system: System, signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
+def make_holds(signals: SignalVector) -> tuple[dict[str, Hold], list[EnergyTank]]:
     """The hold of each connection by name, and the energy tanks, each shared by the holds of one
     spring-damper."""
     shared: dict[SetSpring, EnergyTank] = {}
-    holds = {c.name: make_hold(c, system, signals, shared) for c in system.connections if c.hold}
-    spring_holds.join_sides(holds, shared, system, signals)
+    connections = signals.system.connections
+    holds = {c.name: make_hold(c, signals, shared) for c in connections if c.hold}
+    _join_sides(holds, shared, signals)
     return holds, [*shared.values()]
 
 
 def make_hold(
-    connection: Connection,
-    system: System,
-    signals: SignalVector,
-    shared: dict[SetSpring, EnergyTank],
+    connection: Connection, signals: SignalVector, shared: dict[SetSpring, EnergyTank]
 ) -> Hold:
     """The hold of `connection`, wrapped for its kind, its latency and what it reads beside its
     samples; `shared` are the energy tanks so far."""
     assert connection.hold is not None
-    made_by, size = HOLDS[connection.hold], len(connection.inputs)
-    context = _context(connection, system, signals, shared)
+    made_by, size, system = HOLDS[connection.hold], len(connection.inputs), signals.system
+    context = _context(connection, made_by.needs, signals, shared)
 
     def make() -> Hold:
         own = made_by(context)
@@ -60,7 +60,7 @@ def make_hold(
         hold = Late(hold, Link(connection.latency, system.timeline.base))
     if further := beside(connection, system.fmu):
         places = [signals.scalar(connection.source, s.name) for s in further]
-        hold = spring_holds.WithFurther(hold, spring_holds.reader(signals, places))
+        hold = WithFurther(hold, Reader(signals, places))
     return hold
 
 
@@ -86,14 +86,13 @@ def _turns(connection: Connection, system: System) -> dict[int, float]:
 
 def _context(
     connection: Connection,
-    system: System,
+    needs: Needs | None,
     signals: SignalVector,
     shared: dict[SetSpring, EnergyTank],
 ) -> HoldContext:
     """The context of a hold; displacement, velocity and tank only if the hold needs them."""
     size, moved, moving, tank = len(connection.inputs), None, None, None
-    power = bond(connection, system, signals)
-    if HOLDS[connection.hold or ""].needs == "power" and power:
+    if needs == "power" and (power := bond(connection, signals)):
         # Samples are converted to the target's units behind the hold, so that the displacement is
         # scaled instead.
         entries, work, places = list(power.entries), np.zeros(size), np.zeros(size, np.intp)
@@ -102,14 +101,14 @@ def _context(
         if power.moving:
             places[entries] = power.moving
             moving = Reader(signals, places.tolist(), work)
-    if HOLDS[connection.hold or ""].needs == "spring":
-        of = spring(connection, system.energy.springs)
+    if needs == "spring":
+        of = spring(connection, signals.system.energy.springs)
         assert of is not None
         if of not in shared:
-            shared[of] = spring_holds.tank(of, system, signals)
+            shared[of] = _tank(of, signals)
         row = of.ports.index(f"{connection.target}.{connection.target_port}")
         tank = shared[of], row
-    return HoldContext(size, system.timeline.seconds, moved, moving, tank)
+    return HoldContext(size, signals.system.timeline.seconds, moved, moving, tank)
 
 
 class CheckedHold(Hold):
@@ -137,3 +136,80 @@ class CheckedHold(Hold):
                 "a NumPy array are needed"
             )
         return value
+
+
+class WithFurther(Hold):
+    """Appends what it reads to each sample, so that both have the same latency: the source's
+    derivative or integral, or the energy that the far side of a spring has put in, which `account`
+    (with where to write it) then knows."""
+
+    def __init__(
+        self, hold: Hold, further: Reader, account: tuple[Account, Vector] | None = None
+    ) -> None:
+        self.hold, self.further, self.account = hold, further, account
+        self.link = getattr(hold, "link", None)
+
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
+        if self.account:
+            observer, credit = self.account
+            credit[:] = observer.credit
+        self.hold.push(stamp, np.concatenate([sample, self.further()]), arrival)
+
+    def value(self, tick: int, ahead: float = 0.0) -> Vector:
+        return self.hold.value(tick, ahead)
+
+
+def _tank(of: SetSpring, signals: SignalVector) -> EnergyTank:
+    timeline, unit = signals.system.timeline, signals.system.fmu[of.position.partition(".")[0]]
+    places, turned = _places(of.position, signals)
+    stiffness, velocity = np.array(of.stiffness), None
+    if of.velocity:
+        velocity = Reader(signals, _places(of.velocity, signals)[0])
+    near = NearEnd(
+        Reader(signals, places),
+        np.array([turned.get(i, 0.0) for i in range(len(places))]),
+        timeline.seconds(timeline.clock(unit.clock).longest),
+        timeline.seconds,
+        velocity,
+        unit.sampled,
+    )
+    damping = np.array(of.damping) if of.damping else np.zeros_like(stiffness)
+    return EnergyTank(stiffness, damping, near)
+
+
+def _places(port: str, signals: SignalVector) -> tuple[Sequence[int], Mapping[int, float]]:
+    """Indices of the signals of an input or output, and a full turn of its wrapped angles."""
+    fmu, _, name = port.partition(".")
+    system = signals.system
+    unit = system.fmu[fmu]
+    if c := next((c for c in system.into(fmu) if c.target_port == name), None):
+        return signals.sources(c), turns(c, system.fmu) if c.kind == "angle" else {}
+    scalars = unit.description.port(name, "output")
+    own = Connection(fmu, name, fmu, name, scalars, scalars)
+    angle = unit.description.kinds.get(name) == "angle"
+    return signals.port(unit, name), turns(own, system.fmu) if angle else {}
+
+
+def _join_sides(
+    holds: dict[str, Hold], tanks: Mapping[SetSpring, EnergyTank], signals: SignalVector
+) -> None:
+    """Give the energy tank of each spring both sides: where its force goes back to the FMU that
+    sets its far end, to act on that displacement, and the hold observes the work of it. A force
+    that is late or converted is left out."""
+    system = signals.system
+    for i, s in enumerate(system.energy.springs):
+        fmu, _, port = s.set_position.partition(".")
+        sets = next((c for c in system.into(fmu) if c.target_port == port), None)
+        for c in system.out_of(fmu):
+            observer = holds.get(c.name)
+            if s not in tanks or not sets or not isinstance(observer, Account):
+                continue
+            if f"{fmu}.{c.source_port}" != s.force or c.target != sets.source:
+                continue
+            power = bond(c, signals)
+            if not power or np.any(power.factor != 1.0) or np.any(power.offset != 0.0):
+                continue
+            if list(power.moved) == signals.sources(sets):
+                observer.tank, place = tanks[s], signals.credit(i)
+                credit = Reader(signals, [place]), (observer, signals.values[place : place + 1])
+                holds[sets.name] = WithFurther(holds[sets.name], *credit)

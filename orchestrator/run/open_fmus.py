@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from functools import partial
 
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process import in_process
@@ -16,7 +17,7 @@ from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.network.remote_fmu import Remote
 from hapticlink.orchestrator.run.python_modules import bundled, clashes
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
 def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
@@ -41,18 +42,28 @@ def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     return alone
 
 
-def opened(
-    system: System, signals: SignalVector, alone: Container[str], stack: ExitStack
-) -> dict[str, Instance]:
-    """The FMUs of a system by name, loaded; `stack` closes them. `alone`: those isolated. Each
-    fills its outputs among the signals."""
-    instances = {}
-    for fmu in system.fmus:
-        interrupt.check()
-        kind = Isolated if fmu.name in alone else in_process(fmu.description)
-        outputs = signals.values[signals.fmu(fmu.name)]
-        opening = partial(Remote, fmu.served) if fmu.served else kind
-        instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
-        instance.seldom = fmu.seldom
-        instances[fmu.name] = stack.enter_context(instance)
-    return instances
+class LoadedFmus:
+    """The FMUs of a system, loaded: `instances` by name, each of which fills its outputs among the
+    `signals`; `stack` closes them. isolated: as of the function."""
+
+    def __init__(self, system: System, stack: ExitStack) -> None:
+        self.system, self.signals = system, SignalVector(system)
+        self.isolated = isolated(system.fmus)
+        self.instances: dict[str, Instance] = {}
+        for fmu in system.fmus:
+            interrupt.check()
+            kind = Isolated if fmu.name in self.isolated else in_process(fmu.description)
+            outputs = self.signals.values[self.signals.fmu(fmu.name)]
+            opening = partial(Remote, fmu.served) if fmu.served else kind
+            instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
+            instance.seldom = fmu.seldom
+            self.instances[fmu.name] = stack.enter_context(instance)
+
+    def setter(
+        self, incoming: Sequence[Connection], places: Callable[[Connection], list[int]]
+    ) -> Callable[[Vector], None]:
+        """Sets the inputs of an FMU, those of all these connections to it, from the `places` of
+        each among the signals."""
+        scalars = [s for c in incoming for s in c.inputs]
+        at = [p for c in incoming for p in places(c)]
+        return self.instances[incoming[0].target].connect(scalars, at)

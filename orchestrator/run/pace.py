@@ -50,13 +50,11 @@ class Pace:
 
     def take(self, library: ctypes.CDLL) -> None:
         """Take the clock, and give it to the compiled loop, whose own it is by default."""
-        self._calls: tuple[Any, Any] = library.now, library.wait
         self.clock: Callable[[], int]
         self.wait: Callable[[int], object]
-        self.clock, self.wait = self._given or self._calls
-        if self._given:
-            self._calls = _CLOCK(self.clock), _WAIT(self.wait)
-        clock, wait = self._calls
+        own = library.now, library.wait
+        self.clock, self.wait = self._given or own
+        clock, wait = (_CLOCK(self.clock), _WAIT(self.wait)) if self._given else own
         self.c.fill(clock=clock, wait=wait)
 
     def now(self) -> int:

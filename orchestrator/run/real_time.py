@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run import concurrent_fmus
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.concurrent_fmus import ThreadWorker, Worker
+from hapticlink.orchestrator.run.concurrent_fmus import Side, ThreadWorker, Worker
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.simulation import Simulation
 
@@ -23,7 +24,7 @@ class RealTimeRun:
     """What makes a run one in real time.
 
     turn: called about every 20 ms between two events, with the simulation and the loop. clock, wait
-    and worker: as of Pace and `sides`, of the machine by default. changes: time (s) and text of
+    and worker: as of Pace and Side, of the machine by default. changes: time (s) and text of
     what was changed during the run.
     """
 
@@ -45,8 +46,10 @@ class RealTimeRun:
         self._simulation = simulation
         simulation.pace = self.pace
         simulation.beside, self._in_loop = concurrent_fmus.beside(plan)
-        now = self.pace.now
-        simulation.sides = concurrent_fmus.sides(plan, simulation.beside, now, self._worker)
+        for clock in dict.fromkeys(simulation.beside.values()):
+            fmus = [fmu for fmu in plan.system.fmus if simulation.beside.get(fmu.name) == clock]
+            longer = all(varies_step(fmu.description) for fmu in fmus)
+            simulation.sides[clock] = Side(longer, self.pace.now, self._worker(clock))
         try:
             yield
         finally:

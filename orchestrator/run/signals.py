@@ -4,21 +4,18 @@ of springs have put in."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
 class SignalVector:
-    """The vector `values` and the index of each signal in it. asked: outputs whose indices were
-    asked for, by FMU and name."""
+    """The vector `values` of the signals of a `system` and the index of each in it. asked: outputs
+    whose indices were asked for, by FMU and name."""
 
     def __init__(self, system: System) -> None:
-        self._system, self.asked = system, set[tuple[str, str]]()
+        self.system, self.asked = system, set[tuple[str, str]]()
         self._of_fmu: dict[str, slice] = {}
         self._of_clock: dict[str, slice] = {}
         self._of_hold: dict[str, slice] = {}
@@ -77,12 +74,6 @@ class SignalVector:
     def port(self, unit: Fmu, name: str) -> list[int]:
         return [self.scalar(unit.name, s.name) for s in unit.description.port(name, "output")]
 
-    def view(self, places: Sequence[int]) -> Vector | None:
-        """The values at the indices `places` as a view; None if these are not consecutive."""
-        if list(places) != list(range(places[0], places[-1] + 1)):
-            return None
-        return self.values[places[0] : places[-1] + 1]
-
     def sources(self, connection: Connection) -> list[int]:
         return [self.scalar(connection.source, s.name) for s in connection.outputs]
 
@@ -97,7 +88,7 @@ class SignalVector:
     def recorded(self, clock: str) -> dict[str, int] | None:
         """The columns `fmu.variable` of a clock's table with their indices, None where it has no
         table."""
-        span, written = self.clock(clock), self._system.recording.outputs
+        span, written = self.clock(clock), self.system.recording.outputs
         names = {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
         columns = {n: i for n, i in names.items() if span.start <= i < span.stop}
         if written is None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_account import Account
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.files import Recorder
@@ -20,12 +20,11 @@ from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run import apply_timed_events
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
-from hapticlink.orchestrator.run.energy.meters import Meters
+from hapticlink.orchestrator.run.energy.meter import Meters
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.make_holds import make_holds
-from hapticlink.orchestrator.run.open_fmus import isolated, opened
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.pace import Pace
-from hapticlink.orchestrator.run.signals import SignalVector, Vector
 from hapticlink.orchestrator.run.step_check import StepCheck
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -33,11 +32,11 @@ Call = Callable[[int], object]
 Set = Callable[[Vector], object]
 
 
-class Simulation:
+class Simulation(LoadedFmus):
     """The objects of a run, which `stack` closes; rows are written to `results`.
 
-    setters, now_setters and derivative_setters set inputs of an FMU from the signals: with held
-    values, with the newest outputs of the sources, and the derivatives of held values.
+    setters set the inputs of an FMU from the signals: with held values, or `now` with the newest
+    outputs of the sources; derivative_setters the derivatives of held values.
 
     pace: the schedule of a run in real time. beside: the FMUs whose steps are then taken beside the
     loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock,
@@ -46,33 +45,28 @@ class Simulation:
     """
 
     def __init__(self, system: System, results: RunResults[Any], stack: ExitStack) -> None:
-        self.system, self.signals = system, SignalVector(system)
+        super().__init__(system, stack)
+        stack.callback(self._dismiss)
         self.pace: Pace | None = None
         self.beside: Mapping[str, str] = {}
-        self.sides: Mapping[str, Side] = {}
+        self.sides: dict[str, Side] = {}
         self.arrivals: dict[str, Recorder] = {}
         self.frames: dict[str, Recorder] = {}
         self.late = 0
         self.swept = False
         self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
-        self.isolated = isolated(system.fmus)
-        self.instances = opened(system, self.signals, self.isolated, stack)
-        stack.callback(self._dismiss)
         repeated = system.coupling.scheme == "iterated"
         self.step_checks = {
             fmu.name: StepCheck(self.instances[fmu.name])
             for fmu in (() if repeated else system.fmus)
             if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
         }
-        self.holds: dict[str, Hold]
-        self.springs: list[EnergyTank]
-        self.holds, self.springs = make_holds(system, self.signals)
-        self.meters = Meters(system, self.signals)
-        self.balance = Balance(system, self.signals)
+        self.holds, self.springs = make_holds(self.signals)
+        self.meters = Meters(self.signals)
+        self.balance = Balance(self.signals)
         self.recorders: dict[str, Recorder] = {}
-        self.setters: dict[str, Set] = {}
-        self.now_setters: dict[str, Set] = {}
+        self.setters: dict[tuple[str, bool], Set] = {}
         self.derivative_setters: dict[str, Set] = {}
 
     def _dismiss(self) -> None:
@@ -82,32 +76,29 @@ class Simulation:
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
         create the recorders."""
-        self.swept = initialize(self.system, self.instances, self.signals)
+        self.swept = initialize(self)
         values = self.signals.values
         for c in self.system.connections:
             if c.hold:
                 self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
         self.meters.start()
         self.balance.start()
-        apply_timed_events.arm(self.system, self.instances, self.signals)
+        apply_timed_events.arm(self)
         for fmu in self.system.fmus:
             incoming = self.system.into(fmu.name)
             if not incoming:
                 continue
-            connect = self.instances[fmu.name].connect
-            scalars = [s for c in incoming for s in c.inputs]
-            held = [p for c in incoming for p in self.signals.places(c)]
-            self.setters[fmu.name] = connect(scalars, held)
+            self.setters[fmu.name, False] = self.setter(incoming, self.signals.places)
             if derived := self._derived(incoming):
+                orders, inputs, derivatives = zip(*derived, strict=True)
                 derive = self.instances[fmu.name].connect_derivatives
-                self.derivative_setters[fmu.name] = derive(*derived)
+                self.derivative_setters[fmu.name] = derive(inputs, orders, derivatives)
             if fmu.name in self.system.coupling.get_after_set:
-                sources = [p for c in incoming for p in self.signals.sources(c)]
-                self.now_setters[fmu.name] = connect(scalars, sources)
+                self.setters[fmu.name, True] = self.setter(incoming, self.signals.sources)
         for clock in self.system.timeline.clocks:
             recorded = self.signals.recorded(clock.name)
             columns = None if recorded is None else [*recorded]
-            places = [] if recorded is None else [*recorded.values()]
+            places = [*(recorded or {}).values()]
             every = self.system.recording.every
             recorder = self._results.recorder(clock.name, columns, values, places, every)
             self.recorders[clock.name] = self._stack.enter_context(recorder)
@@ -115,15 +106,16 @@ class Simulation:
                 if fmu.clock == clock.name:
                     self.instances[fmu.name].due = recorder.due
         for side in self.sides:
-            sample, all_of_it = np.zeros(len(COLUMNS)), range(len(COLUMNS))
-            recorder = self._results.recorder(f"{side}_{SAMPLES}", COLUMNS, sample, all_of_it)
-            self.arrivals[side] = self._stack.enter_context(recorder)
-            recorder.row(0.0)  # the sample of t = 0 is there at once
+            self.arrivals[side] = self._beside(f"{side}_{SAMPLES}", COLUMNS)
         for name in self.remote if self.pace else ():
-            frame, all_of_it = np.zeros(len(FRAME)), range(len(FRAME))
-            recorder = self._results.recorder(f"{name}_{FRAMES}", FRAME, frame, all_of_it)
-            self.frames[name] = self._stack.enter_context(recorder)
-            recorder.row(0.0)  # of outputs that came with the initialisation
+            self.frames[name] = self._beside(f"{name}_{FRAMES}", FRAME)
+
+    def _beside(self, name: str, columns: Sequence[str]) -> Recorder:
+        """A table of what runs beside the loop; its row of t = 0 is there at once."""
+        row = np.zeros(len(columns)), range(len(columns))
+        recorder = self._stack.enter_context(self._results.recorder(name, columns, *row))
+        recorder.row(0.0)
+        return recorder
 
     def collect(self, clock: str, tick: int) -> None:
         """Take over the sample that the FMUs beside the loop have left for a tick, `late`."""
@@ -141,22 +133,15 @@ class Simulation:
         """The FMUs on other computers."""
         return {n: i for n, i in self.instances.items() if isinstance(i, Remote)}
 
-    def _derived(
-        self, incoming: Iterable[Connection]
-    ) -> tuple[list[Scalar], list[int], list[int]] | None:
-        """Inputs, orders and signal indices of the derivatives that an FMU gets with its inputs;
-        None if there are none."""
+    def _derived(self, incoming: Iterable[Connection]) -> list[tuple[int, Scalar, int]]:
+        """Order, input and signal index of each derivative that an FMU gets with its inputs, by
+        their order."""
         rows = []
         for c in incoming:
-            span = self.signals.derivatives(c.name)
+            span, n = self.signals.derivatives(c.name), len(c.inputs)
             places = [*self.signals.places(c), *range(span.start, span.stop)] if span.stop else []
-            for i, place in enumerate(places):
-                order, entry = divmod(i, len(c.inputs))
-                rows.append((c.inputs[entry], order, place))
-        if not rows:
-            return None
-        rows.sort(key=lambda row: row[1])
-        return [r[0] for r in rows], [r[1] for r in rows], [r[2] for r in rows]
+            rows += [(i // n, c.inputs[i % n], place) for i, place in enumerate(places)]
+        return sorted(rows, key=lambda row: row[0])
 
     def links(self) -> dict[str, LinkCounts]:
         """Per connection with a latency, the number of samples sent, lost and overtaken."""
@@ -165,25 +150,23 @@ class Simulation:
 
     def premises(self) -> dict[str, Premises]:
         """Per connection with a hold that observes its energy, what was outside its premises."""
-        accounts = {n: own for n, h in self.holds.items() if isinstance(own := _own(h), Account)}
         return {
             name: Premises(int(steps), int(outside), float(stake))
-            for name, account in accounts.items()
-            for steps, outside, stake in [account.premises]
+            for name, own in self._without_wrappers()
+            if isinstance(own, Account)
+            for steps, outside, stake in [own.premises]
         }
 
     def overdrawn(self) -> dict[str, float]:
         """Per set position, the energy (J) that the tank of its spring was short of at most."""
-        owns = {name: _own(hold) for name, hold in self.holds.items()}
         return {
             name: 0.0 - float(own.tank.least[0])
-            for name, own in owns.items()
+            for name, own in self._without_wrappers()
             if isinstance(own, PassiveSetPosition) and own.row == 0
         }
 
-
-def _own(hold: Hold) -> Hold:
-    """The hold itself, without what wraps it."""
-    while inner := getattr(hold, "own", None) or getattr(hold, "hold", None):
-        hold = inner
-    return hold
+    def _without_wrappers(self) -> Iterator[tuple[str, Hold]]:
+        for name, hold in self.holds.items():
+            while inner := getattr(hold, "own", None) or getattr(hold, "hold", None):
+                hold = inner
+            yield name, hold

@@ -9,9 +9,8 @@ from dataclasses import replace
 from hapticlink.orchestrator.fmi.start_values import Given, Starts
 from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.run import open_fmus
 from hapticlink.orchestrator.run.initialize import initialize
-from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.system.system import System
 
 
@@ -41,7 +40,10 @@ def _carried(system: System) -> dict[str, Starts]:
     once = [c for c in system.connections if c.initial]
     if not once:
         return {}
-    signals = _initialized(system)
+    with ExitStack() as stack:
+        fmus = LoadedFmus(system, stack)
+        initialize(fmus)
+    signals = fmus.signals
     starts: dict[str, Starts] = {}
     for c in once:
         rows = zip(c.inputs, signals.values[signals.sources(c)].tolist(), strict=True)
@@ -56,12 +58,3 @@ def _start(scalar: Scalar, value: float) -> Given:
     if scalar.type in ("Real", "Float64", "Float32"):
         return value
     return value >= 0.5 if scalar.type == "Boolean" else round(value)
-
-
-def _initialized(system: System) -> SignalVector:
-    """The signals of t = 0, of FMUs that are closed again."""
-    signals = SignalVector(system)
-    alone = open_fmus.isolated(system.fmus)
-    with ExitStack() as stack:
-        initialize(system, open_fmus.opened(system, signals, alone, stack), signals)
-    return signals

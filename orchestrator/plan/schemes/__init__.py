@@ -15,10 +15,6 @@ from hapticlink.orchestrator.scene import records
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
-def _none(system: System) -> list[list[Fmu]]:
-    return []
-
-
 @dataclass(frozen=True)
 class Scheme:
     """A coupling scheme. block: the operations of an event, in order. ordered: the groups of FMUs
@@ -26,7 +22,7 @@ class Scheme:
     default. Whether a scheme is causal is derived from its blocks (`sample_ages`)."""
 
     block: Callable[[System, Event], tuple[Operation, ...]]
-    ordered: Callable[[System], list[list[Fmu]]] = _none
+    ordered: Callable[[System], list[list[Fmu]]] = lambda system: []
 
 
 SCHEMES: Registry[Scheme] = records.SCHEMES

@@ -17,6 +17,16 @@ from hapticlink.orchestrator.system.system import Fmu, System
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
+    operations = before_plants(system, event)
+    continuous = operation_sequences.firing(system, event)[1]
+    for fmu in operation_sequences.starting(event, continuous):
+        operations += operation_sequences.feed(system, event, fmu)
+        operations += operation_sequences.step(system, event, fmu)
+    return tuple(operations)
+
+
+def before_plants(system: System, event: Event) -> list[Operation]:
+    """The operations of `event` up to the steps of the plants."""
     sampled, continuous = operation_sequences.firing(system, event)
     operations: list[Operation] = [*operation_sequences.publish_ended(system, event, continuous)]
     for fmu in in_order(system, sampled):
@@ -24,10 +34,7 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
         operations += operation_sequences.step(system, event, fmu)
         operations += operation_sequences.publish(system, fmu)
     operations += operation_sequences.record(system, event)
-    for fmu in operation_sequences.starting(event, continuous):
-        operations += operation_sequences.feed(system, event, fmu)
-        operations += operation_sequences.step(system, event, fmu)
-    return tuple(operations)
+    return operations
 
 
 def ordered(system: System) -> list[list[Fmu]]:

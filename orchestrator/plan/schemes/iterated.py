@@ -40,7 +40,7 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks, and
     for FMUs of a loop that do not support rollback."""
-    operations = [*gauss_seidel.block(system, operation_sequences.without_steps(event))]
+    operations = gauss_seidel.before_plants(system, event)
     for group in groups(system, event):
         if len(group) > 1:
             operations += _repeat(system, event, group)

@@ -19,11 +19,7 @@ from typing import NamedTuple
 HERE = Path(__file__).absolute().parent
 LAWS = runpy.run_path(str(HERE / "generate_laws.py"))
 LINKING = runpy.run_path(str(HERE.parents[2] / "fmus" / "native" / "linking.py"))
-SOURCES = (
-    "loop.h", "operations.c", "event_loop.c", "pace.c", "fmu_calls.c", "step_check.c", "meters.c",
-    "holds.c", "holds_on_manifolds.c", "energy_account.c", "energy_tank.c", "platform.c",
-    "process_state.c", "python_errors.c",
-)  # fmt: skip
+SOURCES = sorted(path.name for path in HERE.glob("*.[ch]"))
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
 FLAGS = ("-fPIC", "-std=gnu11", "-O2", "-g0", "-fvisibility=hidden", "-ffp-contract=off")
 WHEELS = {

@@ -16,11 +16,6 @@ enum {
 /* The larger of two as NumPy has it: the first where they are equal, NaN where one is. */
 static double larger(double a, double b) { return a >= b || isnan(a) ? a : b; }
 
-static void reading(const Reader *r, const double *board, double *into) {
-    for (int64_t i = 0; i < r->n; i++)
-        into[i] = r->factor ? r->factor[i] * board[r->where[i]] + r->offset[i] : board[r->where[i]];
-}
-
 static void queue(Queue *q, int64_t n, int64_t tick, const double *values) {
     q->ticks[q->count] = tick;
     memcpy(q->values + q->count++ * n, values, n * sizeof *values);
@@ -99,14 +94,14 @@ static void account(Account *a, const Loop *l, int64_t tick) {
     const int64_t n = a->n;
     const size_t bytes = n * sizeof(double);
     double *x = vector(a, NOW), *before = vector(a, X), *mean = vector(a, AVERAGE);
-    reading(&a->displacement, l->values, x);
+    read_all(&a->displacement, l->values, x);
     if (a->tick < 0) {
         memcpy(before, x, bytes);
         memcpy(vector(a, X_STAMP), x, bytes);
         a->stamp = a->fresh.ticks[0];
         memcpy(vector(a, SAMPLE_), a->fresh.values, bytes);
         a->tick = tick;
-        if (a->velocity.n) reading(&a->velocity, l->values, vector(a, V));
+        if (a->velocity.n) read_all(&a->velocity, l->values, vector(a, V));
     }
     for (int64_t k = 0; k < n; k++) {
         vector(a, MOTION)[k] = x[k] - before[k];
@@ -142,7 +137,7 @@ static void predict(Account *a, const Loop *l, double step) {
         return;
     }
     double *v = vector(a, NOW);
-    reading(&a->velocity, l->values, v);
+    read_all(&a->velocity, l->values, v);
     if ((double)a->steps > step) step = (double)a->steps;
     const double seconds = step * l->numerator / l->denominator;
     for (int64_t k = 0; k < a->n; k++) {
@@ -156,7 +151,7 @@ static void predict(Account *a, const Loop *l, double step) {
 /* Account.credit */
 double account_credit(const Account *a, const Loop *l) {
     double *x = vector(a, NOW), work = 0.0;
-    reading(&a->displacement, l->values, x);
+    read_all(&a->displacement, l->values, x);
     for (int64_t k = 0; k < a->n; k++)
         work += vector(a, WORK)[k] + vector(a, HELD)[k] * (x[k] - vector(a, X)[k]);
     return a->promised - work;

@@ -143,14 +143,14 @@ static void complete(Events *e) {
 
 /* Runs events until there are none left (DONE), `patience` ns have passed `since` the last PAUSE or a
  * signal has come, or Python is needed. e->at.op is -1 between events. */
-EXPORT int hapticlink_events(Loop *l, Events *e) {
+int hapticlink_events(Loop *l, Events *e) {
     note_arithmetic();
     for (;;) {
         if (e->at.op < 0) {
             const int code = next_event(l, e);
             if (code >= 0) return code;
         }
-        const int code = loop_carry_out(l, e->tick, &e->at);
+        const int code = hapticlink_block(l, &e->at, e->tick);
         if (code != DONE) return code;
         complete(e);
         if (!e->pace) {

@@ -21,24 +21,27 @@ static int transferred(const Transfer *t) {
     return ((Transfer3)t->call)(t->fmu, t->references, t->n_references, t->buffer, t->n);
 }
 
+/* The types of whole numbers: in C, the least, and the first number beyond the largest. */
+#define WHOLE(X)                                                                                   \
+    X(INT64, int64_t, -9223372036854775808.0, 9223372036854775808.0)                               \
+    X(INT32, int32_t, -2147483648.0, 2147483648.0)                                                 \
+    X(INT16, int16_t, -32768.0, 32768.0)                                                           \
+    X(INT8, int8_t, -128.0, 128.0)                                                                 \
+    X(UINT64, uint64_t, 0.0, 18446744073709551616.0)                                               \
+    X(UINT32, uint32_t, 0.0, 4294967296.0)                                                         \
+    X(UINT16, uint16_t, 0.0, 65536.0)                                                              \
+    X(UINT8, uint8_t, 0.0, 256.0)
+
 /* Doubles from what the FMU has given; 0 where a number of 64 bits may not be exact as one. */
 static int from_buffer(const Transfer *t) {
     const double exact = 9007199254740992.0;
-#define FROM(kind, type)                                                                           \
+#define FROM(kind, type, ...)                                                                      \
     case kind:                                                                                     \
         for (int64_t i = 0; i < t->n; i++) t->values[i] = (double)((type *)t->buffer)[i];          \
         break;
     switch (t->kind.type) {
-    case DOUBLE: return 1;
         FROM(FLOAT, float)
-        FROM(INT64, int64_t)
-        FROM(INT32, int32_t)
-        FROM(INT16, int16_t)
-        FROM(INT8, int8_t)
-        FROM(UINT64, uint64_t)
-        FROM(UINT32, uint32_t)
-        FROM(UINT16, uint16_t)
-        FROM(UINT8, uint8_t)
+        WHOLE(FROM)
         FROM(BOOL2, int32_t)
         FROM(BOOL3, uint8_t)
     }
@@ -59,17 +62,10 @@ static int to_buffer(const Transfer *t) {
         }                                                                                          \
         break;
     switch (t->kind.type) {
+        WHOLE(TO)
     case FLOAT:
         for (int64_t i = 0; i < t->n; i++) ((float *)t->buffer)[i] = (float)t->values[i];
         break;
-        TO(INT64, int64_t, -9223372036854775808.0, 9223372036854775808.0)
-        TO(INT32, int32_t, -2147483648.0, 2147483648.0)
-        TO(INT16, int16_t, -32768.0, 32768.0)
-        TO(INT8, int8_t, -128.0, 128.0)
-        TO(UINT64, uint64_t, 0.0, 18446744073709551616.0)
-        TO(UINT32, uint32_t, 0.0, 4294967296.0)
-        TO(UINT16, uint16_t, 0.0, 65536.0)
-        TO(UINT8, uint8_t, 0.0, 256.0)
     case BOOL2:
         for (int64_t i = 0; i < t->n; i++) ((int32_t *)t->buffer)[i] = t->values[i] >= 0.5;
         break;

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +15,41 @@ from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.run import step_check
 from hapticlink.orchestrator.run.compiled import structures
-from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.step_check import SLOT, StepCheck
 
+LINE = 64
+"""Bytes of a cache line."""
+BLOCK = 1 << 16
 _NAMED = {"Real": "DOUBLE", "Float64": "DOUBLE", "Float32": "FLOAT", "Integer": "INT32"}
 """The names of types in loop.h, where they are others there; BOOL2 and BOOL3 are apart."""
+
+
+class Memory:
+    """Rooms in blocks of memory, which live as long as this object, in the order in which they are
+    asked for: what an operation reads lies in few cache lines, and the next operation's behind
+    them."""
+
+    def __init__(self) -> None:
+        self._blocks: list[Any] = []
+        self._next = self._end = 0
+
+    def room(self, size: int) -> int:
+        """The address of `size` bytes, zeros, from the beginning of a cache line on."""
+        whole = -(-size // LINE) * LINE
+        if self._next + whole > self._end:
+            block = ctypes.create_string_buffer(max(BLOCK, whole) + LINE)
+            self._blocks.append(block)
+            self._next = -(-ctypes.addressof(block) // LINE) * LINE
+            self._end = ctypes.addressof(block) + len(block)
+        address, self._next = self._next, self._next + whole
+        return address
+
+    def copy(self, array: Any) -> int:
+        """The address of a copy of an array."""
+        content = memoryview(array).cast("B")
+        address = self.room(len(content))
+        ctypes.memmove(address, content.tobytes(), len(content))
+        return address
 
 
 def of_transfers(transfers: Sequence[Transfer], instance: InProcess, memory: Memory) -> int:
@@ -36,8 +67,8 @@ def of_transfers(transfers: Sequence[Transfer], instance: InProcess, memory: Mem
 
 def of_instance(
     instance: InProcess, check: StepCheck | None, c: structures.Fmu, memory: Memory
-) -> object:
-    """Fills `c`; what is returned has to be kept."""
+) -> structures.Fmu:
+    """Fills `c`, which has to be kept."""
     fmi, slave = instance.description.fmi, instance.slave
     c.fill(instance, "place", "outputs", "due", "good", "forward", fmu=slave.component)
     c.fill(do_step=slave.dll[f"fmi{fmi}DoStep"], n_outputs=len(instance.outputs))
@@ -55,11 +86,12 @@ def of_instance(
     c.fewer, c.n_fewer = c.gets, c.n_gets
     if instance.fewer is not instance.gets:
         c.fewer, c.n_fewer = of_transfers(instance.fewer, instance, memory), len(instance.fewer)
-    return None if check is None else _of_check(check, instance, c)
+    if check:
+        _fill_with(check, instance, c)
+    return c
 
 
-def _of_check(check: StepCheck, instance: InProcess, fmu: structures.Fmu) -> object:
-    """Fills the check of `fmu`; what is returned has to be kept."""
+def _fill_with(check: StepCheck, instance: InProcess, fmu: structures.Fmu) -> None:
     c, saved = structures.Check(), instance.slot(SLOT)
     fmu.fill(check=c)
     c.fill(saved, "state", get_state=saved.get, set_state=saved.set)
@@ -73,7 +105,6 @@ def _of_check(check: StepCheck, instance: InProcess, fmu: structures.Fmu) -> obj
     c.fill(before=scratch[0], halves=scratch[1])
     check.changed = partial(_fill_check, c, check)
     check.changed()
-    return c, scratch
 
 
 def _fill_check(c: structures.Check, check: StepCheck) -> None:

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
-from hapticlink.orchestrator.run.spring_holds import WithFurther
+from hapticlink.orchestrator.run.make_holds import WithFurther
 from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 KINDS: Mapping[type[Hold], int] = {
@@ -95,63 +95,34 @@ def _with_arrays(kind: type[structures.Structure], words: Mapping[str, int]) -> 
     return c
 
 
-class CompiledTank:
+def compiled_tank(tank: EnergyTank) -> structures.Tank:
     """An energy tank in C."""
-
-    def __init__(self, tank: EnergyTank) -> None:
-        n, near = len(tank.stiffness), tank.near
-        assert isinstance(near.position, Reader)
-        several = dict.fromkeys(("newest", "modulated"), 2 * n)
-        several |= dict.fromkeys(("x", "moved", "force", "withheld"), n)
-        self.c = c = _with_arrays(structures.Tank, several)
-        self._kept = tuple(map(np.ascontiguousarray, (tank.stiffness, tank.damping, near.turns)))
-        self._readers = near.position, near.velocity
-        stiffness, damping, turns = self._kept
-        c.fill(near, "period", "sampled", n=n, tick=-1)
-        c.fill(tank, "least")
-        c.fill(near.position, "where", stiffness=stiffness, damping=damping, turns=turns)
-        if near.velocity:
-            assert isinstance(near.velocity, Reader)
-            c.fill(velocity=near.velocity.where)
+    n, near = len(tank.stiffness), tank.near
+    assert isinstance(near.position, Reader)
+    several = dict.fromkeys(("newest", "modulated"), 2 * n)
+    several |= dict.fromkeys(("x", "moved", "force", "withheld"), n)
+    c = _with_arrays(structures.Tank, several)
+    c.fill(near, "period", "sampled", n=n, tick=-1)
+    c.fill(tank, "least")
+    constant = {"stiffness": tank.stiffness, "damping": tank.damping, "turns": near.turns}
+    c.fill(near.position, "where", **{k: np.ascontiguousarray(v) for k, v in constant.items()})
+    if near.velocity:
+        assert isinstance(near.velocity, Reader)
+        c.fill(velocity=near.velocity.where)
+    return c
 
 
-class Grown:
-    """Arrays of a structure that grow with a run: fields of vectors, with a row's length."""
-
-    def __init__(self, c: structures.Structure, fields: Mapping[str, int]) -> None:
-        self._c, self._fields = c, fields
-        self._arrays = {name: np.zeros((0, width)) for name, width in fields.items()}
-
-    def to(self, room: int) -> None:
-        """Give them room for `room` rows."""
-        for name, width in self._fields.items():
-            array = np.zeros((room, width))
-            array[: len(self._arrays[name])] = self._arrays[name]
-            self._arrays[name] = array
-            self._c.fill(**{name: array})
-
-
-class CompiledAccount:
+def _compiled_account(hold: Account, tank: structures.Tank | None) -> structures.Account:
     """The energy account of a hold in C."""
-
-    def __init__(self, hold: Account) -> None:
-        n = len(hold.sample)
-        self.c = c = structures.Account(n=n, tick=-1, since=-1, passive=isinstance(hold, Passive))
-        self._vectors = np.zeros((19, n))
-        self._vectors[16] = 1.0 if c.passive else 0.0  # beta, or no correction
-        c.fill(hold, "premises", vectors=self._vectors)
-        self._readers = hold.displacement, hold.velocity
-        for reader, of in zip(self._readers, (c.displacement, c.velocity), strict=True):
-            if reader:
-                assert isinstance(reader, Reader)
-                fill_reader(of, reader)
-        # Ticks and doubles have 8 bytes both.
-        self._queues = [Grown(q, {"ticks": 1, "values": n}) for q in (c.path, c.until, c.fresh)]
-
-    def to(self, room: int) -> None:
-        for queue in self._queues:
-            queue.to(room)
-        self.c.room = room
+    vectors = np.zeros((19, len(hold.sample)))
+    c = structures.Account(tick=-1, since=-1, passive=isinstance(hold, Passive))
+    vectors[16] = 1.0 if c.passive else 0.0  # beta, or no correction
+    c.fill(hold, "premises", n=len(hold.sample), vectors=vectors, tank=tank)
+    for reader, of in ((hold.displacement, c.displacement), (hold.velocity, c.velocity)):
+        if reader:
+            assert isinstance(reader, Reader)
+            fill_reader(of, reader)
+    return c
 
 
 def fill_reader(c: structures.Reader, reader: Reader) -> None:
@@ -170,7 +141,7 @@ class CompiledHold(Hold):
         hold: Hold,
         sources: Sequence[int],
         held: Vector,
-        tank: CompiledTank | None = None,
+        tank: structures.Tank | None = None,
     ) -> None:
         self.own, angles, matrix, link, further, self.far = parts(hold)
         own = self.own
@@ -179,34 +150,33 @@ class CompiledHold(Hold):
         width, turned = len(places), len(angles.angles) if angles else 0
         rows = matrix.n if matrix else 0
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
-        self._sources, self._further = np.array(places, np.intp), further
-        self._held, self._tank = held, tank
+        self._width, self._further = width, further
         arrays = {"samples": depth * width, "vectors": 8 * n, "last": turned, "scale": 2 * rows}
         self._c = c = _with_arrays(structures.Hold, arrays)
         c.fill(kind=KINDS[type(own)], n=n, width=width, depth=depth)
-        c.fill(sources=self._sources, held=held)
+        c.fill(sources=np.array(places, np.intp), held=held)
         if angles:
-            self._angles = np.array(angles.angles, np.int64), np.array(angles.turn, np.float64)
-            c.fill(angles=self._angles[0], turns=self._angles[1], n_angles=turned)
+            turns = np.array(angles.turn, np.float64)
+            c.fill(angles=np.array(angles.angles, np.int64), turns=turns, n_angles=turned)
         if matrix:
             c.manifold = 1 if isinstance(matrix, Projector) else 2
             c.rows, c.rank = rows, -1
-        self.link = None
+        self._growing: list[tuple[structures.Structure, dict[str, int]]] = []
+        self.link = self._account = None
         if link:
             self._link, self._late = link, np.zeros(DRAWN, np.int64)
-            self.link = k = structures.Link(n_late=DRAWN, at_late=DRAWN)
-            k.fill(late=self._late)
-            c.fill(link=k)
-            self._transit = Grown(k, {"arrivals": 1, "stamps": 1, "samples": width})
-        self._account = None
+            self.link = structures.Link(n_late=DRAWN, at_late=DRAWN)
+            self.link.fill(late=self._late)
+            self._growing = [(self.link, {"arrivals": 1, "stamps": 1, "samples": width})]
         if isinstance(own, Account):
-            self._account = CompiledAccount(own)
-            c.fill(account=self._account.c)
-            self._account.c.fill(tank=tank and tank.c)
+            self._account = account = _compiled_account(own, tank)
+            queues = account.path, account.until, account.fresh
+            self._growing += [(queue, {"ticks": 1, "values": n}) for queue in queues]
+        c.fill(link=self.link, account=self._account)
         self.room = 0
         self.grow()
         if tank and isinstance(own, PassiveSetPosition):
-            c.fill(own, "row", tank=tank.c)
+            c.fill(own, "row", tank=tank)
         self.address: int = ctypes.addressof(c)
 
     def join(self, holds: Iterable[CompiledHold]) -> None:
@@ -214,9 +184,7 @@ class CompiledHold(Hold):
         if self.far:
             observer, credit = self.far
             accounts = {id(h.own): h._account for h in holds}
-            account = accounts[id(observer)]
-            assert account
-            self._c.fill(far=account.c, credit=credit)
+            self._c.fill(far=accounts[id(observer)], credit=credit)
 
     def draw(self) -> None:
         """Draw the next latencies."""
@@ -226,12 +194,15 @@ class CompiledHold(Hold):
 
     def grow(self) -> None:
         """Make room for more samples."""
-        self.room = 2 * self.room or FEW
-        if self.link is not None:
-            self._transit.to(self.room)
-            self.link.room = self.room
-        if self._account:
-            self._account.to(self.room)
+        before, self.room = self.room, 2 * self.room or FEW
+        for c, widths in self._growing:  # ticks and doubles have 8 bytes both
+            for name, width in widths.items():
+                array = np.zeros((self.room, width))
+                if before:
+                    array[:before] = c.kept[name]
+                c.fill(**{name: array})
+        for growing in filter(None, (self.link, self._account)):
+            growing.room = self.room
 
     def serve(self, code: int) -> None:
         """Do what `push` or `value` in C have returned for."""
@@ -245,7 +216,7 @@ class CompiledHold(Hold):
         if self._further:
             sample = np.concatenate([sample, self._further()])
         own = np.ascontiguousarray(sample, np.float64)
-        assert len(own) == len(self._sources)
+        assert len(own) == self._width
         while code := self._push(self.address, own.ctypes.data, stamp, arrival):
             self.serve(code)
 
@@ -256,7 +227,7 @@ class CompiledHold(Hold):
         return value
 
 
-def tanks(holds: Iterable[Hold], repeats: bool) -> dict[int, CompiledTank]:
+def tanks(holds: Iterable[Hold], repeats: bool) -> dict[int, structures.Tank]:
     """The energy tanks in C, by the id of the tank, of those all whose holds have C."""
     shared: dict[int, tuple[EnergyTank, list[Hold]]] = {}
     for hold in holds:
@@ -264,7 +235,7 @@ def tanks(holds: Iterable[Hold], repeats: bool) -> dict[int, CompiledTank]:
         if isinstance(own, PassiveSetPosition | Account) and own.tank:
             shared.setdefault(id(own.tank), (own.tank, []))[1].append(hold)
     return {
-        key: CompiledTank(tank)
+        key: compiled_tank(tank)
         for key, (tank, of) in shared.items()
         if all(can(hold, repeats) for hold in of)
     }

@@ -171,7 +171,7 @@ static void receive(Hold *h, int64_t tick) {
     memmove(k->samples, k->samples + gone * h->width, k->n * h->width * sizeof *k->samples);
 }
 
-int hold_push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
+int hapticlink_push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     if (h->link && h->link->started) return send(h->link, y, h->width, stamp, arrival);
     if (h->account && !account_has_room(h->account, 1)) return GROW;
     push(h, y, stamp, arrival);
@@ -180,7 +180,7 @@ int hold_push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
 }
 
 /* The value at `tick`, or GROW. */
-int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
+int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
     if (h->account && !account_has_room(h->account, h->link ? h->link->n : 0)) return GROW;
     if (h->link) receive(h, tick);
     switch (h->kind) {

@@ -2,7 +2,7 @@
  *
  * All arrays belong to Python, which resolves everything that does not change during a run into
  * them. Every field has 8 bytes, so that there is no padding to agree on. What one operation reads
- * lies together (memory.py), the fields of each step first: the cost of a loop over many FMUs is
+ * lies together (fmus.Memory), the fields of each step first: the cost of a loop over many FMUs is
  * that of the cache lines that it touches.
  *
  * A comment [n] behind a pointer is the number of entries that it points to, where that is not one:
@@ -128,6 +128,15 @@ typedef struct {
     int64_t n;
 } Reader;
 
+static inline double reading(const Reader *r, const double *board, int64_t i) {
+    const double value = board[r->where[i]];
+    return r->factor ? r->factor[i] * value + r->offset[i] : value;
+}
+
+static inline void read_all(const Reader *r, const double *board, double *into) {
+    for (int64_t i = 0; i < r->n; i++) into[i] = reading(r, board, i);
+}
+
 /* Vectors with their ticks, oldest first. */
 typedef struct {
     int64_t count, *ticks /* [room] */;
@@ -228,8 +237,8 @@ enum {
     STOP_WHEN,   /* signal a, comparison b, limit x */
 };
 
-/* The steps of a clock's FMUs that are taken beside the loop: beside.py. awaited: they were not done
- * when their end came. longer: a step may go on to the first end that is not past. */
+/* The steps of a clock's FMUs that are taken beside the loop: concurrent_fmus.py. awaited: they were not
+ * done when their end came. longer: a step may go on to the first end that is not past. */
 typedef struct {
     int64_t started, done, awaited, longer;
 } Side;
@@ -324,7 +333,14 @@ static inline int fmu_succeeded(int status) {
     return status == 0 || status == 1;
 }
 
-int loop_carry_out(Loop *l, int64_t tick, At *at);
+/* Those that Python calls: library.py. */
+EXPORT int hapticlink_events(Loop *l, Events *e);
+EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick);
+EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
+EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+EXPORT void hapticlink_guard(int on); /* while it is on, exit() ends the process with status 1 */
+EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
+
 int fmu_get(const Fmu *f, int64_t judged, At *at);
 int fmu_set(const Setter *s, const double *board, At *at);
 int fmu_do_step(const Fmu *f, double time, double size);
@@ -346,14 +362,10 @@ int64_t now(void);
 void wait_until(int64_t time);
 void watch_signals(int on);
 int signal_came(void);
-void use_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
 int exception_left(void);
 void note_arithmetic(void);      /* how numbers are rounded from here on */
 void keep_arithmetic(Place *p);  /* restored where an FMU has changed it, and counted */
-void guard_exit(int on);         /* while it is on, exit() ends the process with status 1 */
 double *hold_scratch(const Hold *h); /* (2, n) */
-int hold_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
-int hold_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 int manifold_push(Hold *h, const double *y);
 void manifold_value(const Hold *h, double *value);
 void tank_credit(Tank *t, double total);

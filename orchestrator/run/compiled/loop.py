@@ -1,16 +1,125 @@
-"""The event loop in C."""
+"""The event loop in C: the clocks' communication points, and the kinds of events."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 
+import numpy as np
+
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.plan.event_kinds import event, key_of, keyed_events
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.run.compiled.events import Events
-from hapticlink.orchestrator.run.compiled.operation_records import Machine
+from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.operation_records import PATIENCE, Machine
+from hapticlink.orchestrator.run.concurrent_fmus import Side
+from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.simulation import Simulation
+
+WINDOW = 4096
+"""Communication points of a clock that the loop gets at a time."""
+NEVER = 2**62
+
+
+class Events:
+    """Runs all events of a timeline, in real time where there is a pace. block: adds the operations
+    of a kind of event, and returns their indices."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        timeline: Timeline,
+        block: Callable[[Event], tuple[int, int]],
+        pace: Pace | None = None,
+        sides: Mapping[str, Side] = MappingProxyType({}),
+    ) -> None:
+        self._machine, self._timeline, self._block = machine, timeline, block
+        self._starts = [clock.starts for clock in timeline.clocks]
+        n = len(timeline.clocks)
+        clocks, self._key = (structures.Clock * n)(), np.zeros(1 + n, np.int64)
+        self._clocks, self._given = [*clocks], [0] * n
+        self._kinds: dict[Event, tuple[int, int]] = {}
+        self._c = c = structures.Events()
+        c.fill(timeline, "end", clocks=clocks, n_clocks=n, key=self._key, patience=PATIENCE)
+        c.at.op = -1
+        if pace:
+            pace.take(machine.library)
+            c.fill(pace=pace.c, since=pace.clock())
+        for i, clock in enumerate(timeline.clocks):
+            self._next_window(i)
+            if clock.name in sides:
+                self._clocks[i].fill(side=sides[clock.name].c)
+
+    @property
+    def complete(self) -> int:
+        """The number of events that are complete."""
+        events: int = self._c.events
+        return events
+
+    def run(self, turn: Callable[[int], object]) -> None:
+        """Run all events; `turn` is called from time to time, and at the end, with the tick."""
+        c, machine = self._c, self._machine
+        loop, here = ctypes.addressof(machine.loop), ctypes.addressof(c)
+        while code := machine.code(c.at, machine.library.events, loop, here):
+            if code == structures.KIND:
+                self._new_kind()
+            elif code == structures.STARTS:
+                self._next_window(c.at.what)
+            elif code == structures.PAUSE:
+                turn(c.tick)
+            else:
+                machine.serve(code, c.at, c.tick)
+        turn(c.tick)
+
+    def previous(self, clock: str) -> int:
+        """The communication point (ticks) at which the newest sample of a clock is."""
+        return self._point(clock, -1)
+
+    def current(self, clock: str) -> int:
+        """The communication point (ticks) that a clock goes to."""
+        return self._point(clock, 0)
+
+    def _point(self, clock: str, further: int) -> int:
+        i = self._index(clock)
+        return self._starts[i][self._given[i] + self._clocks[i].at + further]
+
+    def change_rate(self, clock: str, starts: Sequence[int]) -> None:
+        """Replace the communication points of a clock, `previous` and `current` the first."""
+        i = self._index(clock)
+        self._starts[i], self._given[i], self._clocks[i].at = starts, 1, 0
+        self._next_window(i)
+
+    def patience(self, ns: int) -> None:
+        """Have `turn` called after that time each."""
+        self._c.patience = ns
+
+    def _index(self, clock: str) -> int:
+        return [c.name for c in self._timeline.clocks].index(clock)
+
+    def _next_window(self, i: int) -> None:
+        """The next communication points of clock i: the current one comes first."""
+        self._given[i] = first = self._given[i] + self._clocks[i].at
+        window = np.array(self._starts[i][first : first + WINDOW], np.int64)
+        if len(window) < 2:
+            window = np.array([NEVER, NEVER], np.int64)
+        self._clocks[i].fill(starts=window, n=len(window), at=0)
+
+    def _new_kind(self) -> None:
+        self.prepare([event(self._timeline, self._key.tobytes())])
+
+    def coming(self) -> Iterable[Event]:
+        """The kinds of the first events, in the order of their first occurrence."""
+        return keyed_events(self._timeline, self._timeline.end, WINDOW)[1]
+
+    def prepare(self, kinds: Iterable[Event]) -> None:
+        """Add the operations of kinds of events, those of `coming` before they occur."""
+        self._kinds |= {kind: self._block(kind) for kind in kinds}
+        keys = [key_of(self._timeline, kind) for kind in self._kinds]
+        blocks = np.array([*self._kinds.values()], np.int64)
+        self._c.fill(keys=np.array(keys, np.int64), kinds=blocks, n_kinds=len(keys))
 
 
 class CompiledLoop(PythonLoop):
@@ -20,9 +129,8 @@ class CompiledLoop(PythonLoop):
     """
 
     def __init__(self, plan: Plan, simulation: Simulation, library: ctypes.CDLL) -> None:
-        machine = Machine(library, simulation)
-        super().__init__(plan, simulation, machine.in_python, machine.joined)
-        self._machine = machine
+        self._machine = machine = Machine(library, simulation)
+        super().__init__(plan, machine.operations, machine.in_python)
         timeline, pace = plan.system.timeline, simulation.pace
         self.change_hold = machine.change_hold
         self.events = Events(machine, timeline, self._block, pace, simulation.sides)
@@ -38,4 +146,4 @@ class CompiledLoop(PythonLoop):
             self.complete = self.events.complete
 
     def _block(self, event: Event) -> tuple[int, int]:
-        return self._machine.block(self._binder.instructions(self._plan.block(event)))
+        return self._machine.block(self._instructions(event))

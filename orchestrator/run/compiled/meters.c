@@ -6,15 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-static double entry(const Reader *r, const double *board, int64_t i) {
-    const double value = board[r->where[i]];
-    return r->factor ? r->factor[i] * value + r->offset[i] : value;
-}
-
-static void reading(const Reader *r, const double *board, double *into) {
-    for (int64_t i = 0; i < r->n; i++) into[i] = entry(r, board, i);
-}
-
 /* Meter.sample; CALL where there is no room, which Python then makes. */
 int meter_sample(Meter *m, const double *board, int64_t stamp) {
     int64_t *count = m->counts;
@@ -22,7 +13,7 @@ int meter_sample(Meter *m, const double *board, int64_t stamp) {
         if (*count == m->room) return CALL;
         m->stamps[(*count)++] = stamp;
     }
-    reading(&m->source, board, m->samples + (*count - 1) * m->source.n);
+    read_all(&m->source, board, m->samples + (*count - 1) * m->source.n);
     return 0;
 }
 
@@ -157,7 +148,7 @@ int meter_move(Meter *m, const double *board, int64_t tick) {
     if (*count && m->ticks[*count - 1] == tick) return 0;
     if (*count >= m->full && fold_within_room(m)) return CALL;
     m->ticks[*count] = tick;
-    reading(&m->x, board, m->moves + *count * m->x.n);
+    read_all(&m->x, board, m->moves + *count * m->x.n);
     ++*count;
     return 0;
 }
@@ -168,7 +159,7 @@ void meter_feed(Meter *m, const double *board, double share) {
     const int fresh = *count < moves;
     double *row = m->efforts + (fresh ? *count : *count - 1) * n;
     for (int64_t i = 0; i < n; i++) {
-        const double effort = entry(&m->held, board, i);
+        const double effort = reading(&m->held, board, i);
         const double part = share == 1.0 ? effort : effort * share;
         row[i] = fresh ? part : row[i] + part;
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -23,17 +23,15 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.run.bind_operations import Bound, Stop
 from hapticlink.orchestrator.run.compiled import fmus, structures
+from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.hold_structures import (
     CompiledHold,
-    CompiledTank,
     can,
     fill_reader,
     parts,
     tanks,
 )
-from hapticlink.orchestrator.run.compiled.memory import Memory
 from hapticlink.orchestrator.run.compiled.structures import Op
 from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.instructions import (
@@ -44,6 +42,7 @@ from hapticlink.orchestrator.run.instructions import (
     Move,
     Sample,
 )
+from hapticlink.orchestrator.run.python_loop import OperationsInPython, Stop
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system.system import System
@@ -52,6 +51,8 @@ EXACT = 2**53
 """Up to here every whole number is a double, and the quotient of two is rounded once."""
 PATIENCE = 20_000_000
 """ns after which Python gets a turn: signals, progress."""
+KINDS = ("fmu", "setter", "hold", "meter", "table")
+"""Of objects that operations refer to by the index in an array of `loop`."""
 
 
 def too_long(system: System) -> str:
@@ -76,22 +77,22 @@ class Machine:
         self.loop.fill(simulation.signals, "values")
         self._memory = Memory()
         self._kept: list[object] = []
-        self._bound: Bound = []
-        self._ops = np.zeros(0, np.dtype(Op))
+        self._instructions: list[Instruction] = []
+        self.operations = OperationsInPython(simulation, self._joined)
         self._points: list[tuple[float, float]] = []
         self._fmus = self._array("fmus", structures.Fmu, len(system.fmus))
         self._setters = self._array("setters", structures.Setter, 2 * len(system.fmus))
         self._tables = self._array("tables", structures.Table, len(system.timeline.clocks))
         self._holds = self._array("holds", ctypes.c_void_p, len(system.connections))
         self._meters = self._array("meters", ctypes.c_void_p, len(simulation.meters.of))
-        self._indices: dict[tuple[str, Any], int] = {}
-        self._rows: dict[Instruction, tuple[float, ...]] = {}
+        self._indices: dict[str, dict[Any, int]] = {kind: {} for kind in KINDS}
+        self._records: dict[Instruction, Op] = {}
+        self._ops: list[Op] = []
         self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
         array = (kind * max(n, 1))()
         self.loop.fill(**{name: array})
-        self._kept.append(array)
         return array
 
     def _make_holds(self) -> None:
@@ -99,17 +100,15 @@ class Machine:
         repeats = system.coupling.scheme == "iterated"
         shared = tanks(simulation.holds.values(), repeats)
         for name, hold in simulation.holds.items():
-            own = parts(hold).own
-            needed = getattr(own, "tank", None)
+            needed = getattr(parts(hold).own, "tank", None)
             tank = shared.get(id(needed))
-            if not can(hold, repeats) or (needed and tank is None):
-                continue
-            simulation.holds[name] = self._compiled(name, hold, tank)
+            if can(hold, repeats) and (tank or not needed):
+                simulation.holds[name] = self._compiled(name, hold, tank)
         compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
         for hold in compiled:
             hold.join(compiled)
 
-    def _compiled(self, name: str, hold: Hold, tank: CompiledTank | None = None) -> CompiledHold:
+    def _compiled(self, name: str, hold: Hold, tank: structures.Tank | None = None) -> CompiledHold:
         signals = self._simulation.signals
         sources = signals.sources(self._simulation.system.connection[name])
         values, loop = signals.values[signals.hold(name)], ctypes.addressof(self.loop)
@@ -138,34 +137,31 @@ class Machine:
     # --- what the arrays of `loop` hold -----------------------------------------------------
 
     def names(self, kind: str) -> list[Any]:
-        """The keys of the objects of a kind ("fmu", "setter", "hold", "meter" or "table"), in the
-        order of their array."""
-        return [key for of, key in self._indices if of == kind]
+        """The keys of the objects of one of KINDS, in the order of their array."""
+        return [*self._indices[kind]]
 
     def counts(self) -> dict[str, int]:
         """The number of entries of each array, by the names that loop.h uses."""
-        kinds = ("fmu", "setter", "hold", "meter", "table")
-        of_objects = {f"n_{kind}s": len(self.names(kind)) for kind in kinds}
-        return {**of_objects, "n_ops": len(self._ops), "n_points": len(self._points)}
+        of_objects = {f"n_{kind}s": len(indices) for kind, indices in self._indices.items()}
+        return {**of_objects, "n_ops": len(self._instructions), "n_points": len(self._points)}
 
     # --- records --------------------------------------------------------------------------
 
-    def block(self, bound: Bound) -> tuple[int, int]:
+    def block(self, sequence: Sequence[Instruction]) -> tuple[int, int]:
         """Adds a sequence of instructions; the indices of its first, and of the one after its
         last."""
-        first = len(self._bound)
-        self._bound += bound
-        for instruction, _ in bound:
-            if instruction not in self._rows:
-                self._rows[instruction] = self._record(instruction)
-        rows = [self._rows[instruction] for instruction, _ in bound]
-        self._ops = np.concatenate([self._ops, np.array(rows, np.dtype(Op))])
-        self.loop.fill(ops=self._ops)
-        return first, len(self._bound)
+        first = len(self._instructions)
+        self._instructions += sequence
+        for instruction in sequence:  # kinds of events share most of theirs
+            if instruction not in self._records:
+                self._records[instruction] = self._record(instruction)
+            self._ops.append(self._records[instruction])
+        self.loop.fill(ops=(Op * len(self._ops))(*self._ops))
+        return first, len(self._instructions)
 
-    def joined(self, bound: Bound) -> Call:
+    def _joined(self, sequence: Sequence[Instruction]) -> Call:
         """One call that carries out a sequence of instructions at a tick."""
-        first, last = self.block(bound)
+        first, last = self.block(sequence)
         position, run = structures.At(), self.library.block
         loop, here = ctypes.addressof(self.loop), ctypes.addressof(position)
 
@@ -176,53 +172,52 @@ class Machine:
 
         return call
 
-    def _record(self, instruction: Instruction) -> tuple[float, ...]:
+    def _record(self, instruction: Instruction) -> Op:
         record = self._coded(instruction)
-        if isinstance(record, str):
-            first = next(iter(vars(instruction).values()), "")
-            of = f" {first}" if isinstance(first, str) and first else ""
-            self.in_python[f"{type(instruction).__name__.lower()}{of}"] = record
-            return (structures.PYTHON, 0, 0, 0, 0, 0.0)
-        return (*record, *(0,) * (5 - len(record)), 0.0) if len(record) < 6 else record
+        if not isinstance(record, str):
+            return record
+        first = next(iter(vars(instruction).values()), "")
+        of = f" {first}" if isinstance(first, str) and first else ""
+        self.in_python[f"{type(instruction).__name__.lower()}{of}"] = record
+        return Op(structures.PYTHON)
 
-    def _coded(self, instruction: Instruction) -> tuple[float, ...] | str:
-        """Code, a, b, c, d and x of an operation; why it is carried out in Python where it is."""
+    def _coded(self, instruction: Instruction) -> Op | str:
+        """The record of an operation; why it is carried out in Python where it is."""
         simulation, system = self._simulation, self._simulation.system
         match instruction:
             case Get(fmu, judged=judged) if (index := self._fmu(fmu)) is not None:
-                return structures.GET, index, judged
+                return Op(structures.GET, index, judged)
             case Set(fmu, now, False) if (index := self._setter(fmu, now)) is not None:
-                return structures.SET, index
+                return Op(structures.SET, index)
             case Step(fmu) if fmu in simulation.beside:
                 return "the FMU runs beside the loop, in a thread"
             case Step(fmu, dticks, part, count) if (index := self._fmu(fmu)) is not None:
                 size = float(dticks * (system.timeline.base / count))
                 over = 0 if system.fmu[fmu].sampled and count == 1 else dticks
-                return structures.STEP, index, part * dticks, count, over, size
+                return Op(structures.STEP, index, part * dticks, count, over, size)
             case Push(connection, ahead) if (index := self._hold(connection)) is not None:
-                return structures.PUSH, index, ahead
+                return Op(structures.PUSH, index, ahead)
             case Evaluate(connection, ahead, 0) if (index := self._hold(connection)) is not None:
-                return structures.EVALUATE, index, 0, 0, 0, float(ahead)
+                return Op(structures.EVALUATE, index, x=float(ahead))
             case Blend(connection, points) if (index := self._hold(connection)) is not None:
                 first = len(self._points)
                 self._points += [(weight, float(ahead)) for weight, ahead in points]
-                self._kept.append(of := np.array(self._points))
-                self.loop.fill(points=of)
-                return structures.BLEND, index, first, len(self._points)
+                self.loop.fill(points=np.array(self._points))
+                return Op(structures.BLEND, index, first, len(self._points))
             case Sample(connection, ahead):
-                return structures.SAMPLE, self._meter(connection), ahead
+                return Op(structures.SAMPLE, self._meter(connection), ahead)
             case Move(connection, ahead):
-                return structures.MOVE, self._meter(connection), ahead
+                return Op(structures.MOVE, self._meter(connection), ahead)
             case Feed(connection, share):
-                return structures.FEED, self._meter(connection), 0, 0, 0, share
+                return Op(structures.FEED, self._meter(connection), x=share)
             case Record(clock):
-                return structures.RECORD, self._table(clock)
+                return Op(structures.RECORD, self._table(clock))
             case StopWhen():
                 condition = system.ends_when
                 assert condition is not None
                 place = simulation.signals.scalar(condition.fmu, condition.variable)
                 comparison = [*COMPARISONS].index(condition.comparison)
-                return structures.STOP_WHEN, place, comparison, 0, 0, condition.value
+                return Op(structures.STOP_WHEN, place, comparison, x=condition.value)
             case Evaluate(order=order) if order:
                 return "the FMU takes derivatives of its inputs"
             case Set(derivatives=True):
@@ -242,11 +237,11 @@ class Machine:
 
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
         """The index of an object of `kind`, made at its first use."""
-        if (kind, key) not in self._indices:
-            index = sum(k == kind for k, _ in self._indices)
-            self._kept.append(make(index))
-            self._indices[kind, key] = index
-        return self._indices[kind, key]
+        indices = self._indices[kind]
+        if key not in indices:
+            self._kept.append(make(len(indices)))
+            indices[key] = len(indices)
+        return indices[key]
 
     def _fmu(self, name: str) -> int | None:
         instance = self._simulation.instances[name]
@@ -260,9 +255,7 @@ class Machine:
         )
 
     def _setter(self, name: str, now: bool) -> int | None:
-        simulation = self._simulation
-        setter = (simulation.now_setters if now else simulation.setters)[name]
-        instance = simulation.instances[name]
+        setter, instance = self._simulation.setters[name, now], self._simulation.instances[name]
         if not isinstance(setter, Setter) or not isinstance(instance, InProcess):
             return None
         if instance.texts or any(transfer.exact for transfer in setter.transfers):
@@ -320,7 +313,7 @@ class Machine:
         try:
             return run(*arguments)
         except SystemError as error:
-            instruction, _ = self._bound[position.op]
+            instruction = self._instructions[position.op]
             assert isinstance(instruction, Get | Set | Step)
             instance = self._simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
@@ -330,11 +323,11 @@ class Machine:
 
     def serve(self, code: int, position: structures.At, tick: int) -> None:
         """Does what the loop cannot do at operation `position.op`, and sets where it goes on."""
-        instruction, call = self._bound[position.op]
+        instruction = self._instructions[position.op]
         simulation = self._simulation
         if code == structures.CALL:
             simulation.late = self.loop.late
-            call(tick)
+            self.operations(instruction, tick)
         elif code == structures.STOP:
             raise Stop
         elif code in (structures.DRAW, structures.GROW):
@@ -348,9 +341,8 @@ class Machine:
             instance = simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
             if code == structures.FAILED:
-                raise instance.failed(
-                    self._called(instruction, position.what, instance), position.status
-                )
+                called = self._called(instruction, position.what, instance)
+                raise instance.failed(called, position.status)
             if code == structures.UNRESTORED:
                 called = f"fmi{instance.description.fmi}SetFMUstate"
                 raise instance.failed(called, position.status)
@@ -367,14 +359,11 @@ class Machine:
         """The name of the failed call of a get, a set or a step."""
         if number < 0:
             return instance.do_step
-        transfers = instance.asked
-        if isinstance(instruction, Set):
-            simulation = self._simulation
-            setters = simulation.now_setters if instruction.now else simulation.setters
-            setter = setters[instruction.fmu]
-            assert isinstance(setter, Setter)
-            transfers = [*setter.transfers]
-        return transfers[number].name
+        if not isinstance(instruction, Set):
+            return instance.asked[number].name
+        setter = self._simulation.setters[instruction.fmu, instruction.now]
+        assert isinstance(setter, Setter)
+        return setter.transfers[number].name
 
 
 def _fill_meter(c: structures.Meter, meter: Meter) -> None:

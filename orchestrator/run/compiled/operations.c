@@ -20,7 +20,7 @@ static int compares(double value, int64_t comparison, double limit) {
 }
 
 static int evaluate(const Loop *l, Hold *h, int64_t tick, double ahead) {
-    return hold_value(h, l, tick + l->late, ahead - (double)l->late, h->held);
+    return hapticlink_value(h, l, tick + l->late, ahead - (double)l->late, h->held);
 }
 
 static int blend(const Loop *l, const Op *op, int64_t tick) {
@@ -29,7 +29,7 @@ static int blend(const Loop *l, const Op *op, int64_t tick) {
     for (int64_t k = 0; k < h->n; k++) sum[k] = 0.0;
     for (int64_t i = op->b; i < op->c; i++) {
         const double ahead = l->points[i][1] - (double)l->late;
-        const int code = hold_value(h, l, tick + l->late, ahead, value);
+        const int code = hapticlink_value(h, l, tick + l->late, ahead, value);
         if (code) return code;
         for (int64_t k = 0; k < h->n; k++) sum[k] += l->points[i][0] * value[k];
     }
@@ -40,7 +40,7 @@ static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
     double *sample = hold_scratch(h);
     if (h->far) *h->credit = account_credit(h->far, l);
     for (int64_t k = 0; k < h->width; k++) sample[k] = l->values[h->sources[k]];
-    return hold_push(h, sample, stamp, arrival);
+    return hapticlink_push(h, sample, stamp, arrival);
 }
 
 /* CALL before the first row, and where the block is full. */
@@ -63,9 +63,9 @@ static int record(const Loop *l, Table *t, int64_t tick) {
     return 0;
 }
 
-/* Carries out the operations from at->op to at->last. Returns DONE, or a code for operation
- * at->op. */
-int loop_carry_out(Loop *l, int64_t tick, At *at) {
+/* Carries out the operations from at->op to at->last at a tick, for the loop or within an operation
+ * of Python's. Returns DONE, or a code for operation at->op. */
+int hapticlink_block(Loop *l, At *at, int64_t tick) {
     int64_t known[3] = {INT64_MIN, 0, 0}; /* start, end and parts of the step before */
     double begins = 0.0, ends = 0.0;
     for (; at->op < at->last; at->op++) {
@@ -103,28 +103,10 @@ int loop_carry_out(Loop *l, int64_t tick, At *at) {
     return DONE;
 }
 
+/* Those of platform.c, which does without loop.h: windows.h has the same names for types. */
 EXPORT int64_t hapticlink_now(void) { return now(); }
 
 EXPORT void hapticlink_wait(int64_t until) { wait_until(until); }
 
 /* Whether to notice signals; Windows has none that Python would not notice. */
 EXPORT void hapticlink_watch(int on) { watch_signals(on); }
-
-/* Whether a run is going on, which no FMU may end with the status of a success. */
-EXPORT void hapticlink_guard(int on) { guard_exit(on); }
-
-/* PyGILState_Ensure, PyErr_Occurred and PyGILState_Release. */
-EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
-    use_python(ensure, occurred, release);
-}
-
-/* Runs one sequence of operations at a tick, within an operation that Python carries out. */
-EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick) { return loop_carry_out(l, tick, at); }
-
-EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival) {
-    return hold_push(h, sample, stamp, arrival);
-}
-
-EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
-    return hold_value(h, l, tick, ahead, value);
-}

@@ -1,4 +1,5 @@
-/* What an FMU may change of the whole process: how numbers are rounded, and that it goes on. */
+/* What an FMU may change of the whole process: how numbers are rounded, that it goes on, and the
+ * exceptions that a Python FMU leaves behind. */
 
 #include "loop.h"
 
@@ -51,8 +52,28 @@ static void ended(void) {
     _exit(1);
 }
 
-void guard_exit(int on) {
+void hapticlink_guard(int on) {
     static int registered;
     if (!registered) registered = !atexit(ended);
     running += on ? 1 : -1;
+}
+
+/* The library of a Python FMU goes on with a wrong number after some exceptions, such as an integer
+ * of Python that C cannot hold. */
+static int (*ensure_)(void);
+static void *(*occurred_)(void);
+static void (*release_)(int);
+
+void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int)) {
+    ensure_ = ensure;
+    occurred_ = occurred;
+    release_ = release;
+}
+
+/* Whether there is one, which stays: ctypes raises it when the loop returns. */
+int exception_left(void) {
+    const int state = ensure_();
+    const int occurred = occurred_() != NULL;
+    release_(state);
+    return occurred;
 }

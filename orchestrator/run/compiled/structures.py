@@ -1,5 +1,4 @@
-"""The structures and the numbers of loop.h, by their names there. Pointers are addresses; whoever
-fills one keeps what it points to."""
+"""The structures and the numbers of loop.h, by their names there. Pointers are addresses."""
 
 from __future__ import annotations
 
@@ -40,17 +39,20 @@ POINTERS: dict[str, dict[str, Pointer]] = {}
 
 
 class Structure(ctypes.Structure):
-    """A structure of loop.h."""
+    """A structure of loop.h, which lives as long as its memory does; as an object of Python it also
+    keeps what `fill` has given its fields, in `kept`."""
 
-    __slots__ = ()
+    kept: dict[str, Any]
 
     def fill(self, source: object = None, *names: str, **fields: object) -> None:
         """Set `fields`, and those of these names to the attributes of `source` that have them. A
         pointer is given by what it points to: an array, an object of ctypes, a function of a
         library; or by its address, None for NULL. Raises AttributeError for a name that either
         lacks."""
-        for name, value in ({n: getattr(source, n) for n in names} | fields).items():
+        values = {name: getattr(source, name) for name in names} | fields
+        for name, value in values.items():
             setattr(self, name, _address(value))
+        vars(self).setdefault("kept", {}).update(values)
 
 
 def _address(value: Any) -> Any:
@@ -85,7 +87,7 @@ def _declared(text: str) -> dict[str, Any]:
     for declared in _DECLARED.finditer(_COMMENT.sub("", _COUNT.sub(r"<\1>", text))):
         if name := declared["name"]:
             rows = [*fields(name, declared["fields"])]
-            types[name] = type(name, (Structure,), {"__slots__": (), "_fields_": rows})
+            types[name] = type(name, (Structure,), {"_fields_": rows})
         else:
             names = re.findall(r"\w+", declared["numbers"])
             types |= {name: number for number, name in enumerate(names)}

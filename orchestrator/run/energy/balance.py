@@ -24,9 +24,9 @@ LEAST = 1e-6
 class Balance:
     """Energy balance of the mechanism, checked where only wrenches put energy into it."""
 
-    def __init__(self, system: System, signals: SignalVector) -> None:
-        self._system, self._values = system, signals.values
-        judged = system.energy.in_play is not None and MECHANISM in system.fmu
+    def __init__(self, signals: SignalVector) -> None:
+        self._system, self._values = signals.system, signals.values
+        judged = self._system.energy.in_play is not None and MECHANISM in self._system.fmu
         self._place = signals.scalar(MECHANISM, "energy") if judged else None
         self._start = 0.0
 

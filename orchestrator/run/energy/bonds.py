@@ -8,7 +8,7 @@ use N and m, N.m and rad.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +17,9 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.system.ports import paired
-from hapticlink.orchestrator.system.system import Connection, System
+from hapticlink.orchestrator.system.system import Connection
 
 
 @dataclass(frozen=True)
@@ -48,37 +49,33 @@ class Bond:
         return self.factor * self.scale
 
 
-def bond(c: Connection, system: System, signals: SignalVector) -> Bond | None:
-    target = system.fmu[c.target].description
-    pairs = [(i, s, paired(c, s, system.energy.power)) for i, s in enumerate(c.inputs)]
-    carrying = [(i, s, p) for i, s, p in pairs if p]
+def bond(c: Connection, signals: SignalVector) -> Bond | None:
+    target = signals.system.fmu[c.target].description
+    pairs = ((i, s, paired(c, s, signals.system.energy.power)) for i, s in enumerate(c.inputs))
+    carrying = [(i, s, p.sign, _displacement(target, s, p)) for i, s, p in pairs if p]
     if not carrying or c.initial:
         return None
-    units = [_factor(target, s) for _, s, _ in carrying]
-    moved = [_displacement(target, s, p.effort, p.displacement) for _, s, p in carrying]
-    signs = [p.sign * _factor(target, x) for x, (_, _, p) in zip(moved, carrying, strict=True)]
+    entries, inputs, signs, moved = zip(*carrying, strict=True)
+    units = [_factor(target, s) for s in inputs]
+
+    def places(outputs: Iterable[Scalar]) -> tuple[int, ...]:
+        return tuple(signals.scalar(c.target, s.name) for s in outputs)
+
     return Bond(
-        tuple(i for i, _, _ in carrying),
-        tuple(signals.scalar(c.target, x.name) for x in moved),
-        _moving(target, c.target, moved, signals),
-        np.array([s.conversion.factor for _, s, _ in carrying]) * units,
-        np.array([s.conversion.offset for _, s, _ in carrying]) * units,
-        np.array(signs),
+        entries,
+        places(moved),
+        places(target.derivative(moved) or ()),
+        np.array([s.conversion.factor for s in inputs]) * units,
+        np.array([s.conversion.offset for s in inputs]) * units,
+        np.array(signs) * [_factor(target, x) for x in moved],
     )
 
 
-def _displacement(target: Description, s: Scalar, effort: str, displacement: str) -> Scalar:
-    """The entry of `displacement` with the index that `s` has in `effort`."""
-    efforts, moved = (name.partition(".")[2] for name in (effort, displacement))
+def _displacement(target: Description, s: Scalar, power: PowerPort) -> Scalar:
+    """The entry of the displacement with the index that `s` has in the effort."""
+    efforts, moved = (name.partition(".")[2] for name in (power.effort, power.displacement))
     place = [e.name for e in target.port(efforts, "input")].index(s.name)
     return target.port(moved, "output")[place]
-
-
-def _moving(
-    target: Description, name: str, moved: Sequence[Scalar], signals: SignalVector
-) -> tuple[int, ...]:
-    """Indices of the displacements' derivatives in the signal vector; empty unless all exist."""
-    return tuple(signals.scalar(name, s.name) for s in target.derivative(moved) or ())
 
 
 def _factor(target: Description, scalar: Scalar) -> float:
@@ -94,18 +91,17 @@ class Reader:
         self,
         signals: SignalVector,
         places: Sequence[int],
-        factor: Vector,
+        factor: Vector | float = 1.0,
         offset: Vector | float = 0.0,
     ) -> None:
-        self._values, self._view = signals.values, signals.view(places)
-        self.where = np.array(places, dtype=np.intp)
+        self._values, self.where = signals.values, np.array(places, np.intp)
         self.factor: Vector | None = None
         self.offset: Vector | None = None
         if np.any(factor != 1.0) or np.any(offset != 0.0):
-            self.factor = np.array(factor, dtype=np.float64)
-            self.offset = np.full(len(self.where), offset, dtype=np.float64)
+            self.factor, self.offset = (np.full(len(places), v) for v in (factor, offset))
 
     def __call__(self) -> Vector:
-        if self.factor is not None and self.offset is not None:
-            return self.factor * self._values[self.where] + self.offset
-        return self._values[self.where] if self._view is None else self._view.copy()
+        read: Vector = self._values[self.where]
+        if self.factor is None or self.offset is None:
+            return read
+        return self.factor * read + self.offset

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.results.run_record import Energy
+from hapticlink.orchestrator.run.energy.bonds import Reader, bond
+from hapticlink.orchestrator.run.signals import SignalVector
 
 Read = Callable[[], Vector]
 Rows = TypeVar("Rows", NDArray[np.float64], NDArray[np.int64])
@@ -189,3 +191,42 @@ def _grown(array: Rows, rows: int) -> Rows:
     grown = np.zeros((rows, *array.shape[1:]), array.dtype)
     grown[: len(array)] = array
     return grown
+
+
+class Meters:
+    """One meter for each connection that carries power, of the efforts that its target gets: `of`
+    by its name, of_source and of_target the names by FMU. The gets and sets of a run update them
+    (`instructions`)."""
+
+    def __init__(self, signals: SignalVector) -> None:
+        self.of: dict[str, Meter] = {}
+        self.of_source: dict[str, list[str]] = {}
+        self.of_target: dict[str, list[str]] = {}
+        self._seconds = float(signals.system.timeline.base)
+        for c in signals.system.connections:
+            if power := bond(c, signals):
+                source, held = (
+                    Reader(signals, power.of(places), power.factor, power.offset)
+                    for places in (signals.sources(c), signals.mean(c))
+                )
+                self.of[c.name] = Meter(source, held, Reader(signals, power.moved, power.scale))
+                self.of_source.setdefault(c.source, []).append(c.name)
+                self.of_target.setdefault(c.target, []).append(c.name)
+
+    def start(self) -> None:
+        for meter in self.of.values():
+            meter.sample(0)
+            meter.move(0)
+
+    def checkpoint(self) -> list[Mark]:
+        """Checkpoint of all meters for `rollback`."""
+        return [meter.checkpoint(4) for meter in self.of.values()]
+
+    def rollback(self, marks: list[Mark]) -> None:
+        """Remove what all meters recorded since the checkpoint `marks`."""
+        for meter, mark in zip(self.of.values(), marks, strict=True):
+            meter.rollback(mark)
+
+    def energies(self) -> dict[str, Energy]:
+        """The energies (J) of each connection that carries power, by its name."""
+        return {name: meter.energy(self._seconds) for name, meter in self.of.items()}

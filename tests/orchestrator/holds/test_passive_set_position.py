@@ -179,7 +179,7 @@ def test_a_near_end_that_is_an_angle_is_known_as_one():
     """Its tank unwraps what it reads (tests of the tank have what becomes of it)."""
     options = ["hold=pspm", "kinds.haptic_device.x=angle"]
     with built(open_scene.load("closed-loop-direct", options)) as system:
-        _, (tank,) = make_holds(system, SignalVector(system))
+        _, (tank,) = make_holds(SignalVector(system))
     assert isinstance(tank, EnergyTank)
     np.testing.assert_allclose(tank.near.turns, [0.0, 0.0, 2 * np.pi])
 

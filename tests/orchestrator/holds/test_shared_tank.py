@@ -14,7 +14,7 @@ from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.holds_on_manifolds import Unwrapped
-from hapticlink.orchestrator.run.spring_holds import WithFurther
+from hapticlink.orchestrator.run.make_holds import WithFurther
 from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 

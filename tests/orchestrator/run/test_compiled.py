@@ -15,8 +15,8 @@ from hapticlink.orchestrator.plan.event_kinds import event
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_record import Timings
-from hapticlink.orchestrator.run.compiled.events import Events
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
+from hapticlink.orchestrator.run.compiled.loop import Events
 from hapticlink.orchestrator.scene.records import Iteration
 from tests.orchestrator import coupled
 from tests.orchestrator.foreign_fmus import python_fmu

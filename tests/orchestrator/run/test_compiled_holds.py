@@ -20,7 +20,7 @@ from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import (
     KINDS,
     CompiledHold,
-    CompiledTank,
+    compiled_tank,
     parts,
 )
 from hapticlink.orchestrator.run.compiled.library import load
@@ -38,9 +38,6 @@ class Signals:
 
     def __init__(self) -> None:
         self.values = np.zeros(4 * SIZE)
-
-    def view(self, places: list[int]) -> None:
-        return None
 
 
 def seconds(ticks: float) -> float:
@@ -64,7 +61,7 @@ class Twins:
             values=self._values.ctypes.data, numerator=NUMERATOR, denominator=DENOMINATOR
         )
         tank = getattr(parts(own).own, "tank", None)
-        shared, places = CompiledTank(tank) if tank else None, range(width or size)
+        shared, places = compiled_tank(tank) if tank else None, range(width or size)
         loop = ctypes.addressof(self._loop)
         self.compiled = CompiledHold(load(), loop, own, places, np.zeros(size), shared)
         self.holds = self.python, self.compiled
