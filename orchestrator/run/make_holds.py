@@ -8,9 +8,8 @@ import numpy as np
 
 from hapticlink.orchestrator.base.errors import Fault, shortened
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Vector
 from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run import spring_holds
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
