@@ -33,8 +33,8 @@ from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, Clock
 from hapticlink.orchestrator.fmi.in_process_fmi3 import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
-from hapticlink.orchestrator.fmi.status import DISCARD, succeeded
-from hapticlink.orchestrator.fmi.termination import SHARE
+from hapticlink.orchestrator.fmi.status import DISCARD, SHARE, succeeded
+from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 MOST = 1000
@@ -71,7 +71,7 @@ class InProcessWithEvents(InProcess3):
         self.inputs: EventSetter | None = None
         """The newest that was called."""
         self._clocks = self.description.clocks
-        self._readings: dict[frozenset[int] | None, Reading] = {}
+        self._readings: dict[frozenset[int] | None, tuple[list[int], Vector, list[Transfer]]] = {}
         self._saved_pending: dict[int, Pending] = {}
 
     @property
@@ -139,18 +139,19 @@ class InProcessWithEvents(InProcess3):
         """A periodic clock with the interval that the FMU tells in initialisation mode."""
         if clock.kind not in PERIODIC or clock.interval is not None:
             return clock
-        interval, shift, reference = ctypes.c_double(), ctypes.c_double(), _one(clock.reference)
-        qualifier = ctypes.byref(ctypes.c_int())
-        self._call("fmi3GetIntervalDecimal", reference, 1, ctypes.byref(interval), qualifier)
-        self._call("fmi3GetShiftDecimal", reference, 1, ctypes.byref(shift))
-        if not interval.value > 0:
-            raise self._fault(f"clock {clock.name} has an interval of {interval.value:g} s", 0.0)
-        return clock.timed(interval.value, shift.value)
+        interval, _ = self._interval(clock)
+        shift = ctypes.c_double()
+        self._call("fmi3GetShiftDecimal", _one(clock.reference), 1, ctypes.byref(shift))
+        if not interval > 0:
+            raise self._fault(f"clock {clock.name} has an interval of {interval:g} s", 0.0)
+        return clock.timed(interval, shift.value)
 
-    def getter(self, outputs: Sequence[Scalar], values: Vector) -> Callable[[], None]:
-        """Reads `outputs`, sorted by type, into `values`."""
-        transfers = self._transfers("Get", outputs, values)
-        return lambda: self._carry_out(transfers, "gets", passing=True)
+    def _interval(self, clock: Clock) -> tuple[float, int]:
+        """The interval (s) that the FMU tells of a clock, and its qualifier."""
+        interval, qualifier = ctypes.c_double(), ctypes.c_int()
+        results = ctypes.byref(interval), ctypes.byref(qualifier)
+        self._call("fmi3GetIntervalDecimal", _one(clock.reference), 1, *results)
+        return interval.value, qualifier.value
 
     # --- the loop -------------------------------------------------------------------------
 
@@ -278,7 +279,7 @@ class InProcessWithEvents(InProcess3):
                     self.pending.values[i] += 1
                     now.add(output.reference)
         if now:
-            self._reading(frozenset(now)).into(self.pending.values)
+            self._read_those(frozenset(now))
 
     def _plan(self, time: float, active: Collection[int]) -> None:
         """Take what the FMU tells of the next instants of its aperiodic clocks: of one with a
@@ -289,27 +290,33 @@ class InProcessWithEvents(InProcess3):
                     self.pending.planned.pop(clock.reference, None)
                 if clock.kind == "changing" and clock.reference not in active:
                     continue
-                interval, qualifier = ctypes.c_double(), ctypes.c_int()
-                results = ctypes.byref(interval), ctypes.byref(qualifier)
-                self._call("fmi3GetIntervalDecimal", _one(clock.reference), 1, *results)
-                if qualifier.value == CHANGED:
-                    self.pending.planned[clock.reference] = time + interval.value
+                interval, qualifier = self._interval(clock)
+                if qualifier == CHANGED:
+                    self.pending.planned[clock.reference] = time + interval
 
-    def _reading(self, active: frozenset[int] | None) -> Reading:
-        """What reads the outputs of clocks that are active, or with None those without clocks."""
+    def _read_those(self, active: frozenset[int] | None) -> None:
+        """Read the outputs that have one of the clocks `active`, or with None those that have no
+        clock, into the vector of all outputs."""
         if active not in self._readings:
-            self._readings[active] = Reading(self, active)
-        return self._readings[active]
+            places = [
+                i
+                for i, s in enumerate(self.description.outputs)
+                if s.type != "Clock" and (not s.clocks if active is None else s.clocks & active)
+            ]
+            values, outputs = np.zeros(len(places)), [self.description.outputs[i] for i in places]
+            self._readings[active] = places, values, self._transfers("Get", outputs, values)
+        places, values, transfers = self._readings[active]
+        self._carry_out(transfers, "gets", passing=True)
+        self.pending.values[places] = values
 
     def read(self) -> None:
         if not self._clocks:
             super().read()
             return
-        values = self.pending.values
         if not self._initialized:  # where those with clocks may be read as well
-            self._reading(frozenset(c.reference for c in self._clocks)).into(values)
-        self._reading(None).into(values)
-        self.outputs[:] = values
+            self._read_those(frozenset(c.reference for c in self._clocks))
+        self._read_those(None)
+        self.outputs[:] = self.pending.values
 
     # --- states ---------------------------------------------------------------------------
 
@@ -321,26 +328,6 @@ class InProcessWithEvents(InProcess3):
         super().rollback(slot)
         self.pending = deepcopy(self._saved_pending[slot])
         self.restored += 1
-
-
-class Reading:
-    """Reads the outputs of an FMU that have one of the clocks `active`, or with None those that
-    have no clock."""
-
-    def __init__(self, instance: InProcessWithEvents, active: frozenset[int] | None) -> None:
-        outputs = instance.description.outputs
-        self._places = [
-            i
-            for i, s in enumerate(outputs)
-            if s.type != "Clock" and (not s.clocks if active is None else s.clocks & active)
-        ]
-        self._values = np.zeros(len(self._places))
-        self._read = instance.getter([outputs[i] for i in self._places], self._values)
-
-    def into(self, values: Vector) -> None:
-        """Read into the vector of all outputs."""
-        self._read()
-        values[self._places] = self._values
 
 
 class EventSetter:

@@ -59,7 +59,8 @@ class InProcess3(InProcess):
         """Arrays are set as a whole: entries that are not connected keep their start values. Raises
         FmuFault if such an entry has none, because its array was resized."""
         references = {s.reference for s in scalars}
-        whole = [s for s in self.description.scalars if s.reference in references]
+        about = self.description
+        whole = [s for s in (*about.scalars, *about.strings) if s.reference in references]
         whole.sort(key=lambda s: TYPES.index(s.type))
         place = {s.name: i for i, s in enumerate(whole)}
         into = np.array([place[s.name] for s in scalars], dtype=np.intp)
@@ -73,21 +74,10 @@ class InProcess3(InProcess):
         exact = {n: v for n, v in wide(self.starts).items() if n in unconnected} | dict(exact)
         return everything, into, self._transfers("Set", whole, everything, exact)
 
-    def _set_text(self, scalar: Scalar, text: str) -> None:
-        reference = (ctypes.c_uint * 1)(scalar.reference)
-        if scalar.type == "Binary":
-            content = bytes.fromhex(text)
-            sizes = (ctypes.c_size_t * 1)(len(content))
-            pointer = ctypes.POINTER(ctypes.c_uint8)
-            values = (pointer * 1)(ctypes.cast(ctypes.c_char_p(content), pointer))
-            self._call("fmi3SetBinary", reference, 1, sizes, values, 1)
-        else:
-            self._call("fmi3SetString", reference, 1, (ctypes.c_char_p * 1)(text.encode()), 1)
-
     def enter_initialization(self, stop_time: float) -> None:
-        if sizes := tuple(row for row in self.starts if row[0].structural):
+        if any(s.structural for s, _ in self.starts):
             self._call("fmi3EnterConfigurationMode")
-            self._set_numbers(sizes)
+            self._set_starts(structural=True)
             self._call("fmi3ExitConfigurationMode")
         self._set_starts()
         self._call("fmi3EnterInitializationMode", False, 0.0, 0.0, True, stop_time)

@@ -12,10 +12,10 @@ from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 
-from fmpy import extract, platform, platform_tuple
+from fmpy import extract
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.description import PLATFORMS, Description, describe
 
 MAX_UNPACKED = 32
 """Number of FMUs that are kept from one run to the next."""
@@ -103,7 +103,7 @@ def _extracted(path: Path, folder: str, own: bool) -> str:
 def _is_needed(entry: str) -> bool:
     """Whether a run needs an entry of an FMU of this project: no binary of another platform, which
     is a third of a Python FMU."""
-    here = f"binaries/{platform}/", f"binaries/{platform_tuple}/"
+    here = (f"binaries/{platform}/" for platform in PLATFORMS.values())
     return entry.startswith(("modelDescription.xml", "resources/", *here))
 
 

@@ -15,6 +15,8 @@ from threading import Event
 from time import monotonic_ns
 from typing import Any
 
+import zmq
+
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.worker_process import Died
 from hapticlink.orchestrator.network import key_file, messages
@@ -42,8 +44,6 @@ class Channel:
     """
 
     def __init__(self, address: str, key: key_file.Key, outputs: int) -> None:
-        import zmq
-
         self.address, self._outputs = address, outputs
         self._context, self._poller = zmq.Context(), zmq.Poller()
         self._lanes = [self._connected(key) for _ in range(LANES)]
@@ -63,8 +63,6 @@ class Channel:
         interrupt.add(self.give_up)
 
     def _connected(self, key: key_file.Key) -> Any:
-        import zmq
-
         lane = self._context.socket(zmq.DEALER)
         for option, value in (SECURE | ALIVE | LANE).items():
             setattr(lane, option, value)
@@ -83,8 +81,6 @@ class Channel:
 
     def _transmit(self) -> None:
         """Send the call, over the next lane where it was sent before."""
-        import zmq
-
         if self.attempts:
             self._lane = (self._lane + 1) % LANES
             self.repeated += 1
@@ -125,8 +121,6 @@ class Channel:
 
     def _arrived(self) -> Answer | None:
         """The answer that is awaited, if it has come; others are counted."""
-        import zmq
-
         for i, lane in enumerate(self._lanes):
             while True:
                 try:
@@ -152,8 +146,6 @@ class Channel:
 
     def _refused(self) -> bool:
         """Whether the server has refused each connection so far."""
-        import zmq
-
         while self.newest is None and self._monitor.poll(0):
             self._monitor.recv_multipart(zmq.NOBLOCK)
             self._refusals += 1

@@ -14,6 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import msgpack
+
 MOST = 1 << 20
 """Largest message (bytes)."""
 ARGUMENTS: Mapping[str, tuple[type, ...]] = {
@@ -122,15 +124,11 @@ def _is_fault(content: Any) -> bool:
 
 
 def _packed(content: Any) -> bytes:
-    import msgpack
-
     packed: bytes = msgpack.packb(content)
     return packed
 
 
 def _unpacked(message: bytes) -> Any:
-    import msgpack
-
     try:
         return msgpack.unpackb(message)
     except (ValueError, TypeError, msgpack.UnpackException) as error:

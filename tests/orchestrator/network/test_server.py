@@ -18,7 +18,6 @@ from hapticlink.orchestrator.network.server import Server
 from hapticlink.orchestrator.system.build_system import built
 from tests.orchestrator.foreign_fmus import python_fmu, scene
 
-pytest.importorskip("msgpack")
 ONE, TWO = bytes(16), bytes(15) + b"2"
 OUTPUTS = ["y", "steps"]
 
