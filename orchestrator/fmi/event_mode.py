@@ -18,11 +18,10 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -42,7 +41,6 @@ MOST = 1000
 one that never settles."""
 CHANGED = 2
 """The value of fmi3IntervalQualifier for a new interval."""
-_NONE: Mapping[str, int] = MappingProxyType({})
 
 
 @dataclass
@@ -118,22 +116,15 @@ class InProcessWithEvents(InProcess3):
         self.read()
         self._start_loop()
 
-    def connect(
-        self,
-        scalars: Sequence[Scalar],
-        places: Sequence[int],
-        exact: Mapping[str, int] = _NONE,
-    ) -> Any:
-        if not (self.has_events and self._initialized):
-            of = [i for i, s in enumerate(scalars) if s.type != "Clock"]
-            return self.setter([scalars[i] for i in of], [places[i] for i in of], exact)
-        return EventSetter(self, scalars, places)
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Any:
+        if self.has_events and self._initialized:
+            return EventSetter(self, scalars, places)
+        of = [i for i, s in enumerate(scalars) if s.type != "Clock"]
+        return self.setter([scalars[i] for i in of], [places[i] for i in of])
 
-    def setter(
-        self, scalars: Sequence[Scalar], places: Sequence[int], exact: Any = _NONE
-    ) -> Setter:
+    def setter(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Setter:
         """One that sets them in the mode in which it is called."""
-        return super().connect(scalars, places, exact)
+        return super().connect(scalars, places)
 
     def _told(self, clock: Clock) -> Clock:
         """A periodic clock with the interval that the FMU tells in initialisation mode."""

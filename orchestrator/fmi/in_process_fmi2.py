@@ -12,9 +12,8 @@ import ctypes
 import logging
 import sys
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,6 @@ from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.load_library import loaded
 from hapticlink.orchestrator.fmi.retry import Retry, Saved
 from hapticlink.orchestrator.fmi.setter import Setter, Setting, Varying
-from hapticlink.orchestrator.fmi.start_values import wide
 from hapticlink.orchestrator.fmi.status import (
     DISCARD,
     ERROR,
@@ -156,16 +154,10 @@ class InProcess(Instance):
 
     # --- initialisation -------------------------------------------------------------------
 
-    def connect(
-        self,
-        scalars: Sequence[Scalar],
-        places: Sequence[int],
-        exact: Mapping[str, int] = MappingProxyType({}),
-    ) -> Setter:
-        """exact: integers, by name, to be set instead of the values."""
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Setter:
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
         where, conversions = [places[i] for i in order], [scalars[i].conversion for i in order]
-        setting = self._setting([scalars[i] for i in order], exact)
+        setting = self._setting([scalars[i] for i in order])
         self._setters += self.description.block is not None
         set_all = partial(self._carry_out, counted="sets")
         return Setter(where, conversions, setting, set_all, self.place, self._setters)
@@ -199,17 +191,19 @@ class InProcess(Instance):
 
         return set_from
 
-    def _setting(self, scalars: Sequence[Scalar], exact: Mapping[str, int]) -> Setting:
-        """`whole`, `into` and `transfers` of a Setter of `scalars`."""
-        values = np.zeros(len(scalars))
-        return values, None, self._transfers("Set", scalars, values, exact)
+    def _setting(self, scalars: Sequence[Scalar], start: bool = False) -> Setting:
+        """`whole`, `into` and `transfers` of a Setter of `scalars`, sorted by type; start: with
+        their start values, which no signal replaces."""
+        known = {s.name: as_signal(s, value) for s, value in self.starts if start}
+        values = np.array([known.get(s.name, 0.0) for s in scalars])
+        return values, None, self._transfers("Set", scalars, values)
 
     def _set_starts(self, *, structural: bool = False) -> None:
         """Set the start values, of structural parameters or of all others."""
-        starts = tuple(row for row in self.starts if row[0].structural == structural)
-        if starts:
-            set_from = self.connect([s for s, _ in starts], range(len(starts)), wide(starts))
-            set_from(np.array([as_signal(s, value) for s, value in starts]))
+        started = [s for s, _ in self.starts if s.structural == structural]
+        started.sort(key=lambda s: TYPES.index(s.type))
+        *_, transfers = self._setting(started, start=True)
+        self._carry_out(transfers, "sets")
 
     def enter_initialization(self, stop_time: float) -> None:
         self._call("fmi2SetupExperiment", False, 0.0, 0.0, True, stop_time)

@@ -16,11 +16,13 @@ import atexit
 import ctypes
 import hashlib
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, wraps
+from inspect import getattr_static, isfunction
 from pathlib import Path
 from traceback import extract_tb
 from typing import Any
@@ -35,8 +37,11 @@ _kept: dict[int, ctypes.CDLL] = {}
 """By handle: a reference of our own, so that FMPy's unloading leaves the library in its place."""
 
 
-CALLED = ("do_step", "setup_experiment", "enter_", "exit_", "get_", "set_", "terminate")
-"""What the names of the methods begin with that a library calls."""
+CALLED = re.compile(
+    r"do_step|terminate|setup_experiment|(enter|exit)_\w+_mode"
+    r"|([gs]et)_(real|integer|boolean|string|float\d+|u?int\d+)"
+)
+"""The methods of a slave that a library calls."""
 
 
 def is_python(loaded: ctypes.CDLL) -> bool:
@@ -67,18 +72,19 @@ def tell_exceptions(module: str, tell: Callable[[bytes], object]) -> None:
     """Have the newest instance of a Python FMU `tell` the file and line of an exception, of which
     its library logs the text alone. Its module has been executed for this instance, so that the
     classes in it are of this instance, too."""
-    for kind in [*vars(sys.modules.get(module, object)).values()]:
+    scope = vars(sys.modules[module]) if module in sys.modules else {}
+    for kind in [*scope.values()]:
         own = isinstance(kind, type) and kind.__module__ == module and not kind.__subclasses__()
-        for name in dir(kind) if own and hasattr(kind, "do_step") else ():
-            if name.startswith(CALLED):
-                setattr(kind, name, _telling(getattr(kind, name), tell))
+        for name in filter(CALLED.fullmatch, dir(kind) if own else ()):
+            if isfunction(method := getattr_static(kind, name)):
+                setattr(kind, name, _telling(method, tell))
 
 
 def _telling(method: Callable[..., Any], tell: Callable[[bytes], object]) -> Callable[..., Any]:
     @wraps(method)
-    def telling(*arguments: Any) -> Any:
+    def telling(*arguments: Any, **named: Any) -> Any:
         try:
-            return method(*arguments)
+            return method(*arguments, **named)
         except Exception as error:
             last = extract_tb(error.__traceback__)[-1]
             where = f"{Path(last.filename).name}, line {last.lineno}, in {last.name}: {last.line}"

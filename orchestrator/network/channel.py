@@ -54,7 +54,7 @@ class Channel:
         self._refusals = 0
         self._session, self._number = secrets.token_bytes(16), -1
         self._timer = Timer()
-        self._given_up = Event()
+        self.given_up = Event()
         self.clock = ClockFilter()
         self.round_trips = array("q")
         self.newest: tuple[Answer, int] | None = None
@@ -104,7 +104,7 @@ class Channel:
         deadline = begun + round(1e9 * allowed)
         while (answer := self._arrived()) is None:
             now = monotonic_ns()
-            if self._given_up.is_set() or (self.interruptible and interrupt.came()):
+            if self.given_up.is_set() or (self.interruptible and interrupt.came()):
                 raise Died("was given up")
             if now > deadline:
                 raise Died(f"has not answered within {allowed:g} s{self._hint()}")
@@ -156,13 +156,9 @@ class Channel:
             return ""
         return ": is `hapticlink serve` running there, with the same key, and the port open?"
 
-    @property
-    def given_up(self) -> bool:
-        return self._given_up.is_set()
-
     def give_up(self) -> None:
         """Let `answer` return at once; from any thread."""
-        self._given_up.set()
+        self.given_up.set()
 
     def end(self) -> None:
         """Close the connections."""

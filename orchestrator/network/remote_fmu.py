@@ -88,7 +88,7 @@ class Remote(Isolated):
         """A server that is not there any more keeps nothing back: that is no fault here."""
         channel = self._channel
         try:
-            if self._process is None or channel is None or channel.given_up:
+            if self._process is None or channel is None or channel.given_up.is_set():
                 return None
             if channel.busy:
                 channel.answer(CLOSING)
