@@ -28,6 +28,7 @@ WATCH = 50_000_000
 """ns between two looks at whether the run has given up."""
 FIRST, LEAST, LONGEST = 250_000_000, 10_000_000, 250_000_000
 """ns until a call is sent again: the first time, at least, and at most."""
+UNHEARD = "is `hapticlink serve` running there, with the same key, and the port open?"
 REFUSALS = 3
 """Connections without an answer that were closed by the server, as it does with a wrong key."""
 SECURE = {"linger": 0, "maxmsgsize": messages.MOST, "ipv6": 1}
@@ -107,7 +108,8 @@ class Channel:
             if self.given_up.is_set() or (self.interruptible and interrupt.came()):
                 raise Died("was given up")
             if now > deadline:
-                raise Died(f"has not answered within {allowed:g} s{self._hint()}")
+                hint = "" if self.newest else f": {UNHEARD}"
+                raise Died(f"has not answered within {allowed:g} s{hint}")
             if self._refused():
                 raise Died("closes each connection: its key is another one")
             if now >= self._due:
@@ -150,11 +152,6 @@ class Channel:
             self._monitor.recv_multipart(zmq.NOBLOCK)
             self._refusals += 1
         return self._refusals >= REFUSALS
-
-    def _hint(self) -> str:
-        if self.newest is not None:
-            return ""
-        return ": is `hapticlink serve` running there, with the same key, and the port open?"
 
     def give_up(self) -> None:
         """Let `answer` return at once; from any thread."""
