@@ -40,12 +40,13 @@ def serve(
     """
     import hapticlink as hl
     from hapticlink.orchestrator.network import served_part
-    from hapticlink.orchestrator.network.server import Server
     from hapticlink.orchestrator.system.build_system import built
 
     served_part.require_address(listen)
     if key_file.create(key):
         say(f"{key}: a new key, which the other computer needs: copy it by a safe way")
+    from hapticlink.orchestrator.network.server import Server  # which needs an extra's libraries
+
     secret, read = key_file.read(key), hl.scene(scene, changes.options)
     with built(read) as system:
         names = served_part.fmus_of(system, part)

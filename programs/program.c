@@ -96,8 +96,8 @@ static const Member members[] = {MEMBERS(ROW)};
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP_MODE = 4, ENDED = 8, FAILURE = 16, TERMINATED = 32 };
 enum { SWEEPS = 50 };
 static const double TOLERANCE = 1e-12; /* of start values: run/initialize.py */
-static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/output_bounds.py */
-static const double SHARE = 1e-6;      /* of a step that is whole: fmi/termination.py */
+static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/instance.py */
+static const double SHARE = 1e-6;      /* of a step that is whole: fmi/status.py */
 static const double NEAR = 1e-3;       /* of a tick, by which a time may be before it */
 
 enum { MOST_POINTS = 64, OWN_RATE = -1 }; /* of the window of a clock whose rate was changed; back to the scene's */

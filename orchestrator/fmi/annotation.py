@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import Any, get_args
 from xml.etree.ElementTree import Element
 
 from hapticlink.components.ports import Kind, Power, Spring
@@ -30,9 +30,6 @@ from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.kind_check import misfit
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import Scalar
-
-if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
-    from hapticlink.components.component import Timing
 
 TIMINGS = ("continuous", "sampled")
 SPRING_ENDS = {
@@ -43,17 +40,6 @@ SPRING_ENDS = {
     "force": ("output",),
 }
 """The ports of a spring-damper, and what they may be."""
-
-
-class Annotation(NamedTuple):
-    """What an FMU declares, as in `Description`."""
-
-    kinds: Mapping[str, Kind]
-    power: Mapping[str, Power]
-    timing: Timing = "continuous"
-    declares_timing: bool = False
-    springs: tuple[Spring, ...] = ()
-    states: tuple[str, ...] | None = None
 
 
 def block(tree: Element) -> Element | None:
@@ -75,12 +61,12 @@ def with_units(tree: Element, scalars: Sequence[Scalar]) -> tuple[Scalar, ...]:
     return tuple(replace(s, unit=units[s.port][s.entry]) if s.port in units else s for s in scalars)
 
 
-def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> Annotation:
-    """The annotation of an FMU, empty if it has none. Raises ValueError if it is malformed, or does
-    not fit the variables and their units."""
+def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> dict[str, Any]:
+    """What the annotation of an FMU says, as fields of `Description`. Raises ValueError if it is
+    malformed, or does not fit the variables and their units."""
     if (declared := block(tree)) is None:
-        return Annotation({}, {})
-    timing: Any = declared.get("timing")
+        return {"timing": "continuous"}
+    timing = declared.get("timing")
     if timing is not None:
         _one_of(timing, "timing", TIMINGS)
     ports = _Ports(scalars, units)
@@ -101,7 +87,8 @@ def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) ->
             kinds[name] = ports.kind(element)
         else:
             power[name] = ports.power(element)
-    return Annotation(kinds, power, timing or "continuous", bool(timing), tuple(springs), states)
+    found = {"kinds": kinds, "power": power, "springs": tuple(springs), "states": states}
+    return {"timing": timing or "continuous", "declares_timing": bool(timing), **found}
 
 
 class _Ports:

@@ -15,7 +15,6 @@ from xml.etree import ElementTree
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
-from hapticlink.components.base_units import BASES
 from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import annotation, clocks
@@ -35,6 +34,9 @@ from hapticlink.orchestrator.fmi.variables import (
 
 if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
     from hapticlink.components.component import Timing
+
+PLATFORMS = {"2": platform, "3": platform_tuple}
+"""The folder of this platform in binaries/, by FMI version."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         clocks=ticking,
         block=None if annotation.block(tree) is None else model.modelName,
         **variables,
-        **declared._asdict(),
+        **declared,
     )
 
 
@@ -207,7 +209,7 @@ def _variables(
     return {
         "scalars": scalars,
         "strings": strings,
-        "units": {u.name: _unit(u) for u in model.unitDefinitions},
+        "units": {u.name: u for u in map(Unit.read, tree.iterfind("UnitDefinitions/Unit"))},
         "derivatives": derivatives(model),
         "dependencies": dependencies,
     }
@@ -221,21 +223,13 @@ def _only_xml(text: bytes) -> BytesIO:
     return file
 
 
-def _unit(unit: Any) -> Unit:
-    base = unit.baseUnit
-    if base is None:
-        return Unit(unit.name)
-    powers = tuple(int(getattr(base, b)) for b in BASES)
-    return Unit(unit.name, powers, float(base.factor), float(base.offset))
-
-
 def _require_binary(archive: zipfile.ZipFile, identifier: str, fmi: str) -> None:
     if not identifier or Path(identifier).name != identifier or "\\" in identifier:
         raise InputFault(
             f"{archive.filename}: its modelIdentifier {identifier!r} is no name of a library; "
             "FMI has it be an identifier of C"
         )
-    here = platform if fmi == "2" else platform_tuple
+    here = PLATFORMS[fmi]
     wanted = f"binaries/{here}/{identifier}{sharedLibraryExtension}"
     if wanted in archive.NameToInfo:
         return

@@ -18,11 +18,10 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -33,8 +32,8 @@ from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, Clock
 from hapticlink.orchestrator.fmi.in_process_fmi3 import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
-from hapticlink.orchestrator.fmi.status import DISCARD, succeeded
-from hapticlink.orchestrator.fmi.termination import SHARE
+from hapticlink.orchestrator.fmi.status import DISCARD, SHARE, succeeded
+from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 MOST = 1000
@@ -42,7 +41,6 @@ MOST = 1000
 one that never settles."""
 CHANGED = 2
 """The value of fmi3IntervalQualifier for a new interval."""
-_NONE: Mapping[str, int] = MappingProxyType({})
 
 
 @dataclass
@@ -71,7 +69,7 @@ class InProcessWithEvents(InProcess3):
         self.inputs: EventSetter | None = None
         """The newest that was called."""
         self._clocks = self.description.clocks
-        self._readings: dict[frozenset[int] | None, Reading] = {}
+        self._readings: dict[frozenset[int] | None, tuple[list[int], Vector, list[Transfer]]] = {}
         self._saved_pending: dict[int, Pending] = {}
 
     @property
@@ -118,39 +116,33 @@ class InProcessWithEvents(InProcess3):
         self.read()
         self._start_loop()
 
-    def connect(
-        self,
-        scalars: Sequence[Scalar],
-        places: Sequence[int],
-        exact: Mapping[str, int] = _NONE,
-    ) -> Any:
-        if not (self.has_events and self._initialized):
-            of = [i for i, s in enumerate(scalars) if s.type != "Clock"]
-            return self.setter([scalars[i] for i in of], [places[i] for i in of], exact)
-        return EventSetter(self, scalars, places)
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Any:
+        if self.has_events and self._initialized:
+            return EventSetter(self, scalars, places)
+        of = [i for i, s in enumerate(scalars) if s.type != "Clock"]
+        return self.setter([scalars[i] for i in of], [places[i] for i in of])
 
-    def setter(
-        self, scalars: Sequence[Scalar], places: Sequence[int], exact: Any = _NONE
-    ) -> Setter:
+    def setter(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Setter:
         """One that sets them in the mode in which it is called."""
-        return super().connect(scalars, places, exact)
+        return super().connect(scalars, places)
 
     def _told(self, clock: Clock) -> Clock:
         """A periodic clock with the interval that the FMU tells in initialisation mode."""
         if clock.kind not in PERIODIC or clock.interval is not None:
             return clock
-        interval, shift, reference = ctypes.c_double(), ctypes.c_double(), _one(clock.reference)
-        qualifier = ctypes.byref(ctypes.c_int())
-        self._call("fmi3GetIntervalDecimal", reference, 1, ctypes.byref(interval), qualifier)
-        self._call("fmi3GetShiftDecimal", reference, 1, ctypes.byref(shift))
-        if not interval.value > 0:
-            raise self._fault(f"clock {clock.name} has an interval of {interval.value:g} s", 0.0)
-        return clock.timed(interval.value, shift.value)
+        interval, _ = self._interval(clock)
+        shift = ctypes.c_double()
+        self._call("fmi3GetShiftDecimal", _one(clock.reference), 1, ctypes.byref(shift))
+        if not interval > 0:
+            raise self._fault(f"clock {clock.name} has an interval of {interval:g} s", 0.0)
+        return clock.timed(interval, shift.value)
 
-    def getter(self, outputs: Sequence[Scalar], values: Vector) -> Callable[[], None]:
-        """Reads `outputs`, sorted by type, into `values`."""
-        transfers = self._transfers("Get", outputs, values)
-        return lambda: self._carry_out(transfers, "gets", passing=True)
+    def _interval(self, clock: Clock) -> tuple[float, int]:
+        """The interval (s) that the FMU tells of a clock, and its qualifier."""
+        interval, qualifier = ctypes.c_double(), ctypes.c_int()
+        results = ctypes.byref(interval), ctypes.byref(qualifier)
+        self._call("fmi3GetIntervalDecimal", _one(clock.reference), 1, *results)
+        return interval.value, qualifier.value
 
     # --- the loop -------------------------------------------------------------------------
 
@@ -278,7 +270,7 @@ class InProcessWithEvents(InProcess3):
                     self.pending.values[i] += 1
                     now.add(output.reference)
         if now:
-            self._reading(frozenset(now)).into(self.pending.values)
+            self._read_those(frozenset(now))
 
     def _plan(self, time: float, active: Collection[int]) -> None:
         """Take what the FMU tells of the next instants of its aperiodic clocks: of one with a
@@ -289,27 +281,33 @@ class InProcessWithEvents(InProcess3):
                     self.pending.planned.pop(clock.reference, None)
                 if clock.kind == "changing" and clock.reference not in active:
                     continue
-                interval, qualifier = ctypes.c_double(), ctypes.c_int()
-                results = ctypes.byref(interval), ctypes.byref(qualifier)
-                self._call("fmi3GetIntervalDecimal", _one(clock.reference), 1, *results)
-                if qualifier.value == CHANGED:
-                    self.pending.planned[clock.reference] = time + interval.value
+                interval, qualifier = self._interval(clock)
+                if qualifier == CHANGED:
+                    self.pending.planned[clock.reference] = time + interval
 
-    def _reading(self, active: frozenset[int] | None) -> Reading:
-        """What reads the outputs of clocks that are active, or with None those without clocks."""
+    def _read_those(self, active: frozenset[int] | None) -> None:
+        """Read the outputs that have one of the clocks `active`, or with None those that have no
+        clock, into the vector of all outputs."""
         if active not in self._readings:
-            self._readings[active] = Reading(self, active)
-        return self._readings[active]
+            places = [
+                i
+                for i, s in enumerate(self.description.outputs)
+                if s.type != "Clock" and (not s.clocks if active is None else s.clocks & active)
+            ]
+            values, outputs = np.zeros(len(places)), [self.description.outputs[i] for i in places]
+            self._readings[active] = places, values, self._transfers("Get", outputs, values)
+        places, values, transfers = self._readings[active]
+        self._carry_out(transfers, "gets", passing=True)
+        self.pending.values[places] = values
 
     def read(self) -> None:
         if not self._clocks:
             super().read()
             return
-        values = self.pending.values
         if not self._initialized:  # where those with clocks may be read as well
-            self._reading(frozenset(c.reference for c in self._clocks)).into(values)
-        self._reading(None).into(values)
-        self.outputs[:] = values
+            self._read_those(frozenset(c.reference for c in self._clocks))
+        self._read_those(None)
+        self.outputs[:] = self.pending.values
 
     # --- states ---------------------------------------------------------------------------
 
@@ -321,26 +319,6 @@ class InProcessWithEvents(InProcess3):
         super().rollback(slot)
         self.pending = deepcopy(self._saved_pending[slot])
         self.restored += 1
-
-
-class Reading:
-    """Reads the outputs of an FMU that have one of the clocks `active`, or with None those that
-    have no clock."""
-
-    def __init__(self, instance: InProcessWithEvents, active: frozenset[int] | None) -> None:
-        outputs = instance.description.outputs
-        self._places = [
-            i
-            for i, s in enumerate(outputs)
-            if s.type != "Clock" and (not s.clocks if active is None else s.clocks & active)
-        ]
-        self._values = np.zeros(len(self._places))
-        self._read = instance.getter([outputs[i] for i in self._places], self._values)
-
-    def into(self, values: Vector) -> None:
-        """Read into the vector of all outputs."""
-        self._read()
-        values[self._places] = self._values
 
 
 class EventSetter:

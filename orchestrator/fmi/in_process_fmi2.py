@@ -12,47 +12,49 @@ import ctypes
 import logging
 import sys
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from fmpy import fmi2
 
 from hapticlink.orchestrator.base import current_directory
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries, rounding_mode
 from hapticlink.orchestrator.fmi.capabilities import restores_state
-from hapticlink.orchestrator.fmi.directional_derivatives import Matrix, derivatives
-from hapticlink.orchestrator.fmi.input_derivatives import Varying
-from hapticlink.orchestrator.fmi.instance import Vector
+from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
+from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.load_library import loaded
-from hapticlink.orchestrator.fmi.retry import Retry
-from hapticlink.orchestrator.fmi.setter import Setter, Setting
-from hapticlink.orchestrator.fmi.start_values import Starts, wide
-from hapticlink.orchestrator.fmi.states import WithStates
+from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.setter import Setter, Setting, Varying
 from hapticlink.orchestrator.fmi.status import (
     DISCARD,
     ERROR,
     FATAL,
+    SHARE,
     STATUS,
+    ended_in_discard,
     succeeded,
     worse,
 )
-from hapticlink.orchestrator.fmi.termination import SHARE, ended_in_discard
-from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, transfers
+from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, as_signal, transfers
 from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 
 
-class InProcess(WithStates):
-    """An FMU of FMI 2.0 whose library is loaded into this process. `slave`, `gets`, `fewer` and
-    `retry` are for the compiled loop."""
+class InProcess(Instance):
+    """An FMU of FMI 2.0 whose library is loaded into this process. `slave` (of FMPy, None where it
+    is not loaded), `gets`, `fewer` and `retry` are for the compiled loop."""
 
     _library: Callable[..., Any] = fmi2.FMU2Slave
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
+        self.slave: Any = None
+        self._status = 0
+        self._saved: dict[int, Saved] = {}
+        self._saved_time: dict[int, float] = {}
         self.retry: Retry | None = None
         self._initialized = False
         self._setters = 0
@@ -101,8 +103,11 @@ class InProcess(WithStates):
         slave = loaded(
             self._library, about.fmi, about.guid, about.identifier, self._folder, self.name
         )
-        self.holds_python = python_libraries.prepare(slave.dll, self._folder)
+        module = python_libraries.prepare(slave.dll, self._folder)
+        self.holds_python = bool(module)
         slave.instantiate(loggingOn=True, **self._logging())
+        if module and about.block is None:
+            python_libraries.tell_exceptions(module, partial(messages.keep, self._key, ERROR))
         return slave
 
     def _logging(self) -> dict[str, Any]:
@@ -149,16 +154,10 @@ class InProcess(WithStates):
 
     # --- initialisation -------------------------------------------------------------------
 
-    def connect(
-        self,
-        scalars: Sequence[Scalar],
-        places: Sequence[int],
-        exact: Mapping[str, int] = MappingProxyType({}),
-    ) -> Setter:
-        """exact: integers, by name, to be set instead of the values."""
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Setter:
         order = sorted(range(len(scalars)), key=lambda i: TYPES.index(scalars[i].type))
         where, conversions = [places[i] for i in order], [scalars[i].conversion for i in order]
-        setting = self._setting([scalars[i] for i in order], exact)
+        setting = self._setting([scalars[i] for i in order])
         self._setters += self.description.block is not None
         set_all = partial(self._carry_out, counted="sets")
         return Setter(where, conversions, setting, set_all, self.place, self._setters)
@@ -192,27 +191,19 @@ class InProcess(WithStates):
 
         return set_from
 
-    def _setting(self, scalars: Sequence[Scalar], exact: Mapping[str, int]) -> Setting:
-        """`whole`, `into` and `transfers` of a Setter of `scalars`."""
-        values = np.zeros(len(scalars))
-        return values, None, self._transfers("Set", scalars, values, exact)
+    def _setting(self, scalars: Sequence[Scalar], start: bool = False) -> Setting:
+        """`whole`, `into` and `transfers` of a Setter of `scalars`, sorted by type; start: with
+        their start values, which no signal replaces."""
+        known = {s.name: as_signal(s, value) for s, value in self.starts if start}
+        values = np.array([known.get(s.name, 0.0) for s in scalars])
+        return values, None, self._transfers("Set", scalars, values)
 
-    def _set_starts(self) -> None:
-        self._set_numbers(tuple(row for row in self.starts if not row[0].structural))
-        for scalar, text in self.starts:
-            if isinstance(text, str):
-                self._set_text(scalar, text)
-
-    def _set_numbers(self, starts: Starts) -> None:
-        numbers = [(s, v) for s, v in starts if not isinstance(v, str)]
-        if numbers:
-            places = range(len(numbers))
-            set_from = self.connect([s for s, _ in numbers], places, wide(starts))
-            set_from(np.array([float(v) for _, v in numbers]))
-
-    def _set_text(self, scalar: Scalar, text: str) -> None:
-        one = (ctypes.c_uint * 1)(scalar.reference), 1, (ctypes.c_char_p * 1)(text.encode())
-        self._call("fmi2SetString", *one)
+    def _set_starts(self, *, structural: bool = False) -> None:
+        """Set the start values, of structural parameters or of all others."""
+        started = [s for s, _ in self.starts if s.structural == structural]
+        started.sort(key=lambda s: TYPES.index(s.type))
+        *_, transfers = self._setting(started, start=True)
+        self._carry_out(transfers, "sets")
 
     def enter_initialization(self, stop_time: float) -> None:
         self._call("fmi2SetupExperiment", False, 0.0, 0.0, True, stop_time)
@@ -283,6 +274,49 @@ class InProcess(WithStates):
     def finish(self) -> None:
         """Nothing to wait for: `step` returns after doStep."""
 
+    # --- FMU states: in slots, and as bytes ---------------------------------------------------
+
+    def save(self, slot: int = 0) -> None:
+        if not succeeded(status := self.slot(slot).save()):
+            raise self.failed(f"fmi{self.description.fmi}GetFMUstate", status)
+        self._saved_time[slot] = self.time
+
+    def slot(self, slot: int) -> Saved:
+        """The storage of a slot, which may not have been saved to."""
+        if slot not in self._saved:
+            self._saved[slot] = Saved(self.slave, self.description.fmi, self.place)
+        return self._saved[slot]
+
+    def rollback(self, slot: int = 0) -> None:
+        if not succeeded(status := self._saved[slot].restore()):
+            raise self.failed(f"fmi{self.description.fmi}SetFMUstate", status)
+        self.place.time, self.place.ended = self._saved_time[slot], 0
+        self._status = 0
+
+    def serialized(self) -> bytes:
+        state = self._state("Get", "getFMUState")
+        try:
+            content: bytes = self._state("Serialize", "serializeFMUState", state)
+            return content
+        finally:
+            self.slave.freeFMUState(state)
+
+    def deserialize(self, state: bytes) -> None:
+        restored = self._state("DeSerialize", "deserializeFMUState", state)
+        try:
+            self._state("Set", "setFMUState", restored)
+            self.place.setter = 0
+        finally:
+            self.slave.freeFMUState(restored)
+
+    def _state(self, verb: str, method: str, *arguments: Any) -> Any:
+        """The result of FMPy's `method`, which raises an exception for a status of error."""
+        try:
+            return getattr(self.slave, method)(*arguments)
+        except Exception as error:
+            call = f"fmi{self.description.fmi}{verb}FMUstate"
+            raise self.failed(call, getattr(error, "status", ERROR)) from error
+
     # --- ends -----------------------------------------------------------------------------
 
     def failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
@@ -319,7 +353,8 @@ class InProcess(WithStates):
             if slave is not None and self._status < FATAL:
                 if self.retry is not None:
                     self.retry.free()
-                self.free_states()
+                for saved in self._saved.values():
+                    saved.free()
                 if self._status < ERROR and self._initialized:
                     terminate = f"fmi{self.description.fmi}Terminate"
                     status = slave.dll[terminate](ctypes.c_void_p(slave.component))

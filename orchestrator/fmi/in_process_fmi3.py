@@ -6,7 +6,7 @@ Intermediate update is not used: inputs are constant over each step (FMI 3.0 sec
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.setter import Setting
 from hapticlink.orchestrator.fmi.start_values import wide
 from hapticlink.orchestrator.fmi.status import succeeded
+from hapticlink.orchestrator.fmi.transfer import as_signal
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 
@@ -55,39 +56,29 @@ class InProcess3(InProcess):
                 raise self._fault(what, time)
         return status
 
-    def _setting(self, scalars: Sequence[Scalar], exact: Mapping[str, int]) -> Setting:
+    def _setting(self, scalars: Sequence[Scalar], start: bool = False) -> Setting:
         """Arrays are set as a whole: entries that are not connected keep their start values. Raises
         FmuFault if such an entry has none, because its array was resized."""
         references = {s.reference for s in scalars}
-        whole = [s for s in self.description.scalars if s.reference in references]
+        about = self.description
+        whole = [s for s in (*about.scalars, *about.strings) if s.reference in references]
         whole.sort(key=lambda s: TYPES.index(s.type))
         place = {s.name: i for i, s in enumerate(whole)}
         into = np.array([place[s.name] for s in scalars], dtype=np.intp)
-        known = {s.name: float(v) for s, v in self.starts if not isinstance(v, str)}
+        known = {s.name: as_signal(s, value) for s, value in self.starts}
         everything = np.array([known.get(s.name, s.start) for s in whole])
-        unconnected = set(place) - {s.name for s in scalars}
-        for name in unconnected:
+        unconnected = set(place) if start else set(place) - {s.name for s in scalars}
+        for name in unconnected - known.keys():
             if np.isnan(everything[place[name]]):
                 what = f"{name} has no start value in an array of this size; give start.{name}"
                 raise self._fault(what, 0.0)
-        exact = {n: v for n, v in wide(self.starts).items() if n in unconnected} | dict(exact)
+        exact = {n: v for n, v in wide(self.starts).items() if n in unconnected}
         return everything, into, self._transfers("Set", whole, everything, exact)
 
-    def _set_text(self, scalar: Scalar, text: str) -> None:
-        reference = (ctypes.c_uint * 1)(scalar.reference)
-        if scalar.type == "Binary":
-            content = bytes.fromhex(text)
-            sizes = (ctypes.c_size_t * 1)(len(content))
-            pointer = ctypes.POINTER(ctypes.c_uint8)
-            values = (pointer * 1)(ctypes.cast(ctypes.c_char_p(content), pointer))
-            self._call("fmi3SetBinary", reference, 1, sizes, values, 1)
-        else:
-            self._call("fmi3SetString", reference, 1, (ctypes.c_char_p * 1)(text.encode()), 1)
-
     def enter_initialization(self, stop_time: float) -> None:
-        if sizes := tuple(row for row in self.starts if row[0].structural):
+        if any(s.structural for s, _ in self.starts):
             self._call("fmi3EnterConfigurationMode")
-            self._set_numbers(sizes)
+            self._set_starts(structural=True)
             self._call("fmi3ExitConfigurationMode")
         self._set_starts()
         self._call("fmi3EnterInitializationMode", False, 0.0, 0.0, True, stop_time)

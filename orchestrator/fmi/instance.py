@@ -15,12 +15,72 @@ from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import Diverged, Fault, FmuFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.instance_progress import Place
-from hapticlink.orchestrator.fmi.output_bounds import Bounds
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:  # a worker process need not load what reads scenes
     from hapticlink.orchestrator.fmi.start_values import Starts
+
+GROWTH = 1e12
+"""Times the larger of its start and its nominal, for an output that states no bound."""
+_CALLS = ("get", "rollback", "save", "set", "step")
+
+
+class Place(ctypes.Structure):
+    """Where an instance stands, in memory that the compiled loop shares.
+
+    time: where the instance stands. begin, size, end: of its newest step. step_time: spent in
+    doStep. All in s. ended: whether it has requested the end of the simulation. waiting: from
+    when on there are settings that it is to take before a step, infinity where there are none.
+    setter: the key of the Setter whose values its inputs have, 0 where that is not known. altered:
+    the number of its calls that changed how this process rounds numbers. The others count the calls
+    of its functions in the loop."""
+
+    _fields_ = (
+        *((n, ctypes.c_double) for n in ("time", "begin", "size", "end", "step_time", "waiting")),
+        *((name, ctypes.c_int64) for name in ("ended", "setter", "altered")),
+        *((name, ctypes.c_int64) for name in ("gets", "sets", "steps", "saves", "rollbacks")),
+    )
+
+    def __init__(self) -> None:
+        super().__init__(waiting=math.inf)
+
+    def calls(self) -> dict[str, int]:
+        """The number of calls of the loop by kind, without those that were not made."""
+        counts = {name: getattr(self, name + "s") for name in _CALLS}
+        return {name: count for name, count in counts.items() if count}
+
+    def start(self) -> None:
+        """Count from here."""
+        for name in _CALLS:
+            setattr(self, name + "s", 0)
+
+
+class Bounds:
+    """Bounds on the magnitude of `outputs`, a view that is read at each check: a run that exceeds
+    one has diverged, though its numbers are still finite. Before `start` an output only has to be
+    finite."""
+
+    def __init__(self, description: Description, outputs: Vector) -> None:
+        self._scalars, self._outputs = description.outputs, outputs
+        self.inverse, self._shares = np.zeros(len(outputs)), np.zeros(len(outputs))
+
+    def start(self) -> None:
+        """Sets the bounds from the start values. Integers have the bounds of their types; a Real
+        without a unit is no known physical quantity and has none."""
+        nominal = np.array([s.nominal for s in self._scalars])
+        bounds = GROWTH * np.maximum(np.abs(self._outputs), nominal)
+        for i, scalar in enumerate(self._scalars):
+            if scalar.bound:
+                bounds[i] = scalar.bound
+            elif scalar.unit is None or scalar.type not in ("Real", "Float64", "Float32"):
+                bounds[i] = np.inf
+        self.inverse[:] = 1.0 / bounds
+
+    def hold(self) -> bool:
+        """Whether all outputs are certainly finite and within their bounds: one pass over the
+        vector, since this is asked at every read."""
+        np.multiply(self._outputs, self.inverse, out=self._shares)
+        return bool(self._shares.dot(self._shares) <= 1.0)  # not where one is NaN or infinite
 
 
 class Instance(ABC):
@@ -209,11 +269,13 @@ class Instance(ABC):
             lost = ~np.isfinite(self.outputs)
             self.outputs[lost] = self.good[lost]
             self.held += int(lost.sum())
-        if beyond := self.bounds.first_beyond():
-            scalar, value, bound = beyond
-            what = f"output {scalar.name} is {value:.3g}, beyond {bound:.3g}: the run has diverged"
+        shares = np.abs(self.outputs) * self.bounds.inverse
+        if (shares > 1.0).any():
+            first = int(np.argmax(shares > 1.0))
+            name, bound = self.description.outputs[first].name, 1.0 / self.bounds.inverse[first]
+            beyond = f"output {name} is {self.outputs[first]:.3g}, beyond {bound:.3g}"
             remedy = "take a higher rate, a finer integrator, or weaker gains"
-            message = f"{what} ({remedy})"
+            message = f"{beyond}: the run has diverged ({remedy})"
             raise Diverged(self.name, message, self.time, passing=True, repeatable=True)
         if self.good is not None:
             self.good[:] = self.outputs

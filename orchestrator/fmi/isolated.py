@@ -15,9 +15,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
-from hapticlink.orchestrator.fmi.instance import Instance, Vector
+from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.units import SAME, Linear
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.fmi.worker_process import Died, Process
 
@@ -53,13 +54,16 @@ class Isolated(Instance):
     _calls: Mapping[str, int] = MappingProxyType({})
     """Known once the FMU is closed."""
 
-    def _load(self) -> None:
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
         self._pending: list[tuple[int, bytes]] = []
         self._saved_time: dict[int, float] = {}
+
+    def _load(self) -> None:
         self._folder = temporary_folders.new()
         self._process = Process("hapticlink.orchestrator.fmi.worker")
         self._process.interruptible = True
-        what = (self.name, self.description, len(self.outputs), self.starts, self.policy)
+        what = (self.name, self.description, self.starts, self.policy)
         # The answer waits for `enter_initialization`: all FMUs of a run load at the same time.
         self._send("load", *what, self._folder, allowed=max(self.policy.timeout, LOADING))
 
@@ -113,21 +117,30 @@ class Isolated(Instance):
     # --- the calls of a run ---------------------------------------------------------------
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
-        return self._remote(self._ask("connect", "connect", list(scalars)), places)
+        conversions = [s.conversion for s in scalars]
+        return self._remote(self._ask("connect", [s.name for s in scalars]), conversions, places)
 
     def connect_derivatives(
         self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
     ) -> Callable[[Vector], None]:
-        asked = "connect_derivatives", list(scalars), list(orders)
-        return self._remote(self._ask("connect", *asked), places)
+        of_orders = zip((s.conversion for s in scalars), orders, strict=True)
+        conversions = [Linear(c.factor) if order else c for c, order in of_orders]
+        key = self._ask("connect_derivatives", [s.name for s in scalars], list(orders))
+        return self._remote(key, conversions, places)
 
-    def _remote(self, key: int, places: Sequence[int]) -> Callable[[Vector], None]:
-        """A function that queues the values at `places` for the setter `key` of the worker."""
-        where = np.array(places, dtype=np.intp)
+    def _remote(
+        self, key: int, conversions: Sequence[Linear], places: Sequence[int]
+    ) -> Callable[[Vector], None]:
+        """A function that queues the values at `places`, converted, for the setter `key` of the
+        worker."""
+        where, same = np.array(places, dtype=np.intp), all(c == SAME for c in conversions)
+        factors = np.array([c.factor for c in conversions])
+        offsets = np.array([c.offset for c in conversions])
 
         def set_from(signals: Vector) -> None:
             if not self.ended:
-                self._pending.append((key, signals[where].tobytes()))
+                values = signals[where] if same else signals[where] * factors + offsets
+                self._pending.append((key, values.tobytes()))
 
         return set_from
 

@@ -9,13 +9,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from fmpy import platform, platform_tuple, sharedLibraryExtension
+from fmpy import sharedLibraryExtension
 
 from hapticlink.orchestrator.fmi import python_libraries
+from hapticlink.orchestrator.fmi.description import PLATFORMS
 from hapticlink.orchestrator.fmi.status import require_success
-
-PLATFORMS = {"2": platform, "3": platform_tuple}
-"""The folder of this platform in binaries/, by FMI version."""
 
 
 def loaded(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: str) -> Any:

@@ -5,17 +5,17 @@ for every instance."""
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 
-from fmpy import extract, platform, platform_tuple
+from fmpy import extract
 
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.fmi.description import Description, describe
+from hapticlink.orchestrator.fmi.description import PLATFORMS, Description, describe
 
 MAX_UNPACKED = 32
 """Number of FMUs that are kept from one run to the next."""
@@ -23,15 +23,10 @@ File = tuple[Path, int, int]
 """A path with time of change (ns) and size of what is there."""
 
 
-@dataclass
-class Unpacked:
-    """A folder in which an FMU of this project is unpacked, and how many instances are open."""
-
-    folder: str
-    instances: int = 0
-
-
-_unpacked: dict[File, Unpacked] = {}
+_unpacked: dict[File, str] = {}
+"""The folders in which FMUs of this project are unpacked, the newest last."""
+_instances: Counter[str] = Counter()
+"""By folder: how many instances are open in it."""
 _lock = Lock()
 _stay = False
 
@@ -83,11 +78,9 @@ def unpack(description: Description, folder: str) -> str:
         return _extracted(description.path, folder, own)
     with _lock:
         file = file_at(description.path)
-        if (unpacked := _unpacked.pop(file, None)) is None:
-            unpacked = Unpacked(_extracted(description.path, "", own))
-        unpacked.instances += 1
-        _unpacked[file] = unpacked  # the newest
-        return unpacked.folder
+        _unpacked[file] = _unpacked.pop(file, "") or _extracted(description.path, "", own)
+        _instances[_unpacked[file]] += 1
+        return _unpacked[file]
 
 
 def _extracted(path: Path, folder: str, own: bool) -> str:
@@ -103,7 +96,7 @@ def _extracted(path: Path, folder: str, own: bool) -> str:
 def _is_needed(entry: str) -> bool:
     """Whether a run needs an entry of an FMU of this project: no binary of another platform, which
     is a third of a Python FMU."""
-    here = f"binaries/{platform}/", f"binaries/{platform_tuple}/"
+    here = (f"binaries/{platform}/" for platform in PLATFORMS.values())
     return entry.startswith(("modelDescription.xml", "resources/", *here))
 
 
@@ -111,22 +104,20 @@ def leave(folder: str) -> bool:
     """One instance of those in a folder is closed; it is removed with the last one, unless it is
     kept. Returns whether others are open."""
     with _lock:
-        file, unpacked = next(
-            ((f, entry) for f, entry in _unpacked.items() if entry.folder == folder), (None, None)
-        )
-        if file is None or unpacked is None:
+        file = next((f for f, unpacked in _unpacked.items() if unpacked == folder), None)
+        if file is None:
             shutil.rmtree(folder, ignore_errors=True)
             return False
-        unpacked.instances -= 1
-        if not unpacked.instances and not _stay:
-            shutil.rmtree(_unpacked.pop(file).folder, ignore_errors=True)
-        return unpacked.instances > 0
+        _instances[folder] -= 1
+        if not _instances[folder] and not _stay:
+            shutil.rmtree(_unpacked.pop(file), ignore_errors=True)
+        return _instances[folder] > 0
 
 
 def trim(most: int = MAX_UNPACKED) -> None:
     """Removes the folders that were used longest ago and in which no FMU is open, so that `most`
     are left."""
     with _lock:
-        closed = [file for file, entry in _unpacked.items() if not entry.instances]
+        closed = [file for file, folder in _unpacked.items() if not _instances[folder]]
         for file in closed[: max(len(_unpacked) - most, 0)]:
-            shutil.rmtree(_unpacked.pop(file).folder, ignore_errors=True)
+            shutil.rmtree(_unpacked.pop(file), ignore_errors=True)

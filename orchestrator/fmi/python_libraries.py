@@ -1,4 +1,5 @@
-"""What the libraries of pythonfmu 0.7 and pythonfmu3 0.3 need, so as not to crash the process.
+"""What the libraries of pythonfmu 0.7 and pythonfmu3 0.3 need, so as not to crash the process, and
+to say where an exception comes from.
 
 At the end of the process they release the Python interpreter twice, which corrupts memory. The
 function that they export for it, `finalizePythonInterpreter`, is therefore called earlier, so that
@@ -15,10 +16,16 @@ import atexit
 import ctypes
 import hashlib
 import os
+import re
 import shutil
+import sys
+from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from functools import cache, wraps
+from inspect import getattr_static, isfunction
 from pathlib import Path
+from traceback import extract_tb
+from typing import Any
 
 from fmpy import sharedLibraryExtension
 
@@ -30,17 +37,24 @@ _kept: dict[int, ctypes.CDLL] = {}
 """By handle: a reference of our own, so that FMPy's unloading leaves the library in its place."""
 
 
+CALLED = re.compile(
+    r"do_step|terminate|setup_experiment|(enter|exit)_\w+_mode"
+    r"|([gs]et)_(real|integer|boolean|string|float\d+|u?int\d+)"
+)
+"""The methods of a slave that a library calls."""
+
+
 def is_python(loaded: ctypes.CDLL) -> bool:
     """Whether a library is one of these."""
     return hasattr(loaded, "finalizePythonInterpreter")
 
 
-def prepare(loaded: ctypes.CDLL, folder: str) -> bool:
-    """Whether a library that FMPy has loaded from an FMU's `folder` holds a Python interpreter,
-    which is then released when this process ends. Raises ValueError where such a library would find
-    no module."""
+def prepare(loaded: ctypes.CDLL, folder: str) -> str:
+    """The Python module of an FMU whose library, loaded from its `folder`, holds an interpreter,
+    which is then released when this process ends; "" for other FMUs. Raises ValueError where such a
+    library would find no module."""
     if not is_python(loaded):
-        return False
+        return ""
     if os.name == "posix":
         library = ctypes.CDLL(loaded._name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY)
         if library._handle not in _kept:
@@ -50,8 +64,34 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> bool:
     with suppress(OSError, ValueError):
         name = (resources / "slavemodule.txt").read_text(encoding="utf-8").strip()
         if (resources / f"{name}.py").is_file():
-            return True
+            return name
     raise ValueError("resources/slavemodule.txt names no module beside it; build the FMU again")
+
+
+def tell_exceptions(module: str, tell: Callable[[bytes], object]) -> None:
+    """Have the newest instance of a Python FMU `tell` the file and line of an exception, of which
+    its library logs the text alone. Its module has been executed for this instance, so that the
+    classes in it are of this instance, too."""
+    scope = vars(sys.modules[module]) if module in sys.modules else {}
+    for kind in [*scope.values()]:
+        own = isinstance(kind, type) and kind.__module__ == module and not kind.__subclasses__()
+        for name in filter(CALLED.fullmatch, dir(kind) if own else ()):
+            if isfunction(method := getattr_static(kind, name)):
+                setattr(kind, name, _telling(method, tell))
+
+
+def _telling(method: Callable[..., Any], tell: Callable[[bytes], object]) -> Callable[..., Any]:
+    @wraps(method)
+    def telling(*arguments: Any, **named: Any) -> Any:
+        try:
+            return method(*arguments, **named)
+        except Exception as error:
+            last = extract_tb(error.__traceback__)[-1]
+            where = f"{Path(last.filename).name}, line {last.lineno}, in {last.name}: {last.line}"
+            tell(f"{where}: {type(error).__name__}: {error}".encode())
+            raise
+
+    return telling
 
 
 def shared(folder: Path, library: Path) -> Path | None:

@@ -10,7 +10,7 @@ from typing import Any
 from hapticlink.orchestrator.fmi import python_libraries
 from hapticlink.orchestrator.fmi.capabilities import STATE, VARIABLE_STEP
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.instance_progress import Place
+from hapticlink.orchestrator.fmi.instance import Place
 from hapticlink.orchestrator.fmi.status import DISCARD, succeeded
 
 HALVINGS = 10

@@ -1,8 +1,13 @@
-"""Copies values between a vector and an FMU, with one C call per FMI type."""
+"""Copies values between a vector and an FMU, with one C call per FMI type.
+
+A String or Binary is in a signal vector as its number among those that this process has met: so it
+is held, delayed and passed on as a number is, and what an FMU gets are the bytes.
+"""
 
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
@@ -11,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.fmi.start_values import WIDE
-from hapticlink.orchestrator.fmi.texts import TextTransfer
+from hapticlink.orchestrator.fmi.start_values import WIDE, Given
+from hapticlink.orchestrator.fmi.status import succeeded
 from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 
 _IN_C: dict[str, type[np.generic]] = {
@@ -22,6 +27,10 @@ _IN_C: dict[str, type[np.generic]] = {
     "UInt64": np.uint64, "UInt32": np.uint32, "UInt16": np.uint16, "UInt8": np.uint8,
 }  # fmt: skip
 _BOOLEAN = {"2": np.int32, "3": np.bool_}  # fmi2Boolean is an int, fmi3Boolean a bool
+
+_TEXTS = [b""]
+_NUMBERS = {b"": 0}
+_LOCK = threading.Lock()
 
 
 class Unfit(Exception):
@@ -110,6 +119,54 @@ class Transfer:
             value = float(self.values[i])
             raise Unfit(f"{self._names[i]} cannot be {value!r}: {self._named}")
         return rounded
+
+
+def as_signal(scalar: Scalar, value: Given) -> float:
+    """A start value as a signal has it."""
+    if isinstance(value, str):
+        text = bytes.fromhex(value) if scalar.type == "Binary" else value.encode()
+        return float(_number_of(text))
+    return float(value)
+
+
+def _number_of(text: bytes) -> int:
+    with _LOCK:
+        if text not in _NUMBERS:
+            _NUMBERS[text] = len(_TEXTS)
+            _TEXTS.append(text)
+        return _NUMBERS[text]
+
+
+class TextTransfer:
+    """The Strings or Binaries of a get or a set, called as a `Transfer`."""
+
+    exact = ()
+
+    def __init__(
+        self, slave: Any, fmi: str, verb: str, scalars: Sequence[Scalar], values: Vector
+    ) -> None:
+        n, type_ = ctypes.c_size_t(len(scalars)), scalars[0].type
+        self.name, self._values, self._gets = f"fmi{fmi}{verb}{type_}", values, verb == "Get"
+        self._function, self._is_binary = slave.dll[self.name], type_ == "Binary"
+        self._texts = (ctypes.c_char_p * n.value)()
+        self._sizes = (ctypes.c_size_t * n.value)()
+        references = (ctypes.c_uint * n.value)(*(s.reference for s in scalars))
+        binary, three = [self._sizes] * self._is_binary, [n] * (fmi == "3")
+        own = ctypes.c_void_p(slave.component)
+        self._arguments = [own, references, n, *binary, self._texts, *three]
+
+    def call(self) -> int:
+        if not self._gets:
+            for i, number in enumerate(self._values):
+                self._texts[i] = text = _TEXTS[round(number)]
+                self._sizes[i] = len(text)
+        status: int = self._function(*self._arguments)
+        if self._gets and succeeded(status):
+            starts = ctypes.cast(self._texts, ctypes.POINTER(ctypes.c_void_p))
+            for i, size in enumerate(self._sizes):
+                text = ctypes.string_at(starts[i], size) if size else self._texts[i] or b""
+                self._values[i] = _number_of(b"" if self._is_binary and not size else text)
+        return status
 
 
 def transfers(

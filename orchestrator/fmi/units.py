@@ -9,6 +9,7 @@ a to b by y_b = (f_a/f_b) y_a + (o_a - o_b)/f_b. An offset does not count for di
 from __future__ import annotations
 
 from dataclasses import dataclass
+from xml.etree.ElementTree import Element
 
 from hapticlink.components.base_units import BASES
 
@@ -21,6 +22,15 @@ class Unit:
     base: tuple[int, ...] | None = None
     factor: float = 1.0
     offset: float = 0.0
+
+    @classmethod
+    def read(cls, element: Element, space: str = "") -> Unit:
+        """The unit of a Unit element of FMI, or of SSP, whose namespace is `space`."""
+        name, base = element.get("name", ""), element.find(f"{space}BaseUnit")
+        if base is None:
+            return cls(name)
+        powers = tuple(int(base.get(b, "0")) for b in BASES)
+        return cls(name, powers, float(base.get("factor", "1")), float(base.get("offset", "0")))
 
 
 @dataclass(frozen=True)

@@ -165,9 +165,15 @@ def derivatives(model: Any) -> dict[str, str]:
     return by_output
 
 
+def indices(sizes: Iterable[int]) -> list[str]:
+    """The indices of all entries of an array row by row, as "[1,1]", "[1,2]" ...; [""] of a
+    scalar."""
+    every = product(*(range(1, 1 + size) for size in sizes))
+    return [f"[{','.join(map(str, entry))}]" if entry else "" for entry in every]
+
+
 def _names(variable: Any) -> list[str]:
-    places = product(*(range(1, n + 1) for n in variable.shape or ()))
-    return [f"{variable.name}[{','.join(map(str, p))}]" if p else variable.name for p in places]
+    return [f"{variable.name}{entry}" for entry in indices(variable.shape or ())]
 
 
 def _nominal(variable: Any) -> float:

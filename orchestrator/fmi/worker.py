@@ -8,7 +8,7 @@ import os
 import pickle
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, BinaryIO
 
@@ -16,8 +16,10 @@ import numpy as np
 
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.base.process_end import leave_threads
+from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.variables import Scalar
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
@@ -33,6 +35,7 @@ class Worker:
 
     def __init__(self) -> None:
         self._instance: Instance | None = None
+        self._inputs: dict[str, Scalar] = {}
         self._setters: list[Callable[[Any], None]] = []
 
     @property
@@ -41,22 +44,34 @@ class Worker:
         return self._instance
 
     def load(
-        self, name: str, description: Any, outputs: int, starts: Any, policy: Any, folder: str
+        self, name: str, description: Description, starts: Any, policy: Any, folder: str = ""
     ) -> None:
-        kind = in_process(description)
-        self._instance = kind(name, description, np.zeros(outputs), starts, policy, folder)
+        self._inputs = {s.name: s for s in description.scalars if s.causality != "output"}
+        kind, outputs = in_process(description), np.zeros(len(description.outputs))
+        self._instance = kind(name, description, outputs, starts, policy, folder)
         self.instance.__enter__()
 
-    def connect(self, call: str, scalars: Any, *orders: Any) -> int:
-        """The key of the setter that `call` of the instance gives."""
-        setter = getattr(self.instance, call)(scalars, *orders, range(len(scalars)))
-        self._setters.append(setter)
+    def connect(self, names: Sequence[str]) -> int:
+        return self._connected(self.instance.connect, names)
+
+    def connect_derivatives(self, names: Sequence[str], orders: Sequence[int]) -> int:
+        return self._connected(self.instance.connect_derivatives, names, orders)
+
+    def _connected(
+        self, connect: Callable[..., Callable[[Any], None]], names: Sequence[str], *orders: Any
+    ) -> int:
+        """The key of a setter of these inputs, or of their derivatives of these orders."""
+        scalars = [self._inputs[name] for name in names]
+        self._setters.append(connect(scalars, *orders, range(len(names))))
         return len(self._setters) - 1
 
-    def set_all(self, pending: Any) -> None:
-        """`pending`: (key, values as bytes) of setters, in order."""
+    def called(self, pending: Any, call: str, arguments: Any) -> Any:
+        """What a call returns, once inputs are set as `pending` says: (key, values as bytes) of
+        setters, in order."""
         for key, values in pending:
             self._setters[key](np.frombuffer(values))
+        of = self.instance if call in self.DIRECT else self
+        return getattr(of, call)(*arguments)
 
     def read(self) -> bytes:
         self.instance.read()
@@ -99,9 +114,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
         except EOFError:
             break
         try:
-            worker.set_all(pending)
-            called = worker.instance if call in worker.DIRECT else worker
-            answer = ("answer", getattr(called, call)(*arguments))
+            answer = ("answer", worker.called(pending, call, arguments))
         except FmuFault as fault:
             answer = ("end" if isinstance(fault, AsksToEnd) else "fault", fault_fields(fault))
         pickle.dump(answer, answers)

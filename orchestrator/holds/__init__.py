@@ -1,24 +1,25 @@
-"""Holds: they give the value of an input between two samples of its source. One hold a file."""
+"""Holds: they give the value of an input between two samples of its source."""
 
 from __future__ import annotations
 
 from typing import Any, get_args
 
 from hapticlink.components.registry import Registry, no_subclass
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.delayed import Delayed
-from hapticlink.orchestrator.holds.first_order import FirstOrder
-from hapticlink.orchestrator.holds.first_order_derivative import FirstOrderDerivative
-from hapticlink.orchestrator.holds.hermite import Hermite
-from hapticlink.orchestrator.holds.hold import Hold, Needs
-from hapticlink.orchestrator.holds.lead import Lead
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Needs
 from hapticlink.orchestrator.holds.mean import Mean
 from hapticlink.orchestrator.holds.nearly_energy_preserving import NearlyEnergyPreserving
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
-from hapticlink.orchestrator.holds.second_order import SecondOrder
-from hapticlink.orchestrator.holds.slope import Slope
-from hapticlink.orchestrator.holds.smooth import Smooth
+from hapticlink.orchestrator.holds.polynomial_holds import (
+    Delayed,
+    FirstOrder,
+    FirstOrderDerivative,
+    Hermite,
+    Lead,
+    SecondOrder,
+    Slope,
+    Smooth,
+)
 from hapticlink.orchestrator.holds.zero_order import Latest, ZeroOrder
 
 __all__ = ["HOLDS", "Hold", "HoldContext"]

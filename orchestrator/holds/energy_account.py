@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, total
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext
 
 
 def repayment(excess: Vector, motion: Vector, largest: Vector) -> Vector:

@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Vector
 from hapticlink.orchestrator.holds.polynomial_hold_laws import Law, Value, arguments
 
 

@@ -12,8 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext
 
 
 class Mean(Hold):

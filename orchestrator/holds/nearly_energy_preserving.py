@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector, repayment
+from hapticlink.orchestrator.holds.hold import HoldContext
 
 
 class NearlyEnergyPreserving(Account):

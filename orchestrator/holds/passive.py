@@ -37,8 +37,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account, Vector
+from hapticlink.orchestrator.holds.hold import HoldContext
 
 STOPPED = 0.01
 """A step back by less than this part of the predicted displacement counts as none: a friction that

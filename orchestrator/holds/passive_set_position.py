@@ -60,8 +60,7 @@ near end is read on.
 from __future__ import annotations
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.hold import Hold
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext
 
 
 class PassiveSetPosition(Hold):

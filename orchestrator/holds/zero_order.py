@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.orchestrator.holds.context import HoldContext
-from hapticlink.orchestrator.holds.hold import Hold, Vector
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Vector
 
 
 class ZeroOrder(Hold):

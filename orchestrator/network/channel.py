@@ -15,6 +15,8 @@ from threading import Event
 from time import monotonic_ns
 from typing import Any
 
+import zmq
+
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.fmi.worker_process import Died
 from hapticlink.orchestrator.network import key_file, messages
@@ -26,6 +28,7 @@ WATCH = 50_000_000
 """ns between two looks at whether the run has given up."""
 FIRST, LEAST, LONGEST = 250_000_000, 10_000_000, 250_000_000
 """ns until a call is sent again: the first time, at least, and at most."""
+UNHEARD = "is `hapticlink serve` running there, with the same key, and the port open?"
 REFUSALS = 3
 """Connections without an answer that were closed by the server, as it does with a wrong key."""
 SECURE = {"linger": 0, "maxmsgsize": messages.MOST, "ipv6": 1}
@@ -42,8 +45,6 @@ class Channel:
     """
 
     def __init__(self, address: str, key: key_file.Key, outputs: int) -> None:
-        import zmq
-
         self.address, self._outputs = address, outputs
         self._context, self._poller = zmq.Context(), zmq.Poller()
         self._lanes = [self._connected(key) for _ in range(LANES)]
@@ -54,7 +55,7 @@ class Channel:
         self._refusals = 0
         self._session, self._number = secrets.token_bytes(16), -1
         self._timer = Timer()
-        self._given_up = Event()
+        self.given_up = Event()
         self.clock = ClockFilter()
         self.round_trips = array("q")
         self.newest: tuple[Answer, int] | None = None
@@ -63,8 +64,6 @@ class Channel:
         interrupt.add(self.give_up)
 
     def _connected(self, key: key_file.Key) -> Any:
-        import zmq
-
         lane = self._context.socket(zmq.DEALER)
         for option, value in (SECURE | ALIVE | LANE).items():
             setattr(lane, option, value)
@@ -83,8 +82,6 @@ class Channel:
 
     def _transmit(self) -> None:
         """Send the call, over the next lane where it was sent before."""
-        import zmq
-
         if self.attempts:
             self._lane = (self._lane + 1) % LANES
             self.repeated += 1
@@ -108,10 +105,11 @@ class Channel:
         deadline = begun + round(1e9 * allowed)
         while (answer := self._arrived()) is None:
             now = monotonic_ns()
-            if self._given_up.is_set() or (self.interruptible and interrupt.came()):
+            if self.given_up.is_set() or (self.interruptible and interrupt.came()):
                 raise Died("was given up")
             if now > deadline:
-                raise Died(f"has not answered within {allowed:g} s{self._hint()}")
+                hint = "" if self.newest else f": {UNHEARD}"
+                raise Died(f"has not answered within {allowed:g} s{hint}")
             if self._refused():
                 raise Died("closes each connection: its key is another one")
             if now >= self._due:
@@ -125,8 +123,6 @@ class Channel:
 
     def _arrived(self) -> Answer | None:
         """The answer that is awaited, if it has come; others are counted."""
-        import zmq
-
         for i, lane in enumerate(self._lanes):
             while True:
                 try:
@@ -152,25 +148,14 @@ class Channel:
 
     def _refused(self) -> bool:
         """Whether the server has refused each connection so far."""
-        import zmq
-
         while self.newest is None and self._monitor.poll(0):
             self._monitor.recv_multipart(zmq.NOBLOCK)
             self._refusals += 1
         return self._refusals >= REFUSALS
 
-    def _hint(self) -> str:
-        if self.newest is not None:
-            return ""
-        return ": is `hapticlink serve` running there, with the same key, and the port open?"
-
-    @property
-    def given_up(self) -> bool:
-        return self._given_up.is_set()
-
     def give_up(self) -> None:
         """Let `answer` return at once; from any thread."""
-        self._given_up.set()
+        self.given_up.set()
 
     def end(self) -> None:
         """Close the connections."""

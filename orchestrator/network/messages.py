@@ -14,6 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import msgpack
+
 MOST = 1 << 20
 """Largest message (bytes)."""
 ARGUMENTS: Mapping[str, tuple[type, ...]] = {
@@ -38,8 +40,16 @@ class Malformed(Exception):
     """A message that no run and no server sends; the text says why."""
 
 
+class Message:
+    """A record whose fields are sent in their order."""
+
+    def packed(self) -> bytes:
+        packed: bytes = msgpack.packb([*vars(self).values()])
+        return packed
+
+
 @dataclass(frozen=True)
-class Request:
+class Request(Message):
     """A call of a session, its `number`-th, that was sent at `sent` (ns of the run's clock)."""
 
     session: bytes
@@ -49,12 +59,9 @@ class Request:
     call: str
     arguments: list[Any]
 
-    def packed(self) -> bytes:
-        return _packed([*vars(self).values()])
-
 
 @dataclass(frozen=True)
-class Answer:
+class Answer(Message):
     """The answer to the call `number`, which was `sent` at t_1 of the run's clock, and `received`
     at t_2 and `answered` at t_3 of the server's (ns)."""
 
@@ -64,9 +71,6 @@ class Answer:
     answered: int
     kind: str
     content: Any
-
-    def packed(self) -> bytes:
-        return _packed([*vars(self).values()])
 
 
 def request_of(message: bytes) -> Request:
@@ -121,16 +125,7 @@ def _is_fault(content: Any) -> bool:
     return form and all(isinstance(text, str) for text in content[2])
 
 
-def _packed(content: Any) -> bytes:
-    import msgpack
-
-    packed: bytes = msgpack.packb(content)
-    return packed
-
-
 def _unpacked(message: bytes) -> Any:
-    import msgpack
-
     try:
         return msgpack.unpackb(message)
     except (ValueError, TypeError, msgpack.UnpackException) as error:

@@ -6,15 +6,14 @@ of pipes, with names in the place of objects.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.errors import FmuFault
-from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
-from hapticlink.orchestrator.fmi.instance import Vector
 from hapticlink.orchestrator.fmi.isolated import LOADING, Isolated
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.fmi.worker_process import Died
@@ -46,12 +45,11 @@ class Remote(Isolated):
         self._channel: Channel | None = None
 
     def _load(self) -> None:
-        # Here, since every run imports this file.
+        key = key_file.read(self._at.key)
+        # Here, since every run imports this file, and few have the extra.
         from hapticlink.orchestrator.network.channel import Channel
 
-        self._pending: list[tuple[int, bytes]] = []
-        self._saved_time: dict[int, float] = {}
-        self._channel = Channel(self._at.address, key_file.read(self._at.key), len(self.outputs))
+        self._channel = Channel(self._at.address, key, len(self.outputs))
         self._process = self._channel
         self._process.interruptible = True
         outputs = [s.name for s in self.description.outputs]
@@ -66,15 +64,6 @@ class Remote(Isolated):
         self._process = None
         if self._channel:
             self._channel.end()
-
-    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
-        return self._remote(self._ask("connect", [s.name for s in scalars]), places)
-
-    def connect_derivatives(
-        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
-    ) -> Callable[[Vector], None]:
-        names = [s.name for s in scalars]
-        return self._remote(self._ask("connect_derivatives", names, list(orders)), places)
 
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
         return None  # differences take their place
@@ -99,7 +88,7 @@ class Remote(Isolated):
         """A server that is not there any more keeps nothing back: that is no fault here."""
         channel = self._channel
         try:
-            if self._process is None or channel is None or channel.given_up:
+            if self._process is None or channel is None or channel.given_up.is_set():
                 return None
             if channel.busy:
                 channel.answer(CLOSING)

@@ -8,18 +8,19 @@ refused by ZeroMQ before a message is read (CurveZMQ).
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from time import monotonic_ns
 from typing import Any
 
 import numpy as np
+import zmq
+from zmq.auth.thread import ThreadAuthenticator
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault, InputFault
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.worker import Worker, fault_fields
 from hapticlink.orchestrator.network.channel import ALIVE, SECURE
 from hapticlink.orchestrator.network.key_file import Key
@@ -53,7 +54,7 @@ class Session(Worker):
     def __init__(self, request: Request, fmu: Fmu, policy: Faults) -> None:
         super().__init__()
         self.identifier, self.number = request.session, request.number
-        self.newest: Answer | None = None
+        self.newest: tuple[str, Any] | None = None
         self.heard = monotonic_ns()
         self.phase = "loaded"
         self._reached, self._sizes = -np.inf, list[int]()
@@ -65,20 +66,19 @@ class Session(Worker):
         kept = replace(
             fmu.description, scalars=(*others, *(scalars[name] for name in dict.fromkeys(outputs)))
         )
-        self._inputs = {s.name: s for s in kept.scalars if s.causality != "output"}
-        kind = in_process(kept)
-        self._instance = kind(fmu.name, kept, np.zeros(len(kept.outputs)), fmu.starts, policy)
-        self._instance.__enter__()
+        self.load(fmu.name, kept, fmu.starts, policy)
 
-    def _connect(self, call: str, names: list[Any], *orders: list[Any]) -> int:
-        """The key of the setter for inputs, or for their derivatives of these orders."""
+    def _connected(
+        self, connect: Callable[..., Callable[[Any], None]], names: Sequence[str], *orders: Any
+    ) -> int:
+        """Raises Malformed for what no run asks for."""
         if any(
             len(of) != len(names) or any(type(n) is not int or n < 0 for n in of) for of in orders
         ):
             raise Malformed("connect_derivatives: an order for each input")
         if not all(type(name) is str and name in self._inputs for name in names):
             raise Malformed("connect: inputs that the FMU does not have")
-        key = self.connect(call, [self._inputs[name] for name in names], *orders)
+        key = super()._connected(connect, names, *orders)
         self._sizes.append(len(names))
         return key
 
@@ -97,16 +97,13 @@ class Session(Worker):
             self._reached = time + size
         elif call == "rollback":
             self._reached = -np.inf
-        self.set_all(request.pending)
-        if call == "close":
-            self.phase = "closed"
-        called = self.instance if call in self.DIRECT else self
-        if call.startswith("connect"):
-            result = self._connect(call, *arguments)
-        else:
-            result = getattr(called, call)(*arguments)
+        result = self.called(request.pending, call, arguments)
         self.phase = NEXT.get(call, self.phase)
         return result
+
+    def close(self) -> dict[str, int]:
+        self.phase = "closed"
+        return super().close()
 
 
 class Server:
@@ -125,8 +122,6 @@ class Server:
 
     def serve(self, address: str, key: Key) -> None:
         """Serve at HOST:PORT until a signal comes. Raises InputFault where that cannot be."""
-        import zmq
-
         with _bound(address, key, self._say) as socket:
             while not interrupt.came():
                 if not socket.poll(POLL):
@@ -156,8 +151,7 @@ class Server:
         session = self._session(request)
         if session and request.number == session.number and session.newest:
             # It comes again: the time of this exchange, and the answer from memory.
-            kept = session.newest
-            return self._packed(request, received, kept.kind, kept.content)
+            return self._packed(request, received, *session.newest)
         if session and request.number != session.number + 1:
             self._refuse("a call out of its order")
             return None
@@ -172,7 +166,7 @@ class Server:
         packed = self._packed(request, received, kind, content)
         if session := self._session(request):
             session.number, session.heard = request.number, received
-            session.newest = Answer(request.number, 0, 0, 0, kind, content)
+            session.newest = kind, content
         return packed
 
     def _packed(self, request: Request, received: int, kind: str, content: Any) -> bytes:
@@ -238,9 +232,6 @@ class _Holders:
 @contextmanager
 def _bound(address: str, key: Key, say: Callable[[str], object]) -> Iterator[Any]:
     """A socket that is bound to an address and admits those who have the key."""
-    import zmq
-    from zmq.auth.thread import ThreadAuthenticator
-
     context = zmq.Context()
     authenticator = ThreadAuthenticator(context)
     authenticator.start()

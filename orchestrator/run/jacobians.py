@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.fmi.capabilities import gives_directional_derivatives
-from hapticlink.orchestrator.fmi.directional_derivatives import Matrix
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus

@@ -10,10 +10,9 @@ import numpy as np
 
 from hapticlink.orchestrator.base.errors import Fault, shortened
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.context import HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
-from hapticlink.orchestrator.holds.hold import Hold, Needs, Vector
+from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Needs, Vector
 from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector

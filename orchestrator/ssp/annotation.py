@@ -16,9 +16,15 @@ from hapticlink.orchestrator.scene.extends import traced
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 from hapticlink.orchestrator.scene.unrepresentable_values import unsound
-from hapticlink.orchestrator.ssp.names import ANNOTATION, NOT_IN_ANNOTATION, RUN, SSC, SSD
+from hapticlink.orchestrator.ssp.names import (
+    ANNOTATION,
+    NOT_IN_ANNOTATION,
+    OF_GRAPHICS,
+    RUN,
+    SSC,
+    SSD,
+)
 
-OF_GRAPHICS = ("rate", "align", "phase")
 OF_AN_FMU = ("rate", "timing", "isolate", "derivatives")
 
 

@@ -23,13 +23,14 @@ NOT_IN_ANNOTATION = frozenset(
         *("packaging", "hands", "devices", "controllers", "local_model"),
     )
 )
-"""Keys of a scene that are contained in its FMUs and the structure; of graphics, the rate is in the
-annotation."""
+"""Keys of a scene that are contained in its FMUs and the structure."""
+OF_GRAPHICS = ("rate", "align", "phase")
+"""Those of graphics that are in the annotation."""
 
 
 def is_fixed(names: tuple[str, ...]) -> bool:
     """Whether a key determines the FMUs, which are built already, so that no option can change
     it."""
     if names[0] == "graphics":
-        return len(names) > 1 and names[1] not in ("rate", "align", "phase")
+        return len(names) > 1 and names[1] not in OF_GRAPHICS
     return names[0] in NOT_IN_ANNOTATION - {"fmu", "connection"}

@@ -12,7 +12,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from hapticlink.orchestrator.base.errors import SHOWN, InputFault
@@ -60,7 +59,6 @@ class Given:
 class Parameters:
     """Reads the parameter bindings of the elements of `wires`."""
 
-    path: Path
     wires: Wires
     unused: list[str] = field(default_factory=list)
 
@@ -72,7 +70,7 @@ class Parameters:
             names = printable(", ".join(self.unused[:SHOWN]))
             more = f" and {n} more" if (n := len(self.unused) - SHOWN) > 0 else ""
             message = "%s: parameters that match nothing are ignored: %s%s"
-            logging.getLogger(__name__).warning(message, self.path, names, more)
+            logging.getLogger(__name__).warning(message, self.wires.path, names, more)
         return starts
 
     def values(self) -> dict[Place, dict[str, Value]]:
@@ -115,7 +113,7 @@ class Parameters:
                     yield Given(name + entry, READ[kind](text), of)
             except ValueError as error:  # also of a list for a scalar
                 what = f"{len(given)} values for {len(entries)} entries, {error}"
-                raise InputFault(f"{self.path}: parameter {name}: {what}") from None
+                raise InputFault(f"{self.wires.path}: parameter {name}: {what}") from None
 
     def _mapped(self, mapping: Element, values: Iterable[Given], part: Part) -> Iterator[Given]:
         """The values of the set under the names that they are mapped to, those of an array entry by
@@ -129,7 +127,9 @@ class Parameters:
             source, target = entry.get("source", ""), entry.get("target", "")
             if target in targets:
                 name = dotted(part.place, target)
-                raise InputFault(f"{self.path}: two parameters are mapped to {name}; keep one")
+                raise InputFault(
+                    f"{self.wires.path}: two parameters are mapped to {name}; keep one"
+                )
             targets.add(target)
             if source not in given:
                 self.unused.append(dotted(part.place, source or f"source of {target}"))
@@ -149,7 +149,7 @@ class Parameters:
         as_kind = READ[kind]
         if type(given.value) is not type(as_kind("0")):
             what = f"{given.value!r} is no {kind}, of which its mapping has a table"
-            raise InputFault(f"{self.path}: parameter {given.name}: {what}")
+            raise InputFault(f"{self.wires.path}: parameter {given.name}: {what}")
         return {as_kind(a): as_kind(b) for a, b in targets.items()}.get(given.value, given.value)
 
     def _targets(self, part: Part, name: str) -> Iterator[Reach]:
@@ -163,7 +163,7 @@ class Parameters:
                 yield from self._targets(inner, name.removeprefix(f"{inner.place[-1]}."))
 
     def _converted(self, part: Part, given: Given, target: Reach) -> Value:
-        value, where = given.value, f"{self.path}: parameter {dotted(part.place, given.name)}"
+        value, where = given.value, f"{self.wires.path}: parameter {dotted(part.place, given.name)}"
         try:
             first = SAME
             if given.convert:

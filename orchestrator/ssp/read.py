@@ -15,7 +15,6 @@ import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,7 @@ def tables(path: Path) -> dict[str, Any]:
     file and element, for what is malformed or not supported."""
     with structure(path) as (root, system, described):
         wires = Wires(path, system, described)
-        starts = Parameters(path, wires).starts()
+        starts = Parameters(wires).starts()
     rest, named = annotation.read(path, root), names(described)
     tables: dict[str, Any] = {
         "title": root.get("description") or root.get("name") or path.stem,
@@ -67,8 +66,9 @@ def structure(path: Path) -> Iterator[tuple[Element, Part, dict[Place, Descripti
     with opened(path, "SSP") as archive, _room() as room, ExitStack() as archives:
         root, system = Tree(archives).root(File(path, archive))
         described = _described(system, room)
-        unconnected = Wires(path, _unconnected(system), described)
-        yield root, system, resized(described, Parameters(path, unconnected).values())
+        # The ends of connections exist once arrays have their sizes.
+        unconnected = Wires(path, system.everywhere(lines=()), described)
+        yield root, system, resized(described, Parameters(unconnected).values())
 
 
 @contextmanager
@@ -131,11 +131,6 @@ def _described(system: Part, room: Path) -> dict[Place, Description]:
                 known[file.path, entry] = describe(_unpacked(room, file, entry, part.place))
             fmus[part.place] = known[file.path, entry]
     return fmus
-
-
-def _unconnected(part: Part) -> Part:
-    """The part without connections, whose ends exist once arrays have their sizes."""
-    return replace(part, lines=(), parts=tuple(map(_unconnected, part.parts)))
 
 
 def resized(

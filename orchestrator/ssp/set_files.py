@@ -32,7 +32,8 @@ def options(scene: Scene, files: Iterable[Path]) -> tuple[str, ...]:
     path = Path(scene.source.name if scene.source else scene.title)
     if path.suffix == ".ssp":
         with read.structure(path) as (_, system, described):
-            wires = Wires(path, _bound(system, bindings), described)
+            bound = replace(system.everywhere(bindings=()), bindings=bindings)
+            wires = Wires(path, bound, described)
             names = read.names(described)
     else:
         own = {(f.name,): f for f in scene.fmu if f.path}
@@ -44,7 +45,7 @@ def options(scene: Scene, files: Iterable[Path]) -> tuple[str, ...]:
     return overrides.written(
         {
             f"fmu.{names[place]}.start.{json.dumps(variable)}": value
-            for place, starts in Parameters(path, wires).starts().items()
+            for place, starts in Parameters(wires).starts().items()
             for variable, value in starts.items()
         }
     )
@@ -59,8 +60,3 @@ def _binding(path: Path) -> tuple[File, Element]:
     except OSError as error:
         raise InputFault(f"--set-file {path}: {error.strerror}; give an .ssv") from None
     return File(path, archive), Element("ParameterBinding", source=quote(path.name))
-
-
-def _bound(part: Part, bindings: tuple[tuple[File, Element], ...] = ()) -> Part:
-    """The part with these parameter bindings alone."""
-    return replace(part, bindings=bindings, parts=tuple(map(_bound, part.parts)))

@@ -12,18 +12,17 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
 from io import BytesIO
-from itertools import product
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 from lxml import etree
 
-from hapticlink.components.base_units import BASES
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi import variables
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
-from hapticlink.orchestrator.fmi.variables import MAX_NUMBERS
 from hapticlink.orchestrator.ssp.names import DEFINITION, FMU, PACKAGE, SSB, SSC, SSD, STRUCTURE
 
 Place = tuple[str, ...]
@@ -85,6 +84,11 @@ class Part:
     parts: tuple[Part, ...] = ()
     lines: tuple[Line, ...] = ()
     dictionary: Place | None = None
+
+    def everywhere(self, **changes: Any) -> Part:
+        """The part with these fields changed, in all parts inside it, too."""
+        inside = tuple(part.everywhere(**changes) for part in self.parts)
+        return replace(self, parts=inside, **changes)
 
     def __iter__(self) -> Iterator[Part]:
         """All parts, each after the parts inside it, and finally this one."""
@@ -155,14 +159,8 @@ def _schema(name: str) -> etree.XMLSchema:
 
 def units(root: Element, space: str = SSD) -> dict[str, Unit]:
     """The units that a file defines, by name."""
-    units = {}
-    for unit in root.iterfind(f"{{{space}}}Units/{{{SSC}}}Unit"):
-        base = unit.find(f"{{{SSC}}}BaseUnit")
-        assert base is not None  # required by the schema
-        powers = tuple(int(base.get(b, "0")) for b in BASES)
-        factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
-        units[unit.get("name", "")] = Unit(unit.get("name", ""), powers, factor, offset)
-    return units
+    every = root.iterfind(f"{{{space}}}Units/{{{SSC}}}Unit")
+    return {unit.name: unit for unit in (Unit.read(e, f"{{{SSC}}}") for e in every)}
 
 
 @dataclass(frozen=True)
@@ -292,14 +290,13 @@ def _unit(element: Element, known: Mapping[str, Unit]) -> Unit | None:
 
 
 def indices(sizes: Sequence[int | None]) -> list[str]:
-    """The indices of all entries of an array row by row, as "[1,1]", "[1,2]" ...; [""] of a
-    scalar, [] where a size is left open. Raises InputFault for more than MAX_NUMBERS entries."""
+    """The indices of all entries of an array, [] where a size is left open. Raises InputFault for
+    more than MAX_NUMBERS entries."""
     if None in sizes:
         return []
-    if math.prod(size or 0 for size in sizes) > MAX_NUMBERS:
-        raise InputFault(f"an array of the sizes {sizes}; at most {MAX_NUMBERS} entries")
-    every = product(*(range(1, 1 + (size or 0)) for size in sizes))
-    return [f"[{','.join(map(str, entry))}]" if entry else "" for entry in every]
+    if math.prod(size or 0 for size in sizes) > variables.MAX_NUMBERS:
+        raise InputFault(f"an array of the sizes {sizes}; at most {variables.MAX_NUMBERS} entries")
+    return variables.indices(size or 0 for size in sizes)
 
 
 def _line(path: Path, place: Place, element: Element) -> Line:

@@ -33,6 +33,7 @@ from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
     FMU,
     NOT_IN_ANNOTATION,
+    OF_GRAPHICS,
     RUN,
     SSC,
     SSD,
@@ -206,7 +207,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     if scene.graphics and "graphics" in rates.values():
         graphics = pydantic.TypeAdapter(type(scene.graphics))
         tables["graphics"] = graphics.dump_python(
-            scene.graphics, mode="json", exclude_none=True, include={"rate", "align", "phase"}
+            scene.graphics, mode="json", exclude_none=True, include={*OF_GRAPHICS}
         )
     as_json = partial(pydantic.TypeAdapter(AnyRate).dump_python, mode="json")
     derivatives = {f.name: dict(f.derivatives) for f in scene.fmu if f.derivatives}

@@ -32,7 +32,7 @@ from hapticlink.orchestrator.run.compiled.hold_structures import (
     parts,
     tanks,
 )
-from hapticlink.orchestrator.run.compiled.structures import Op
+from hapticlink.orchestrator.run.compiled.structures import Structure
 from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.instructions import (
     Collect,
@@ -47,6 +47,7 @@ from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
 from hapticlink.orchestrator.system.system import System
 
+Op: Any = structures.Op
 EXACT = 2**53
 """Up to here every whole number is a double, and the quotient of two is rounded once."""
 PATIENCE = 20_000_000
@@ -86,8 +87,8 @@ class Machine:
         self._holds = self._array("holds", ctypes.c_void_p, len(system.connections))
         self._meters = self._array("meters", ctypes.c_void_p, len(simulation.meters.of))
         self._indices: dict[str, dict[Any, int]] = {kind: {} for kind in KINDS}
-        self._records: dict[Instruction, Op] = {}
-        self._ops: list[Op] = []
+        self._records: dict[Instruction, Structure] = {}
+        self._ops: list[Structure] = []
         self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
@@ -172,7 +173,7 @@ class Machine:
 
         return call
 
-    def _record(self, instruction: Instruction) -> Op:
+    def _record(self, instruction: Instruction) -> Structure:
         record = self._coded(instruction)
         if not isinstance(record, str):
             return record
@@ -181,7 +182,7 @@ class Machine:
         self.in_python[f"{type(instruction).__name__.lower()}{of}"] = record
         return Op(structures.PYTHON)
 
-    def _coded(self, instruction: Instruction) -> Op | str:
+    def _coded(self, instruction: Instruction) -> Structure | str:
         """The record of an operation; why it is carried out in Python where it is."""
         simulation, system = self._simulation, self._simulation.system
         match instruction:

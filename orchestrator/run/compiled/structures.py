@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.orchestrator.fmi.instance_progress import Place
+from hapticlink.orchestrator.fmi.instance import Place
 from hapticlink.orchestrator.run.compiled.build import HERE
 
 _COUNT = re.compile(r"/\* \[(.*?)\] \*/")

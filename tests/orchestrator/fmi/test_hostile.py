@@ -12,7 +12,6 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.fmi import messages
 from hapticlink.orchestrator.results import tables
 from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
@@ -225,18 +224,3 @@ def test_an_fmu_that_needs_a_tool_has_a_process_of_its_own(tmp_path):
         _, said = tool.communicate(timeout=20)
     assert tool.returncode == 1
     assert "interrupted" in said
-
-
-def test_the_newest_messages_are_kept_and_no_novel():
-    """Log messages of an FMU are kept up to their bounds."""
-    key = messages.opened()
-    for i in range(20_000):
-        messages.keep(key, 2, b"%d " % i + b"x" * 10_000)
-    messages.keep(key, 0, b"all is well")
-    messages.keep(key, -1, b"20000 is no status that FMI defines")
-    kept = messages.newest(key)
-    messages.closed(key)
-    assert [said.split()[0] for said in kept] == [str(i) for i in range(19_996, 20_001)]
-    assert {len(said) for said in kept[:-1]} == {messages.MAX_LENGTH}
-    messages.keep(key, 3, b"after the end")
-    assert messages.newest(key) == []

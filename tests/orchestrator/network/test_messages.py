@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import msgpack
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +13,6 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator.network import messages
 from hapticlink.orchestrator.network.messages import Answer, Malformed, Request
 
-msgpack = pytest.importorskip("msgpack")
 PLAIN: Any = st.recursive(
     st.none()
     | st.booleans()

@@ -20,7 +20,6 @@ from hapticlink.orchestrator.system.build_system import built
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene
 
-pytest.importorskip("msgpack")
 ONE, TWO = bytes(16), bytes(15) + b"2"
 OUTPUTS = ["y", "steps"]
 

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.network import key_file
 from hapticlink.orchestrator.results.tables import read_table
 from tests.orchestrator.foreign_fmus import python_fmu
-from tests.orchestrator.foreign_scenes import fmu_table, scene
+from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.network.served import (
     command,
     free_address,
@@ -216,6 +216,20 @@ def test_outputs_that_are_no_numbers_are_held(tmp_path: Path) -> None:
         run = hl.run(path, ["duration=1"], figures=False, remote={"slow": at}, key=tmp_path / "key")
     assert run.fault is None
     assert run.run["held_outputs"]["slow"] == 32
+
+
+def test_an_input_of_a_remote_fmu_is_converted(tmp_path: Path) -> None:
+    python_fmu(tmp_path, "One")
+    python_fmu(tmp_path, "Slow", "self.y = self.u")
+    wire = wire_table("one.y", "slow.u", "factor = -2.0\noffset = 1.0\n")
+    path = scene(tmp_path, fmu_table("one", "One") + fmu_table("slow", "Slow") + wire)
+    hl.run(path, out=tmp_path / "here", figures=False)
+    with server(path, tmp_path, "--part", "slow") as at:
+        where = {"slow": at}
+        hl.run(path, out=tmp_path / "remote", figures=False, remote=where, key=tmp_path / "key")
+    here, remote = (read_table(tmp_path / o / "haptics.csv") for o in ("here", "remote"))
+    assert here["slow.y"][1] == 1.0
+    assert (here["slow.y"] == remote["slow.y"]).all()
 
 
 def namespaces(name: str) -> tuple[list[str], list[str], str]:

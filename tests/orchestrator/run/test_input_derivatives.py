@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.context import HoldContext
+from hapticlink.orchestrator.holds.hold import HoldContext
 from hapticlink.orchestrator.system import held_polynomials
 from tests.orchestrator import coupled
 from tests.orchestrator.coupled import scene_of

@@ -1,0 +1,34 @@
+"""Log messages of FMUs are kept up to their bounds."""
+
+import pytest
+
+from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi import messages
+from tests.orchestrator.foreign_fmus import python_fmu
+from tests.orchestrator.foreign_scenes import fmu_table, scene
+
+
+def test_the_newest_messages_are_kept_and_no_novel():
+    key = messages.opened()
+    for i in range(20_000):
+        messages.keep(key, 2, b"%d " % i + b"x" * 10_000)
+    messages.keep(key, 0, b"all is well")
+    messages.keep(key, -1, b"20000 is no status that FMI defines")
+    kept = messages.newest(key)
+    messages.closed(key)
+    assert [said.split()[0] for said in kept] == [str(i) for i in range(19_996, 20_001)]
+    assert {len(said) for said in kept[:-1]} == {messages.MAX_LENGTH}
+    messages.keep(key, 3, b"after the end")
+    assert messages.newest(key) == []
+
+
+@pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
+def test_an_exception_of_a_python_fmu_has_its_file_and_line(tmp_path, isolate):
+    python_fmu(tmp_path, "Slow", "self.y = 1 / (2 - self.steps)")
+    (module,) = tmp_path.glob("m*.py")
+    text = module.read_text().splitlines()
+    line = next(i for i, code in enumerate(text, 1) if "1 / (2" in code)
+    path = scene(tmp_path, fmu_table("slow", "Slow", isolate))
+    fault = str(simulate(str(path), tmp_path / "out").outcome.fault)
+    where = f"{module.name}, line {line}, in do_step: self.y = 1 / (2 - self.steps)"
+    assert f"slow says: {where}: ZeroDivisionError: division by zero\n" in fault
