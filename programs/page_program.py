@@ -36,7 +36,9 @@ def webassembly_files(
 ) -> dict[str, str]:
     """The C files of the module, whose functions are those of page.c. Raises InputFault for FMUs of
     others with resources."""
-    refusals.of_page(program.foreign, program.scene.title)
+    reading = (name for name, foreign in program.foreign.items() if foreign.resources)
+    reasons = (f"{name} has resources, files that a page lacks" for name in reading)
+    refusals.refuse(program.scene.title, reasons)
     texts = sources(program, components, ports)
     texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
     texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')

@@ -26,13 +26,13 @@ from hapticlink.programs.memory_regions import (
 class TypedData:
     """C of the regions of a run.
 
-    members: index of each FMU, by the address of its component. functions: names of FMI functions
-    by address.
+    members: index of each FMU, by the address of its component. functions: what the FMI functions
+    are called in `calls`, by address.
 
     `structure` declares `Scene`, `values` is its initialiser, `pointers` has pairs of places in it
     (the pointer, and what it leads to), `handles` the places of components with the member's index,
-    `calls` those of functions with the member's index and their name, `slots` those of where states
-    are saved, with the member's index.
+    `calls` those of functions with the member's index and what they are called, `slots` those of
+    where states are saved, with the member's index.
     """
 
     def __init__(
