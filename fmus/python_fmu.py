@@ -24,7 +24,7 @@ import casadi as ca
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus import model_description
 from hapticlink.fmus.described import described
-from hapticlink.fmus.documentation import documentation
+from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.fmus.reference_run import reference_run
@@ -60,12 +60,10 @@ def require_platform() -> None:
     )
 
 
-def entries(component: Component, *, stop_time: float, step_size: float) -> dict[str, bytes]:
-    """All files of the FMU; GUID and name of the slave contain a hash of them. stop_time and
-    step_size (s) are the default experiment. Raises FmuError where the component's functions and
-    variables do not fit."""
+def entries(component: Component, **experiment: float) -> dict[str, bytes]:
+    """All files of the FMU; GUID and name of the slave contain a hash of them. experiment: as of
+    `described`. Raises FmuError where the component's functions and variables do not fit."""
     check_functions(component)
-
     parts = one_pass(component)
     texts = {f.name(): f.serialize() for f in parts.functions}
     functions = {
@@ -73,24 +71,23 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
         "resources/functions.txt": program(parts.functions, component.look_ups).encode(),
     }
     about = {"n_shared": parts.n_shared}
-    return packed(component, functions, about, stop_time=stop_time, step_size=step_size)
+    return packed(component, functions, about, **experiment)
 
 
 def packed(
     component: Component,
     functions: Mapping[str, bytes],
     about: Mapping[str, object],
-    *,
-    stop_time: float,
-    step_size: float,
     engine: bytes = b"",
+    /,
+    **experiment: float,
 ) -> dict[str, bytes]:
     """As `entries`, with the files that hold the functions, and what the slave needs to know of
     them. engine: the text of a module whose functions replace these."""
-
-    described_as = described(component, stop_time=stop_time, step_size=step_size)
-    run = None if engine else reference_run(component, step_size)  # whose equations are others
-    files = {"documentation/index.html": documentation(component, run), **functions}
+    described_as = described(component, **experiment)
+    own_equations = not engine
+    run = reference_run(component, described_as.step_size) if own_equations else None
+    files = {PAGE: documentation(component, run), **functions}
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
     for path in sorted((PYTHONFMU / "resources" / "binaries").rglob("*.*")):

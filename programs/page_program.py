@@ -11,13 +11,13 @@ import casadi as ca
 
 from hapticlink.components.component import Component
 from hapticlink.fmus.native.compiler import compile_webassembly
-from hapticlink.fmus.native.source import functions
+from hapticlink.fmus.native.source import functions, table
 from hapticlink.programs import refusals
 from hapticlink.programs.build import OPTIONS
 from hapticlink.programs.foreign import write_texts
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.programs.sources import HERE, prefixed, sources, table
+from hapticlink.programs.sources import HERE, prefixed, sources
 
 PAGE = "page.c"
 """What stands in place of the FMU's own file, and includes it."""

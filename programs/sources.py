@@ -15,7 +15,7 @@ import numpy as np
 from hapticlink.components.component import Component
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
 from hapticlink.fmus.native.native_fmu import COMMON, WRAPPER
-from hapticlink.fmus.native.source import component_source, number
+from hapticlink.fmus.native.source import component_source, number, table
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.run.compiled import build as loop
@@ -208,13 +208,6 @@ def _changes(resolved: Resolved, regions: Regions) -> Iterator[str]:
 
 def _at(place: str) -> str:
     return f"offsetof(Scene, {place})"
-
-
-def table(declared: str, entries: Iterable[str]) -> str:
-    """A C array with an additional entry of zeros at its end, since a C array must not be empty."""
-    rows = [f"    {entry}," for entry in entries]
-    zero = "{0}" if any(row.endswith("},") for row in rows) else "0"
-    return "\n".join([f"static const {declared}[] = {{", *rows, f"    {zero}}};"])
 
 
 def _given(resolved: Resolved, members: Sequence[str]) -> Iterator[str]:

@@ -96,38 +96,35 @@ def compile_library(
     (-DNAME=VALUE, -fvisibility=default). Raises FmuError for an unknown platform, CompilerError
     with the compiler's output if the source does not compile.
     """
-    compiler_version()
-    library = Path(library).resolve()
-    targets = TARGETS.get(platform or host_platform())
-    if targets is None:
-        raise FmuError(f"no platform {platform!r}; there are {', '.join(PLATFORMS)}")
-    if len(targets) > 1 and not isinstance(source, (Path, str)):
-        source = [*source]
+    library, files = Path(library).resolve(), source
+    if isinstance(files, (Path, str)):
+        files = [Path(files)]
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        slices = [_compiled(source, Path(folder), target, options) for target in targets]
-        library.write_bytes(_joined(slices))
+        made = binaries(files, "", Path(folder), [platform or host_platform()], options)
+        library.write_bytes(next(made)[1])
     return library
 
 
 def binaries(
-    source: Sequence[Path],
+    source: Iterable[Path],
     name: str,
     folder: Path,
     platforms: Sequence[str],
-    options: Sequence[str],
+    options: Sequence[str] = (),
 ) -> Iterator[tuple[str, bytes]]:
     """Entries of an FMU with the shared library `name` for each of the platforms, compiled side by
     side in `folder`. Raises as `compile_library`."""
+    compiler_version()
+    if unknown := [platform for platform in platforms if platform not in TARGETS]:
+        raise FmuError(f"no platform {unknown[0]!r}; there are {', '.join(PLATFORMS)}")
     targets = [target for platform in platforms for target in TARGETS[platform]]
+    files = source if len(targets) == 1 else [*source]
     with ThreadPoolExecutor(len(targets)) as pool:
-        compiled = pool.map(lambda target: _compiled(source, folder, target, options), targets)
+        compiled = pool.map(lambda target: _compiled(files, folder, target, options), targets)
         made = dict(zip(targets, compiled, strict=True))
     for platform in platforms:
-        yield entry(platform, name), _joined([made[target] for target in TARGETS[platform]])
-
-
-def _joined(slices: Sequence[bytes]) -> bytes:
-    return universal(slices) if len(slices) > 1 else slices[0]
+        slices = [made[target] for target in TARGETS[platform]]
+        yield entry(platform, name), universal(slices) if len(slices) > 1 else slices[0]
 
 
 def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[str] = ()) -> bytes:
@@ -137,9 +134,7 @@ def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[
     return _compiled(source, folder, WEBASSEMBLY, options)
 
 
-def _compiled(
-    source: Path | str | Iterable[Path], folder: Path, target: str, options: Sequence[str]
-) -> bytes:
+def _compiled(source: Iterable[Path], folder: Path, target: str, options: Sequence[str]) -> bytes:
     own_folder = folder / target
     own_folder.mkdir()
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
@@ -155,12 +150,12 @@ def _compiled(
 
 
 def _objects(
-    source: Path | str | Iterable[Path], folder: Path, target: str, options: Sequence[str]
+    source: Iterable[Path], folder: Path, target: str, options: Sequence[str]
 ) -> list[str]:
     """Compiles C files side by side, and returns the names of the object files in `folder`."""
     jobs = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for file in [Path(source)] if isinstance(source, (Path, str)) else source:
+        for file in source:
             command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
             jobs[f"{file.stem}.o"] = pool.submit(_zig, command, folder, target)
     for job in jobs.values():
