@@ -34,6 +34,7 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
 from hapticlink.programs.description import described, documentation
+from hapticlink.programs.foreign import written
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolve_scene import Resolved, resolved
 from hapticlink.programs.sources import identifiers, sources
@@ -163,11 +164,8 @@ def _built(
 ) -> Path:
     """The FMU with a binary for each platform, written once FMPy finds nothing wrong with it."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
-        room, entries = Path(name), dict(files)
-        for entry in (e for e in files if e.startswith("sources/")):
-            path = room / entry.removeprefix("sources/")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(files[entry])
-        texts = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
-        entries |= binaries(texts, identifier, room, platforms, OPTIONS)
+        listed = (e for e in files if e.startswith("sources/"))
+        texts = {e.removeprefix("sources/"): files[e].decode() for e in listed}
+        room, compiled = Path(name), written(texts, Path(name))
+        entries = {**files, **dict(binaries(compiled, identifier, room, platforms, OPTIONS))}
     return write_fmu(entries, folder, identifier)

@@ -14,7 +14,7 @@ from hapticlink.fmus.native.compiler import compile_webassembly
 from hapticlink.fmus.native.source import functions, table
 from hapticlink.programs import refusals
 from hapticlink.programs.build import OPTIONS
-from hapticlink.programs.foreign import write_texts
+from hapticlink.programs.foreign import written
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
 from hapticlink.programs.sources import HERE, prefixed, sources
@@ -50,9 +50,7 @@ def webassembly(texts: Mapping[str, str], folder: Path) -> bytes:
     """The module of these files, compiled in `folder`. Raises CompilerError."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
-        write_texts(texts, room)
-        files = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
-        return compile_webassembly(files, room, OPTIONS)
+        return compile_webassembly(written(texts, room), room, OPTIONS)
 
 
 def _picture(drawing: Drawing) -> dict[str, str]:
