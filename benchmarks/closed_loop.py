@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from time import thread_time
 
-from benchmarks.peers import bare_scene
+from benchmarks.peers import bare_loop
 from benchmarks.rows import Rows
-from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.run import execute_plan
+from benchmarks.timing import simulated
 
 SCENE, RATE = "closed-loop", 512
 DURATIONS = (3, 15)
@@ -18,18 +17,13 @@ COLUMNS = ("packaging", "loop", "round", "tick_us")
 
 def alone(options: list[str], folder: Path, seconds: int) -> float:
     """Processor time (s) of the loop in C."""
-    return bare_scene.seconds(SCENE, options, RATE * seconds, folder)
+    return bare_loop.seconds(SCENE, options, RATE * seconds, folder)
 
 
 def recorded(options: list[str], folder: Path, seconds: int) -> float:
     """Processor time (s) of our loop."""
-    execute_plan.perf_counter, before = thread_time, execute_plan.perf_counter
-    try:
-        ended = simulate(SCENE, folder / "out", [*options, f"duration={seconds}"]).outcome
-    finally:
-        execute_plan.perf_counter = before
-    assert ended.fault is None
-    return ended.wall_time
+    given = [*options, f"duration={seconds}"]
+    return simulated(SCENE, folder / "out", given, clock=thread_time).outcome.wall_time
 
 
 def measure(rows: Rows, rounds: int, folder: Path) -> None:

@@ -8,20 +8,17 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import hapticlink.orchestrator
 from benchmarks import closed_loop, code_version, master_page, rings
+from benchmarks.page import Progress
 from benchmarks.peers.masters import MASTERS
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.base import temporary_folders
-
-Progress = Callable[[str, int, int], object]
 
 
 class Case(NamedTuple):
@@ -63,8 +60,8 @@ def measured(master: str, folder: Path) -> tuple[float, float, float]:
     return 1e6 * found["step"], found["start"], found["memory"]
 
 
-def bench(folder: Path, quick: bool, progress: Progress, command: str) -> None:
-    """Write README.md, the tables and a figure to `folder`."""
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes the tables and a figure to `folder`."""
     code_version.begin(folder, ROWS, hapticlink.orchestrator)
     cases, rounds = (QUICK, 1) if quick else (CASES, ROUNDS)
     rows = Rows(folder / ROWS[0], COLUMNS, 5)
@@ -83,5 +80,4 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> None:
                 rows.add(*case, master, turn, *measured(master, ring))
         progress("closed-loop", len(cases), len(cases) + 1)
         closed_loop.measure(whole, rounds, room)
-    on = f"{platform.machine()}, {os.cpu_count()} cores"
-    master_page.write(folder, [*rows.rows.values()], [*whole.rows.values()], command, on)
+    return master_page.page(folder, [*rows.rows.values()], [*whole.rows.values()], command)

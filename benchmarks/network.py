@@ -8,19 +8,19 @@ from __future__ import annotations
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import sleep
 from typing import Any, NamedTuple
 
-from matplotlib.figure import Figure
-
 import hapticlink as hl
+from benchmarks.page import Progress, table
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.tables import load
+from studies import draw
 
 SCENE, SECONDS, QUICK, SEED = "closed-loop", 8, 3, 1
 NAMES = ("one computer", "loopback", "5 ms", "20 +- 5 ms", "20 +- 5 ms, 5 % lost",
@@ -55,10 +55,8 @@ class Row(NamedTuple):
     error: Any
 
 
-def bench(
-    folder: Path, quick: bool, progress: Callable[[str, int, int], None], command: str
-) -> None:
-    """Write the page and its figure to `folder`."""
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes network.png to `folder`."""
     options = ["packaging=native", f"duration={QUICK if quick else SECONDS}"]
     rows = []
     with temporary_folders.room() as room, ExitStack() as stack:
@@ -80,9 +78,8 @@ def bench(
                     ends.enter_context(_process(relay, room / "relay.log"))
                     remote["graphics"] = between
                 rows.append(_row(room / str(i), options, remote, key))
-    folder.mkdir(parents=True, exist_ok=True)
-    _figure(rows).savefig(folder / "network.png", dpi=150)
-    (folder / "README.md").write_text("\n".join(_page(rows, options, command)))
+    _figure(folder, rows)
+    return "\n".join(_page(rows, options, command))
 
 
 def _row(out: Path, options: Sequence[str], remote: dict[str, str], key: Path) -> Row:
@@ -124,16 +121,14 @@ def _process(module: Sequence[str], log: Path) -> Iterator[None]:
             running.wait()
 
 
-def _figure(rows: Sequence[Row]) -> Any:
-    figure = Figure(figsize=(8, 4), layout="constrained")
-    axes = figure.subplots()
+def _figure(folder: Path, rows: Sequence[Row]) -> None:
+    figure, (axes,) = draw.panels(1, width=8, height=4)
     for i in (0, 3, 5, 7):
         axes.plot(*rows[i].error, label=NAMES[i], linewidth=0.9)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("handle from the operational point (mm)")
+    axes.set(xlabel="time (s)", ylabel="handle from the operational point (mm)")
     axes.set_ylim(bottom=0)
     figure.legend(loc="outside upper center", ncols=4)
-    return figure
+    draw.save(figure, folder, "network.png")
 
 
 def _page(rows: Sequence[Row], options: Sequence[str], command: str) -> Iterator[str]:
@@ -159,11 +154,13 @@ def _page(rows: Sequence[Row], options: Sequence[str], command: str) -> Iterator
         "works: [two computers](../../docs/two-computers.md)."
     )
     yield ""
-    heads = ("each way", "samples", "late", "at most (ms)", "sent again", "error RMS (mm)",
-             "largest (mm)", "energy (mJ)", "deadlines missed", "same again")  # fmt: skip
-    yield f"| {' | '.join(heads)} |"
-    yield "|---|" + "--:|" * (len(heads) - 1)
-    for name, row in zip(NAMES, rows, strict=True):
-        cells = [short(v) if isinstance(v, float) else str(v) for v in row[:-1]]
-        yield f"| {name} | {' | '.join(cells)} |"
+    heads = (
+        "each way | samples | late | at most (ms) | sent again | error RMS (mm) | "
+        "largest (mm) | energy (mJ) | deadlines missed | same again"
+    )
+    cells = (
+        (name, *(short(v) if isinstance(v, float) else v for v in row[:-1]))
+        for name, row in zip(NAMES, rows, strict=True)
+    )
+    yield from table(heads, "l" + "r" * 9, cells)
     yield ""

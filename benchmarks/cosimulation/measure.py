@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.continuous import GRID, Reference
 from benchmarks.cosimulation.points import Point
+from benchmarks.page import Progress
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
@@ -20,7 +21,6 @@ SETTINGS = tuple(f.name for f in fields(Point))
 COLUMNS = (*SETTINGS, "round", "run_s", "first_mm", "max_mm", "rms_mm", "end", "end_s")
 APART = 42.0
 """Error (mm, the length of a link) from which on a run counts as unstable."""
-Progress = Callable[[str, int, int], None]
 
 
 def errors(handle: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ import importlib
 import json
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks import mechanisms
 from benchmarks.mechanism import reference
 from benchmarks.our_mechanism import Ours
+from benchmarks.page import Progress
 from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.linkage import Linkage, Mechanism
@@ -36,6 +37,7 @@ EVALUATIONS = {
 COLUMNS = ("case", "code", "method", "rate", "round", "seconds", "x", "y")
 LOST = 0.1  # m; with a larger error the run has diverged
 SLOW = 3.0  # s; a run this long is not repeated
+MANY = 40  # bodies with which a step of a loop in Python takes 7 ms and more, and is left out
 NATIVE, MACHINE = "ours, C", "ours, CasADi VM"
 Run = Callable[[int], tuple[float, float, float]]
 
@@ -47,9 +49,8 @@ class Case:
     end: float
     rates: tuple[int, ...]
     exact: Callable[[], tuple[np.ndarray, float]]
+    settings: tuple[tuple[str, str], ...]
     wrench: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    settings: tuple[tuple[str, str], ...] = ()
-    skip: tuple[tuple[str, str], ...] = field(default=())
 
 
 PROJECTED = ("passive-midpoint",)
@@ -73,38 +74,15 @@ def cases(quick: bool) -> list[Case]:
     wrench = (-0.5, 0.0, -0.0025)
     bar = mechanisms.five_bar()
     start = Ours(bar, wrench, Mechanism(), 1 / 512)
-    found = [
-        Case(
-            "five-bar, 3 s",
-            bar,
-            3.0,
-            (128, 512, 2048) if quick else (128, 256, 512, 1024, 2048, 4096),
-            lambda: reference.tip(start, 3.0),
-            wrench,
-            ALL,
-        ),
-        Case(
-            "N-four-bar, N = 2, 10 s",
-            mechanisms.n_four_bar(2),
-            10.0,
-            (250, 1000) if quick else (125, 250, 500, 1000, 2000, 4000),
-            closed_form(2),
-            settings=ALL,
-        ),
-    ]
-    if not quick:
-        python_loop = ("Pinocchio", "rk4, projected (Python loop)")  # 7 ms a step
-        found.append(
-            Case(
-                "N-four-bar, N = 40, 10 s",
-                mechanisms.n_four_bar(40),
-                10.0,
-                (250, 500, 1000),
-                closed_form(40),
-                settings=FEW,
-                skip=(python_loop,),
-            )
-        )
+    exact = partial(reference.tip, start, 3.0)
+    rates: tuple[int, ...] = (128, 512, 2048) if quick else (128, 256, 512, 1024, 2048, 4096)
+    found = [Case("five-bar, 3 s", bar, 3.0, rates, exact, ALL, wrench)]
+    for N, rates, settings in (
+        (2, (250, 1000) if quick else (125, 250, 500, 1000, 2000, 4000), ALL),
+        *([] if quick else [(40, (250, 500, 1000), FEW)]),
+    ):
+        name, linkage = f"N-four-bar, N = {N}, 10 s", mechanisms.n_four_bar(N)
+        found.append(Case(name, linkage, 10.0, rates, closed_form(N), settings))
     return found
 
 
@@ -142,14 +120,12 @@ def tasks(
             yield MACHINE, ", ".join(chosen), rate, partial(machine, *chosen, rate)
         for peer in codes:
             for method in peer.METHODS:
-                if (peer.NAME, method) not in case.skip:
+                if "Python loop" not in method or len(case.linkage.body) < MANY:
                     arguments = case.linkage, np.array(case.wrench), q, qd, method, 1 / rate
                     yield peer.NAME, method, rate, partial(peer.prepare, *arguments)
 
 
-def measure(
-    out: Path, quick: bool, progress: Callable[[str, int, int], None]
-) -> tuple[dict[str, list[dict]], list[str]]:
+def measure(out: Path, quick: bool, progress: Progress) -> tuple[dict[str, list[dict]], list[str]]:
     """Run the cases that runs.csv lacks; returns the aggregated rows by case and the codes that are
     not installed."""
     rows = Rows(out / "runs.csv", COLUMNS, keys=5)

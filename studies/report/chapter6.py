@@ -10,7 +10,8 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.tables import Results
-from studies.report import draw, measures
+from studies import draw
+from studies.report import measures
 from studies.report.entry import Entry, Runs, command
 
 DIRECTIONS = "mechanism.directions=true"

@@ -9,7 +9,8 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.tables import Results
-from studies.report import draw, measures
+from studies import draw
+from studies.report import measures
 from studies.report.chapter6 import OFF, ON
 from studies.report.entry import Entry, Runs, command
 
