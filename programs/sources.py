@@ -19,10 +19,9 @@ from hapticlink.fmus.native.source import component_source, number, table
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.run.compiled import build as loop
-from hapticlink.programs.memory_regions import Regions
+from hapticlink.programs.memory_as_c import Regions, TypedData
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.programs.typed_data import TypedData
 
 HERE = Path(__file__).parent
 OWN = ("program.c", "changes.h", "latencies.h", "platform.c")

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import product
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from hapticlink.analysis.findings.user_port import NOTICEABLE_J, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import CONTINUOUS, DIRECT, MOBILITY, REFERENCE, mapped
 from studies.mismatch.figures import Panel, Point, lines, short
-from studies.mismatch.findings import COMPENSATION, Found, both
+from studies.mismatch.findings import COMPENSATION, Found, both, paragraph
 from studies.mismatch.measure import COUPLING, KICK, MARGIN, RUN, draw, stable
 from studies.mismatch.method_choice import energy, margin, within
 from studies.mismatch.methods import (
@@ -75,7 +74,7 @@ def _by_hold(
 
 
 def _text(text: str, figure: str, alt: str) -> str:
-    return f"{fill(text, 108, break_on_hyphens=False)}\n\n![{alt}]({figure})"
+    return f"{paragraph(text)}\n\n![{alt}]({figure})"
 
 
 def _gains(folder: Path, found: Found) -> Iterator[str]:
@@ -289,4 +288,4 @@ def _modelling(found: Found) -> str:
         f"{short(float(np.median(by['full'])))} mm with it (up to {short(worst[METRIC])}, "
         f"{worst['case']})."
     )
-    return fill(text, 108, break_on_hyphens=False)
+    return paragraph(text)
