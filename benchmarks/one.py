@@ -15,7 +15,7 @@ from time import process_time
 
 from benchmarks.page import Progress, table
 from benchmarks.timing import Row, made_anew, measured_scenes, simulated
-from hapticlink.fmus.check import initialize, session
+from hapticlink.fmus.check import session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import Experiment
@@ -64,8 +64,7 @@ def _stepped(path: Path, experiment: Experiment, ticks: int) -> float:
     step = ticks * _period(experiment)
     count = int(experiment.outcome.end_time / step + 1e-9)
     with session(path) as opened:
-        slave = opened.instance()
-        initialize(slave)
+        slave = opened.initialized()
         begin = process_time()
         for k in range(count):
             slave.doStep(k * step, step)

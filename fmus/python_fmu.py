@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 import platform
 import sys
-import uuid
 from collections.abc import Mapping
 from importlib.metadata import distribution
 from pathlib import Path
@@ -28,7 +27,7 @@ from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.fmus.reference_run import reference_run
-from hapticlink.fmus.reproducible_zip import digest
+from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.straight_line import program
 
 PYTHONFMU = Path(str(distribution("pythonfmu").locate_file("pythonfmu")))
@@ -105,7 +104,7 @@ def packed(
         **model_description.files(described_as, ""),
     }
     whole = digest(content)
-    module, guid = f"hapticlink_{whole[:16]}", f"{{{uuid.UUID(whole[:32])}}}"
+    module, guid = f"hapticlink_{whole[:16]}", guid_of(whole)
     files |= {
         **model_description.files(described_as, guid),
         "resources/component.json": json.dumps(about | {"digest": whole, "guid": guid}).encode(),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
-import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from hapticlink.fmus.native.compiler import (
     host_platform,
 )
 from hapticlink.fmus.native.fmi3_interface import fmi3_sources
-from hapticlink.fmus.reproducible_zip import digest
+from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault
@@ -120,7 +119,7 @@ def program_files(
     content = {f"sources/{name}": text.encode() for name, text in texts.items()} | resources
     content |= documentation(scene, variables, pictures())
     whole = digest(content | model_description.files(about, "", fmi, compiled))
-    guid = f"{{{uuid.UUID(whole[:32])}}}"
+    guid = guid_of(whole)
     content["sources/scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["sources/scene.h"]
     return content | model_description.files(about, guid, fmi, compiled)
 

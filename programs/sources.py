@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import json
 import re
-import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from hapticlink.components.component import Component
+from hapticlink.fmus.cache import sha
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
 from hapticlink.fmus.native.native_fmu import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number, table
+from hapticlink.fmus.reproducible_zip import guid_of
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.run.compiled import build as loop
@@ -62,7 +62,7 @@ def _member(id_: str, component: Component) -> tuple[str, dict[str, str]]:
     """The GUID of a block, and its files: fmi2.c with the component's functions, all names that the
     linker sees with the block's prefix."""
     header, pieces = component_source(component)
-    guid = f"{{{uuid.UUID(hashlib.sha256(header.encode()).hexdigest()[:32])}}}"
+    guid = guid_of(sha(header))
     prefix = f"#undef fmi2FullName\n#define fmi2FullName(name) {id_}_ ## name\n"
     own = f'{prefix}#define GUID "{guid}"\n{header}'
     text = WRAPPER.read_text().replace('#include "component.h"', own)

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.cosimulation.front import Measured, front
-from benchmarks.cosimulation.measure import APART
+from benchmarks.cosimulation.measure import APART, Measured, front
 from benchmarks.cosimulation.points import ITERATED, NONE
 from studies import draw
 

@@ -10,8 +10,7 @@ from textwrap import fill
 
 from benchmarks.continuous import GRID, Reference
 from benchmarks.cosimulation import figure
-from benchmarks.cosimulation.front import Measured, front, measured
-from benchmarks.cosimulation.measure import APART
+from benchmarks.cosimulation.measure import APART, Measured, front, measured
 from benchmarks.cosimulation.points import CONTACT, ITERATED, LOOP, NONE, STUDY, Point
 from benchmarks.page import table
 from benchmarks.rows import Rows, quartiles

@@ -1,6 +1,11 @@
 """Compiles C to a shared library, for this machine or another one, with the package `ziglang`.
 
 The same source, platform and version of ziglang give the same bytes on every machine.
+
+zig keeps the C library that it builds for each target, which linking needs, in a cache. A second
+zig that starts within a tenth of a second of a first one with the same cache waits for a lock until
+the first one has compiled, and two that find no library build it both. So each target has a cache,
+which one zig uses at a time to link; compiling needs no cache.
 """
 
 from __future__ import annotations
@@ -13,14 +18,14 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import fmpy
 
+from hapticlink.fmus import cache, lock
 from hapticlink.fmus.errors import CompilerError, FmuError
-from hapticlink.fmus.native.compiler_cache import CHOICE, linker_cache
 from hapticlink.fmus.native.linking import system_libraries
 from hapticlink.fmus.versions import install_command, version
 
@@ -52,6 +57,8 @@ LINK = ("-shared", "-s")
 WEBASSEMBLY = "wasm32-wasi"
 WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
 _ZIG = (sys.executable, "-m", "ziglang")
+ZIG_CACHE = "ZIG_GLOBAL_CACHE_DIR"
+"""zig's own environment variable: a folder that the user has chosen is used as it is."""
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 FMI2_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 
@@ -187,15 +194,34 @@ def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
     command = [*_ZIG, "cc", "-target", target, *flags, f"-I{HEADERS}", *arguments]
     with tempfile.TemporaryDirectory(dir=folder) as local:
         # zig keeps its own C library in its cache, but not our code.
-        compiles = nullcontext({CHOICE: local}) if "-c" in command else linker_cache(target)
-        with compiles as cache:
-            environment = {**os.environ, **cache, "ZIG_LOCAL_CACHE_DIR": local}
+        compiles = nullcontext({ZIG_CACHE: local}) if "-c" in command else linker_cache(target)
+        with compiles as chosen:
+            environment = {**os.environ, **chosen, "ZIG_LOCAL_CACHE_DIR": local}
             done = subprocess.run(
                 command, cwd=folder, env=environment, capture_output=True, text=True, check=False
             )
     if done.returncode:
         name = Path(command[-1]).name
         raise CompilerError(f"{name} does not compile for {target}:\n{done.stderr.strip()}")
+
+
+@contextmanager
+def linker_cache(target: str) -> Iterator[dict[str, str]]:
+    """The environment variables to link for a target; none where no cache can be written."""
+    root = cache.user_folder() / "zig"
+    if ZIG_CACHE not in os.environ and _writable(root):
+        with lock.held(root / f"{target}.lock", lambda: None):
+            yield {ZIG_CACHE: str(root / target)}
+    else:
+        yield {}
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
 
 
 _CPU = {0x01000007: 3, 0x0100000C: 0}  # x86-64 and ARM64, with the subtype "all" of each

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
@@ -27,7 +26,7 @@ from hapticlink.fmus.native.linking import WINDOWS
 from hapticlink.fmus.native.source import component_source
 from hapticlink.fmus.python_fmu import check_functions
 from hapticlink.fmus.reference_run import reference_run
-from hapticlink.fmus.reproducible_zip import digest
+from hapticlink.fmus.reproducible_zip import digest, guid_of
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
 COMMON = Path(__file__).parent / "fmi2_common.h"
@@ -66,7 +65,7 @@ def entries(
         "compiler": json.dumps(made_by).encode(),
         **model_description.files(about, "", fmi),
     }
-    guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
+    guid = guid_of(digest(content))
     own["component.h"] = f'#define GUID "{guid}"\n'.encode() + content["component.h"]
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
