@@ -23,19 +23,17 @@ from hapticlink.orchestrator.results.tables import load
 from studies import draw
 
 SCENE, SECONDS, QUICK, SEED = "closed-loop", 8, 3, 1
-NAMES = ("one computer", "loopback", "5 ms", "20 +- 5 ms", "20 +- 5 ms, 5 % lost",
-         "60 +- 20 ms", "60 +- 20 ms, 5 % lost", "5 ms, a cut of 2 s")  # fmt: skip
-NETWORKS: tuple[tuple[float, ...] | None, ...] = (
-    None,
-    (0, 0, 0, SEED, -1),
-    (0.005, 0, 0, SEED, -1),
-    (0.015, 0.01, 0, SEED, -1),
-    (0.015, 0.01, 0.05, SEED, -1),
-    (0.04, 0.04, 0, SEED, -1),
-    (0.04, 0.04, 0.05, SEED, -1),
-    (0.005, 0, 0, SEED, 2),
-)
-"""Least delay, spread (s) and loss of each way, seed, and when the network is cut (s)."""
+NETWORKS: dict[str, tuple[float, float, float, float] | None] = {
+    "one computer": None,
+    "loopback": (0, 0, 0, -1),
+    "5 ms": (0.005, 0, 0, -1),
+    "20 +- 5 ms": (0.015, 0.01, 0, -1),
+    "20 +- 5 ms, 5 % lost": (0.015, 0.01, 0.05, -1),
+    "60 +- 20 ms": (0.04, 0.04, 0, -1),
+    "60 +- 20 ms, 5 % lost": (0.04, 0.04, 0.05, -1),
+    "5 ms, a cut of 2 s": (0.005, 0, 0, 2),
+}
+"""Least delay, spread (s) and loss of each way, and when the network is cut (s)."""
 
 
 class Row(NamedTuple):
@@ -67,13 +65,14 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
         stack.enter_context(_process(["hapticlink", *arguments], log))
         while "serves at" not in log.read_text():
             sleep(0.1)
-        for i, (name, network) in enumerate(zip(NAMES, NETWORKS, strict=True)):
-            progress(name, i, len(NAMES))
+        for i, (name, network) in enumerate(NETWORKS.items()):
+            progress(name, i, len(NETWORKS))
             with ExitStack() as ends:
                 remote = {}
                 if network:
                     between = _free()
-                    asked = [between, at, str(key), *map(str, network)]
+                    *spread, cut = map(str, network)
+                    asked = [between, at, str(key), *spread, str(SEED), cut]
                     relay = ["benchmarks.network_relay", *asked]
                     ends.enter_context(_process(relay, room / "relay.log"))
                     remote["graphics"] = between
@@ -124,7 +123,7 @@ def _process(module: Sequence[str], log: Path) -> Iterator[None]:
 def _figure(folder: Path, rows: Sequence[Row]) -> None:
     figure, (axes,) = draw.panels(1, width=8, height=4)
     for i in (0, 3, 5, 7):
-        axes.plot(*rows[i].error, label=NAMES[i], linewidth=0.9)
+        axes.plot(*rows[i].error, label=[*NETWORKS][i], linewidth=0.9)
     axes.set(xlabel="time (s)", ylabel="handle from the operational point (mm)")
     axes.set_ylim(bottom=0)
     figure.legend(loc="outside upper center", ncols=4)
@@ -160,7 +159,7 @@ def _page(rows: Sequence[Row], options: Sequence[str], command: str) -> Iterator
     )
     cells = (
         (name, *(short(v) if isinstance(v, float) else v for v in row[:-1]))
-        for name, row in zip(NAMES, rows, strict=True)
+        for name, row in zip(NETWORKS, rows, strict=True)
     )
     yield from table(heads, "l" + "r" * 9, cells)
     yield ""
