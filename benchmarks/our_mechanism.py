@@ -76,13 +76,14 @@ class Ours:
     def virtual_machine(self) -> Callable[[int], tuple[float, float, float]]:
         """As a Python FMU: (steps) -> x and y (m) of the operational point, and the time (s) that
         they took from the start on."""
-        t, h = np.zeros(1), np.array([self.h])
+        x, after = np.zeros_like(self.start), np.zeros_like(self.start)
+        given = (x, self.u, self.p, np.zeros(1), np.array([self.h]))
+        buffer, trigger = in_place(self.component.step, given, after)
 
-        def advance(x: np.ndarray, steps: int) -> np.ndarray:
-            after = np.zeros_like(x)
-            _buffer, trigger = in_place(self.component.step, (x, self.u, self.p, t, h), after)
+        def advance(start: np.ndarray, steps: int, kept: Any = buffer) -> np.ndarray:
+            x[:] = start
             for k in range(steps):
-                t[0] = k * self.h
+                given[3][0] = k * self.h
                 trigger()
                 x[:] = after
             return x
