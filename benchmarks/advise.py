@@ -9,13 +9,14 @@ keep the limits in all of them.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
 
 import numpy as np
 
+from benchmarks.page import Progress, table
 from hapticlink.analysis.advise.advise_method import (
     Advice,
     Method,
@@ -61,16 +62,15 @@ class Judged:
         return self.ratio <= NEAR
 
     @property
-    def line(self) -> str:
-        """The row of the table."""
+    def row(self) -> tuple[object, ...]:
+        """Of the table."""
         taken = self.advice.taken
         limits = f" (keeps the limits in {taken.within} of {len(taken.error_mm)})"
         note = "" if taken.admitted else limits
-        return (
-            f"| {self.seed} | {self.scene} | {taken.method.name}{note} | {self.kept} of {DRAWS} | "
-            f"{self.best.name if self.best else f'none ({self.most} of {DRAWS} at most)'} | "
-            f"{short(self.ratio) if self.best else '-'} |"
-        )
+        best = self.best.name if self.best else f"none ({self.most} of {DRAWS} at most)"
+        ratio = short(self.ratio) if self.best else "-"
+        advised = f"{taken.method.name}{note}"
+        return self.seed, self.scene, advised, f"{self.kept} of {DRAWS}", best, ratio
 
 
 def judged(seed: int, folder: Path, processes: int) -> Judged:
@@ -98,7 +98,6 @@ def _error(rows: Sequence[Row]) -> float:
 
 
 def page(found: Sequence[Judged], command: str) -> Iterator[str]:
-    """The lines of README.md."""
     known = [one for one in found if one.best]
     yield "# What `hapticlink advise` is worth on scenes kept apart\n"
     yield fill(
@@ -118,17 +117,14 @@ def page(found: Sequence[Judged], command: str) -> Iterator[str]:
         WIDTH,
     )
     yield ""
-    yield "| seed | scene | advised | within the limits | best | error relative to the best |"
-    yield "|---" * 6 + "|"
-    yield from (one.line for one in found)
+    heads = "seed | scene | advised | within the limits | best | error relative to the best"
+    yield from table(heads, "llllll", (one.row for one in found))
 
 
-def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> None:
-    """Write README.md to `out`."""
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
     count = 2 if quick else COUNT
     found = []
     for i in range(count):
         progress(f"scene {i + 1}", i, count)
         found.append(judged(FIRST + i, Path("sweeps/advise"), os.cpu_count() or 1))
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "README.md").write_text("\n".join(page(found, command)) + "\n", encoding="utf-8")
+    return "\n".join(page(found, command)) + "\n"

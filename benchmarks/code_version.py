@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Iterator, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 
@@ -17,22 +16,13 @@ import hapticlink.fmus.native
 import hapticlink.orchestrator
 import hapticlink.programs
 from hapticlink.fmus.cache import sources
+from hapticlink.fmus.versions import installed
 
 PACKAGES = (
     "hapticlink", "casadi", "ziglang", "numpy", "scipy", "mujoco", "pin", "exudyn", "fmpy",
     "pythonfmu", "libcosimpy", "ecospy",
 )  # fmt: skip
-
-
-def versions() -> dict[str, str]:
-    """Of the packages that take part, those that are installed."""
-    found = {}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
+"""Those that take part, of which some need not be installed."""
 
 
 def begin(out: Path, rows: tuple[str, ...], *further: ModuleType) -> None:
@@ -40,11 +30,10 @@ def begin(out: Path, rows: tuple[str, ...], *further: ModuleType) -> None:
     `further` among them, and versions."""
     path = out / "state.json"
     made_by = sources(hapticlink.components, hapticlink.fmus.native, benchmarks, *further)
-    now = {"sources": made_by, "versions": versions()}
+    now = {"sources": made_by, "versions": installed(PACKAGES)}
     if not path.exists() or json.loads(path.read_text()) != now:
         for name in rows:
             (out / name).unlink(missing_ok=True)
-        out.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(now, indent=1) + "\n")
 
 
@@ -63,16 +52,9 @@ def sign(results: Path, what: str, page: Path) -> None:
         (*git, "describe", "--always"), capture_output=True, text=True, check=False
     )
     commit = named.stdout.strip()
-    own = (
-        *git,
-        "diff",
-        "--quiet",
-        "HEAD",
-        "--",
-        ":/",
-        ":!/results",
-    )  # where pages are just written
-    if commit and subprocess.run(own, check=False).returncode:
+    places = (":/", ":!/results")  # where pages are just written
+    changed = subprocess.run((*git, "diff", "--quiet", "HEAD", "--", *places), check=False)
+    if commit and changed.returncode:
         commit += "-dirty"
     path = results / MADE_FROM
     record = json.loads(path.read_text()) if path.exists() else {}

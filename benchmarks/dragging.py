@@ -14,6 +14,8 @@ import math
 import shutil
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 EVERY = 1 / 60  # s, of a mouse that moves
@@ -62,6 +64,17 @@ JUDGED = """([selector, value]) => new Promise((resolve) => {
 """Sets a control, and returns the times (s) until there is a verdict, so far and of all hands."""
 
 
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A headless browser of the machine's own."""
+    from playwright.sync_api import sync_playwright
+
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    with sync_playwright() as started:
+        flags = ["--no-sandbox", "--disable-gpu"]
+        yield started.chromium.launch(executable_path=path, args=flags)
+
+
 def dragged(page: Any, seconds: float) -> dict[str, Any]:
     """Drag around a circle."""
     page.wait_for_function("() => view.frame && view.stage.limits && view.frame.t > 1.0")
@@ -81,18 +94,11 @@ def dragged(page: Any, seconds: float) -> dict[str, Any]:
 
 
 def main() -> None:
-    from playwright.sync_api import sync_playwright
-
     url, seconds = sys.argv[1:]
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    with sync_playwright() as started:
-        browser = started.chromium.launch(
-            executable_path=chromium, args=["--no-sandbox", "--disable-gpu"]
-        )
+    with chromium() as browser:
         page = browser.new_page(viewport={"width": 1280, "height": 800}, bypass_csp=True)
         page.goto(url)
         json.dump(dragged(page, float(seconds)), sys.stdout)
-        browser.close()
 
 
 if __name__ == "__main__":

@@ -9,17 +9,17 @@ port, and how the run ends.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import hapticlink as hl
+from benchmarks.page import Progress, table
 from hapticlink.orchestrator.base import temporary_folders
+from studies import draw
 
-Progress = Callable[[str, int, int], None]
 SCENES = ("closed-loop", "two-users", "serial")
 RATES = (10, 30, 60)
 COPIES = {
@@ -29,7 +29,6 @@ COPIES = {
     "MuJoCo, pulled": ("operational", True),
 }
 CONTACTS = ("enclosure", "push-disc")
-MOVED = ("disc", "block")
 DURATION = 1.0
 """Of the copies' runs (s)."""
 
@@ -44,7 +43,10 @@ class Ran:
     energy: float | None
     end: str
     moved: dict[str, float]
-    run_time: float
+
+    @property
+    def energy_mj(self) -> str:
+        return "-" if self.energy is None else f"{self.energy * 1e3:.3g} mJ"
 
     def off(self, other: Ran) -> float:
         """Largest distance (mm) from another run at the instants of both."""
@@ -57,19 +59,19 @@ class Ran:
 def ran(scene: str, options: list[str], block: str | None, folder: Path) -> Ran:
     swap = [f'fmu.+={{replaces="{block}", engine="mujoco"}}'] if block else []
     found = hl.run(scene, [*options, *swap], out=folder)
-    table, end = found.haptics, found.run["end"]
+    rows, end = found.haptics, found.run["end"]
     linkage = hl.scene(scene).linkage
     assert linkage is not None
     moved, at = {}, 1
     for joint in linkage.joint:
         if joint.type == "free":
-            way = np.column_stack([table[f"virtual_mechanism.q[{at + i}]"] for i in (0, 1)])
+            way = np.column_stack([rows[f"virtual_mechanism.q[{at + i}]"] for i in (0, 1)])
             moved[joint.child] = float(np.linalg.norm(way - way[0], axis=1).max() * 1e3)
         at += 3 if joint.type == "free" else 1
-    path = np.column_stack([table[f"virtual_mechanism.x[{i}]"] for i in (1, 2)])
+    path = np.column_stack([rows[f"virtual_mechanism.x[{i}]"] for i in (1, 2)])
     energy = port.peak if (port := found.measures().port) else None
     why = "ended" if end["reason"] == "duration" else f"{end['reason']} at {end['time']:.2g} s"
-    return Ran(table["time"], path, energy, why, moved, found.run["timings"]["run"])
+    return Ran(rows["time"], path, energy, why, moved)
 
 
 def copies(
@@ -107,21 +109,21 @@ def touching(quick: bool, progress: Progress, room: Path) -> dict[tuple[str, int
 
 
 def copies_table(found: dict[tuple[str, int, str], tuple[float, Ran]]) -> Iterator[str]:
-    yield "| scene | graphics | copy | distance | energy at the port | end |"
-    yield "|---|---|---|---|---|---|"
-    for (scene, rate, name), (off, run) in found.items():
-        energy = "-" if run.energy is None else f"{run.energy * 1e3:.3g} mJ"
-        yield f"| {scene} | {rate} Hz | {name} | {off:.3g} mm | {energy} | {run.end} |"
+    rows = (
+        (scene, f"{rate} Hz", name, f"{off:.3g} mm", run.energy_mj, run.end)
+        for (scene, rate, name), (off, run) in found.items()
+    )
+    return table("scene | graphics | copy | distance | energy at the port | end", "l" * 6, rows)
 
 
 def contact_table(found: dict[tuple[str, int, str], Ran]) -> Iterator[str]:
-    yield "| scene | haptics | mechanism | from ours | objects moved | energy at the port | end |"
-    yield "|---|---|---|---|---|---|---|"
+    heads = "scene | haptics | mechanism | from ours | objects moved | energy at the port | end"
+    rows = []
     for (scene, rate, name), run in found.items():
         off = f"{run.off(found[scene, rate, 'ours']):.3g} mm"
         moved = ", ".join(f"{body} {way:.1f} mm" for body, way in run.moved.items()) or "-"
-        energy = "-" if run.energy is None else f"{run.energy * 1e3:.3g} mJ"
-        yield f"| {scene} | {rate} Hz | {name} | {off} | {moved} | {energy} | {run.end} |"
+        rows.append((scene, f"{rate} Hz", name, off, moved, run.energy_mj, run.end))
+    return table(heads, "l" * 7, rows)
 
 
 def spread(values: list[float]) -> str:
@@ -130,11 +132,9 @@ def spread(values: list[float]) -> str:
 
 def finding(found: dict[tuple[str, int, str], tuple[float, Ran]]) -> str:
     by = {c: [off for (_, _, name), (off, _) in found.items() if name == c] for c in COPIES}
-    same = max(
-        abs(found[s, r, "MuJoCo, placed"][0] - found[s, r, "ours, placed"][0]) for s, r, _ in found
-    )
-    apart = max(
-        abs(found[s, r, "MuJoCo, pulled"][0] - found[s, r, "ours, pulled"][0]) for s, r, _ in found
+    same, apart = (
+        max(abs(a - b) for a, b in zip(by[f"MuJoCo, {how}"], by[f"ours, {how}"], strict=True))
+        for how in ("placed", "pulled")
     )
     ends = [run.end for (_, _, name), (_, run) in found.items() if name == "MuJoCo, pulled"]
     return (
@@ -147,11 +147,10 @@ def finding(found: dict[tuple[str, int, str], tuple[float, Ran]]) -> str:
     )
 
 
-def figure(path: Path, found: dict[tuple[str, int, str], tuple[float, Ran]]) -> None:
+def figure(folder: Path, found: dict[tuple[str, int, str], tuple[float, Ran]]) -> None:
     """The distance by rate, one panel a scene."""
     scenes = list(dict.fromkeys(scene for scene, _, _ in found))
-    drawn = Figure(figsize=(3.4 * len(scenes) + 1, 3.8), layout="constrained")
-    panels = np.atleast_1d(drawn.subplots(1, len(scenes), sharey=True))
+    drawn, panels = draw.panels(len(scenes), width=3.7, sharey=True)
     marks = dict(zip(COPIES, ("o-", "x--", "s-", "+--"), strict=True))
     for axes, scene in zip(panels, scenes, strict=True):
         for name, mark in marks.items():
@@ -161,18 +160,18 @@ def figure(path: Path, found: dict[tuple[str, int, str], tuple[float, Ran]]) -> 
         axes.set_xticks(rates, [str(rate) for rate in rates])
         axes.minorticks_off()
         axes.set(xlabel="graphics rate (Hz)", title=scene)
-        axes.grid(alpha=0.3)
     panels[0].set_ylabel("distance from graphics at the haptic rate (mm)")
     panels[0].legend(fontsize="small")
     drawn.suptitle("The rate and the way a copy follows decide the error, not who computes it")
-    drawn.savefig(path, dpi=110, metadata={"Software": None})
+    draw.save(drawn, folder, "error.png")
 
 
-def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
-    """Write README.md and error.png to `out`."""
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes error.png to `out`."""
     with temporary_folders.room() as folder:
         found = copies(quick, progress, Path(folder))
         touched = touching(quick, progress, Path(folder))
+    figure(out, found)
     page = [
         "# A physics engine in the place of our blocks\n",
         finding(found) + "\n",
@@ -189,6 +188,4 @@ def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
         "the run with our mechanism.\n",
         *contact_table(touched),
     ]
-    out.mkdir(parents=True, exist_ok=True)
-    figure(out / "error.png", found)
-    (out / "README.md").write_text("\n".join(page) + "\n", encoding="utf-8")
+    return "\n".join(page) + "\n"

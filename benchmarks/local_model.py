@@ -7,20 +7,21 @@ of 2000 steps.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from benchmarks import mechanisms
 from benchmarks.our_mechanism import in_place
+from benchmarks.page import Progress, table
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
 from hapticlink.components.specs.linkage import Mechanism
-from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
+from studies import draw
 
 STEP = 1 / 512
 HELD = ("local_model=true", "mechanism.stabilization=baumgarte")
@@ -42,10 +43,8 @@ def microseconds(block: Component) -> float:
 
 
 def costs() -> Iterator[str]:
-    linkage = open_scene.load("five-bar").linkage
-    assert linkage is not None
-    yield "| matrices | integrator | stabilisation | instructions | us a step |"
-    yield "|---|---|---|---|---|"
+    linkage = mechanisms.five_bar()
+    rows = []
     for name, frame, stabilization in (
         ("own", None, "projection"),
         ("own", None, "baumgarte"),
@@ -54,10 +53,10 @@ def costs() -> Iterator[str]:
         for integrator in ("semi-implicit-euler", "rk4"):
             spec = Mechanism(integrator=integrator, stabilization=stabilization)  # type: ignore[arg-type]
             block = virtual_mechanism(linkage, spec, step_s=STEP, frame_s=frame)
-            yield (
-                f"| {name} | {integrator} | {stabilization} | {block.step.n_instructions()} "
-                f"| {microseconds(block):.1f} |"
-            )
+            spent = f"{microseconds(block):.1f}"
+            rows.append((name, integrator, stabilization, block.step.n_instructions(), spent))
+    heads = "matrices | integrator | stabilisation | instructions | us a step"
+    return table(heads, "lllll", rows)
 
 
 def tip(folder: Path, *options: str) -> tuple[np.ndarray, float]:
@@ -67,9 +66,10 @@ def tip(folder: Path, *options: str) -> tuple[np.ndarray, float]:
     return way, float(found["virtual_mechanism.closure_error"].max())
 
 
-def gaps(
-    rates: tuple[int, ...], progress: Callable[[str, int, int], None]
-) -> dict[tuple[str, int], tuple[np.ndarray, float]]:
+Gaps = dict[tuple[str, int], tuple[np.ndarray, float]]
+
+
+def gaps(rates: tuple[int, ...], progress: Progress) -> Gaps:
     """By integrator and rate of the frames: the distance (mm) of the operational point from that of
     the mechanism with its own matrices at each tick of 1 s, and the largest gap of the loop (m)."""
     cases = [(i, r) for i in ("semi-implicit-euler", "rk4") for r in rates]
@@ -85,20 +85,18 @@ def gaps(
     return found
 
 
-def errors(found: dict[tuple[str, int], tuple[np.ndarray, float]]) -> Iterator[str]:
-    yield "| integrator | frames | .25 s | .5 s | 1 s | closure, 1 s |"
-    yield "|---|---|---|---|---|---|"
+def errors(found: Gaps) -> Iterator[str]:
+    rows = []
     for (integrator, rate), (gap, opened) in found.items():
         ticks = [round(t * 512) for t in (0.25, 0.5, 1.0)]
         at = [f"{gap[: k + 1].max():.3g} mm" if k < len(gap) else "diverged" for k in ticks]
-        shown = " | ".join([*at, f"{opened * 1e3:.3g} mm"])
-        yield f"| {integrator} | {rate} Hz | {shown} |"
+        rows.append((integrator, f"{rate} Hz", *at, f"{opened * 1e3:.3g} mm"))
+    return table("integrator | frames | .25 s | .5 s | 1 s | closure, 1 s", "llllll", rows)
 
 
-def figure(path: Path, found: dict[tuple[str, int], tuple[np.ndarray, float]]) -> None:
+def figure(folder: Path, found: Gaps) -> None:
     """The distance over time, by rate, with semi-implicit Euler."""
-    drawn = Figure(figsize=(6.4, 3.8), layout="constrained")
-    axes = drawn.add_subplot()
+    drawn, (axes,) = draw.panels(1, width=6.4)
     for (integrator, rate), (gap, _) in found.items():
         if integrator == "semi-implicit-euler":
             axes.semilogy(np.arange(1, len(gap)) / 512, gap[1:], label=f"frames at {rate} Hz")
@@ -107,17 +105,17 @@ def figure(path: Path, found: dict[tuple[str, int], tuple[np.ndarray, float]]) -
         "From 30 Hz on the error is that of the Coriolis terms, which are left out",
         fontsize="medium", wrap=True,
     )  # fmt: skip
-    axes.grid(alpha=0.3)
     axes.legend(fontsize="small")
-    drawn.savefig(path, dpi=110, metadata={"Software": None})
+    draw.save(drawn, folder, "error.png")
 
 
-def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> None:
-    """Write README.md and error.png to `out`."""
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes error.png to `out`."""
     progress("local model: cost of a step", 0, 1)
     cost, found = list(costs()), gaps((30, 60) if quick else (10, 30, 60, 512), progress)
     ends = [gap[512] for gap, _ in found.values() if len(gap) > 512]
     lost = sorted({f"{rate} Hz" for (_, rate), (gap, _) in found.items() if len(gap) <= 512})
+    figure(out, found)
     page = [
         "# The local model of interaction\n",
         "With matrices held from the graphics rate the operational point is "
@@ -135,6 +133,4 @@ def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], com
         "\n## Cost of a step at 512 Hz\n",
         *cost,
     ]
-    out.mkdir(parents=True, exist_ok=True)
-    figure(out / "error.png", found)
-    (out / "README.md").write_text("\n".join(page) + "\n", encoding="utf-8")
+    return "\n".join(page) + "\n"

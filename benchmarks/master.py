@@ -1,27 +1,28 @@
 """Masters side by side: what a macro step of a ring of FMUs costs beside the FMUs themselves.
 
 A ring of n FMUs that pass on their inputs, y = u/2 + 1, each with k reals: FMUs in C, Python FMUs
-of this project and of pythonfmu. Each master runs each ring in a process of its own, by turns.
+of this project and of pythonfmu. Each master runs each ring in a process of its own, by turns. And
+what a haptic tick of the closed loop costs, beside a loop in C over the same FMUs.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import platform
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
+from time import thread_time
 from typing import NamedTuple
 
 import hapticlink.orchestrator
-from benchmarks import closed_loop, code_version, master_page, rings
+from benchmarks import code_version, master_page, rings
+from benchmarks.page import Progress
+from benchmarks.peers import bare_loop
 from benchmarks.peers.masters import MASTERS
 from benchmarks.rows import Rows
+from benchmarks.timing import simulated
 from hapticlink.orchestrator.base import temporary_folders
-
-Progress = Callable[[str, int, int], object]
 
 
 class Case(NamedTuple):
@@ -45,6 +46,10 @@ LIMIT = 600
 """Seconds after which a master is stopped."""
 COLUMNS = ("packaging", "fmus", "signals", "master", "round", "step_us", "start_s", "memory_mb")
 ROWS = ("rows.csv", "closed-loop.csv")
+SCENE, RATE = "closed-loop", 512
+DURATIONS = (3, 15)
+"""Of two runs (s); their difference leaves out what each run costs once."""
+TICK_COLUMNS = ("packaging", "loop", "round", "tick_us")
 
 
 def measured(master: str, folder: Path) -> tuple[float, float, float]:
@@ -63,12 +68,36 @@ def measured(master: str, folder: Path) -> tuple[float, float, float]:
     return 1e6 * found["step"], found["start"], found["memory"]
 
 
-def bench(folder: Path, quick: bool, progress: Progress, command: str) -> None:
-    """Write README.md, the tables and a figure to `folder`."""
+def alone(options: list[str], folder: Path, seconds: int) -> float:
+    """Processor time (s) of the loop in C."""
+    return bare_loop.seconds(SCENE, options, RATE * seconds, folder)
+
+
+def recorded(options: list[str], folder: Path, seconds: int) -> float:
+    """Processor time (s) of our loop."""
+    given = [*options, f"duration={seconds}"]
+    return simulated(SCENE, folder / "out", given, clock=thread_time).outcome.wall_time
+
+
+def ticks(rows: Rows, rounds: int, folder: Path) -> None:
+    """Add the microseconds of processor time per tick, of both loops by turns."""
+    for packaging in ("native", "python"):
+        fixed = [f"packaging={packaging}", "stop_when=''"]
+        loops = {"C loop": alone, "hapticlink": recorded}
+        for turn in range(rounds):
+            for name, run in loops.items():
+                if (packaging, name, turn) not in rows:
+                    short, long = (min(run(fixed, folder, s) for _ in range(3)) for s in DURATIONS)
+                    ticks = RATE * (DURATIONS[1] - DURATIONS[0])
+                    rows.add(packaging, name, turn, 1e6 * (long - short) / ticks)
+
+
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes the tables and a figure to `folder`."""
     code_version.begin(folder, ROWS, hapticlink.orchestrator)
     cases, rounds = (QUICK, 1) if quick else (CASES, ROUNDS)
     rows = Rows(folder / ROWS[0], COLUMNS, 5)
-    whole = Rows(folder / ROWS[1], closed_loop.COLUMNS, 3)
+    whole = Rows(folder / ROWS[1], TICK_COLUMNS, 3)
     with temporary_folders.room() as room:
         for i, case in enumerate(cases):
             ring = Path(room, "-".join(map(str, case)))
@@ -82,6 +111,5 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> None:
                     rings.make(*case, ring)
                 rows.add(*case, master, turn, *measured(master, ring))
         progress("closed-loop", len(cases), len(cases) + 1)
-        closed_loop.measure(whole, rounds, room)
-    on = f"{platform.machine()}, {os.cpu_count()} cores"
-    master_page.write(folder, [*rows.rows.values()], [*whole.rows.values()], command, on)
+        ticks(whole, rounds, room)
+    return master_page.page(folder, [*rows.rows.values()], [*whole.rows.values()], command)

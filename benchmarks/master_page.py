@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import os
+import platform
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
+from benchmarks.page import table
 from benchmarks.peers.masters import MASTERS
+from studies import draw
 
 OURS, ALONE, PEERS = "hapticlink", "C loop", ("Ecos", "libcosim", "ctypes", "FMPy")
 TITLES = {
@@ -53,20 +52,18 @@ def finding(times: Best, packaging: str) -> str:
     return ", ".join(filter(None, (share(times, packaging, peer) for peer in PEERS)))
 
 
-def table(values: Best, packaging: str, digits: str = ".3g") -> list[str]:
+def by_master(values: Best, packaging: str, digits: str = ".3g") -> Iterator[str]:
     names = [m for m in MASTERS if any(m in row for row in values.values())]
-    lines = [f"| FMUs | reals of each | {' | '.join(names)} |", "|--:|--:|" + "--:|" * len(names)]
-    for (of, n, k), row in sorted(values.items()):
-        if of == packaging:
-            cells = (format(row[m], digits) if m in row else "-" for m in names)
-            lines.append(f"| {n} | {k} | {' | '.join(cells)} |")
-    return lines
+    rows = (
+        (n, k, *(format(row[m], digits) if m in row else "-" for m in names))
+        for (of, n, k), row in sorted(values.items())
+        if of == packaging
+    )
+    return table(f"FMUs | reals of each | {' | '.join(names)}", "rr" + "r" * len(names), rows)
 
 
-def write(
-    folder: Path, rows: Sequence[Row], whole: Sequence[Row], command: str, machine: str
-) -> None:
-    """Write README.md and masters.png."""
+def page(folder: Path, rows: Sequence[Row], whole: Sequence[Row], command: str) -> str:
+    """Writes masters.png."""
     times, starts, memory = (best(rows, c) for c in ("step_us", "start_s", "memory_mb"))
     kinds = [kind for kind in TITLES if any(case[0] == kind for case in times)]
     by_kind = "; ".join(f"{TITLES[kind]}: {finding(times, kind)}" for kind in kinds)
@@ -82,41 +79,35 @@ def write(
         "over the FMUs' functions with all arguments made before, `C loop` the same in C: what the",
         "FMUs cost themselves. Each master runs each ring in processes of its own, whose processor",
         "time is measured; the least of its rounds counts, which are all in [rows.csv](rows.csv).",
-        f"Made by `{command}` on {machine}.",
+        f"Made by `{command}` on {platform.machine()}, {os.cpu_count()} cores.",
     ]
     for kind in kinds:
         lines += ["", f"## {TITLES[kind]}", "", "Microseconds per macro step:", ""]
-        lines += table(times, kind)
+        lines += by_master(times, kind)
         lines += ["", "Start-up in s, interpreter and imports included, FMUs in the cache:", ""]
-        lines += table(starts, kind, ".2g")
-        lines += ["", "Largest memory of the process in MB:", "", *table(memory, kind, ".0f")]
+        lines += by_master(starts, kind, ".2g")
+        lines += ["", "Largest memory of the process in MB:", "", *by_master(memory, kind, ".0f")]
     lines += ["", "## The closed loop", "", *closed(whole)]
-    (folder / "README.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    figure(folder / "masters.png", times, kinds)
+    figure(folder, times, kinds)
+    return "\n".join([*lines, ""])
 
 
-def closed(rows: Sequence[Row]) -> list[str]:
+def closed(rows: Sequence[Row]) -> Iterator[str]:
     """What a haptic tick of `closed-loop` costs."""
-    lines = [
-        "Microseconds of processor time per haptic tick of `closed-loop` with holds, energies,",
-        "checks and every output recorded, beside a C loop that only sets, steps and gets its FMUs",
-        "(all rounds in [closed-loop.csv](closed-loop.csv)):",
-        "",
-        "| FMUs | C loop | hapticlink | ratio | times real time |",
-        "|---|--:|--:|--:|--:|",
-    ]
+    yield (
+        "Microseconds of processor time per haptic tick of `closed-loop` with holds, energies,\n"
+        "checks and every output recorded, beside a C loop that only sets, steps and gets its "
+        "FMUs\n(all rounds in [closed-loop.csv](closed-loop.csv)):\n"
+    )
+    cells = []
     for kind in dict.fromkeys(row["packaging"] for row in rows):
+        mine = [row for row in rows if row["packaging"] == kind]
         alone, ours = (
-            min(
-                float(row["tick_us"])
-                for row in rows
-                if (row["packaging"], row["loop"]) == (kind, of)
-            )
-            for of in (ALONE, OURS)
+            min(float(row["tick_us"]) for row in mine if row["loop"] == of) for of in (ALONE, OURS)
         )
-        real = 1e6 / 512 / ours
-        lines.append(f"| {kind} | {alone:.3g} | {ours:.3g} | {ours / alone:.2f} | {real:.0f} |")
-    return lines
+        real = f"{1e6 / 512 / ours:.0f}"
+        cells.append((kind, f"{alone:.3g}", f"{ours:.3g}", f"{ours / alone:.2f}", real))
+    yield from table("FMUs | C loop | hapticlink | ratio | times real time", "lrrrr", cells)
 
 
 def title(times: Best) -> str:
@@ -129,10 +120,10 @@ def title(times: Best) -> str:
     return f"With FMUs in C every other master takes at least {least:.1f} times as long"
 
 
-def figure(path: Path, times: Best, kinds: Sequence[str]) -> None:
+def figure(folder: Path, times: Best, kinds: Sequence[str]) -> None:
     """Time per macro step over the number of FMUs, by master."""
-    panels, axes = plt.subplots(1, len(kinds), figsize=(4.4 * len(kinds), 4.4), squeeze=False)
-    for ax, kind in zip(axes[0], kinds, strict=True):
+    drawn, panels = draw.panels(len(kinds), width=4.4, height=4.4)
+    for axes, kind in zip(panels, kinds, strict=True):
         signals = 3 if kind == "native" else 12
         for name, colour in COLOURS.items():
             points = sorted(
@@ -143,16 +134,13 @@ def figure(path: Path, times: Best, kinds: Sequence[str]) -> None:
             if points:
                 line, width = "o:" if name == ALONE else "o-", 2.5 if name == OURS else 1.2
                 x, y = zip(*points, strict=True)
-                ax.loglog(x, y, line, ms=3, lw=width, color=colour, label=name)
-        ax.set_title(f"{TITLES[kind]}, {signals} reals each", fontsize=10)
-        ax.set_xlabel("FMUs")
-        ax.set_xticks([2, 4, 16, 64], ["2", "4", "16", "64"])
-        ax.minorticks_off()
-        ax.grid(alpha=0.3)
-    axes[0][0].set_ylabel("processor time per macro step, us")
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    panels.legend(handles, labels, ncols=len(labels), loc="lower center", frameon=False, fontsize=8)
-    panels.suptitle(title(times))
-    panels.tight_layout(rect=(0, 0.06, 1, 1))
-    panels.savefig(path, dpi=130)
-    plt.close(panels)
+                axes.loglog(x, y, line, ms=3, lw=width, color=colour, label=name)
+        axes.set_title(f"{TITLES[kind]}, {signals} reals each", fontsize=10)
+        axes.set_xlabel("FMUs")
+        axes.set_xticks([2, 4, 16, 64], ["2", "4", "16", "64"])
+        axes.minorticks_off()
+    panels[0].set_ylabel("processor time per macro step, us")
+    shown = panels[0].get_legend_handles_labels()
+    drawn.legend(*shown, ncols=len(shown[1]), loc="outside lower center", fontsize=8)
+    drawn.suptitle(title(times))
+    draw.save(drawn, folder, "masters.png")

@@ -8,34 +8,16 @@ from scipy.optimize import brentq
 from scipy.special import ellipkinc
 
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop, OperationalPoint
+from hapticlink.orchestrator import open_scene
 
 GRAVITY = 9.81
 
 
 def five_bar() -> Linkage:
-    """The report's closed-loop mechanism: Figure 3.1, Table 6.1, mass centres at mid-link."""
-    lengths, masses = (0.042, 0.042, 0.0184, 0.0564), (1.0, 1.0, 0.5, 0.5)
-    inertias = (2.1e-4, 2.1e-4, 1.05e-4, 1.05e-4)
-    return Linkage(
-        body=tuple(
-            Body(name=f"link{i + 1}", mass=m, inertia=inertia, center=(0.5 * length, 0.0))
-            for i, (length, m, inertia) in enumerate(zip(lengths, masses, inertias, strict=True))
-        ),
-        joint=(
-            Joint(name="shoulder1", child="link1"),
-            Joint(name="elbow1", parent="link1", child="link2", at_parent=(lengths[0], 0.0)),
-            Joint(name="shoulder2", child="link3"),
-            Joint(name="elbow2", parent="link3", child="link4", at_parent=(lengths[2], 0.0)),
-        ),
-        loop=(Loop(bodies=("link2", "link4"), at=((lengths[1], 0.0), (lengths[3], 0.0))),),
-        operational_point=OperationalPoint(body="link2", at=(0.5 * lengths[1], 0.0)),
-        start={
-            "shoulder1": math.pi / 4,
-            "elbow1": -math.pi / 2,
-            "shoulder2": -0.4 * math.pi,
-            "elbow2": math.pi / 2,
-        },
-    )
+    """The report's closed-loop mechanism: Figure 3.1, Table 6.1."""
+    linkage = open_scene.load("five-bar").linkage
+    assert linkage
+    return linkage
 
 
 def _rod(name: str) -> Body:
@@ -89,10 +71,11 @@ def chain(links: int) -> Linkage:
             for n in names[1:]
         ),
         joint=tuple(
-            Joint(name=f"joint{i}", parent=names[i], child=names[i + 1])
-            if i == 0
-            else Joint(
-                name=f"joint{i}", parent=names[i], child=names[i + 1], at_parent=(length, 0.0)
+            Joint(
+                name=f"joint{i}",
+                parent=names[i],
+                child=names[i + 1],
+                at_parent=(length, 0.0) if i else None,
             )
             for i in range(links)
         ),

@@ -8,34 +8,32 @@ from __future__ import annotations
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import sleep
 from typing import Any, NamedTuple
 
-from matplotlib.figure import Figure
-
 import hapticlink as hl
+from benchmarks.page import Progress, table
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.tables import load
+from studies import draw
 
 SCENE, SECONDS, QUICK, SEED = "closed-loop", 8, 3, 1
-NAMES = ("one computer", "loopback", "5 ms", "20 +- 5 ms", "20 +- 5 ms, 5 % lost",
-         "60 +- 20 ms", "60 +- 20 ms, 5 % lost", "5 ms, a cut of 2 s")  # fmt: skip
-NETWORKS: tuple[tuple[float, ...] | None, ...] = (
-    None,
-    (0, 0, 0, SEED, -1),
-    (0.005, 0, 0, SEED, -1),
-    (0.015, 0.01, 0, SEED, -1),
-    (0.015, 0.01, 0.05, SEED, -1),
-    (0.04, 0.04, 0, SEED, -1),
-    (0.04, 0.04, 0.05, SEED, -1),
-    (0.005, 0, 0, SEED, 2),
-)
-"""Least delay, spread (s) and loss of each way, seed, and when the network is cut (s)."""
+NETWORKS: dict[str, tuple[float, float, float, float] | None] = {
+    "one computer": None,
+    "loopback": (0, 0, 0, -1),
+    "5 ms": (0.005, 0, 0, -1),
+    "20 +- 5 ms": (0.015, 0.01, 0, -1),
+    "20 +- 5 ms, 5 % lost": (0.015, 0.01, 0.05, -1),
+    "60 +- 20 ms": (0.04, 0.04, 0, -1),
+    "60 +- 20 ms, 5 % lost": (0.04, 0.04, 0.05, -1),
+    "5 ms, a cut of 2 s": (0.005, 0, 0, 2),
+}
+"""Least delay, spread (s) and loss of each way, and when the network is cut (s)."""
 
 
 class Row(NamedTuple):
@@ -55,10 +53,8 @@ class Row(NamedTuple):
     error: Any
 
 
-def bench(
-    folder: Path, quick: bool, progress: Callable[[str, int, int], None], command: str
-) -> None:
-    """Write the page and its figure to `folder`."""
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes network.png to `folder`."""
     options = ["packaging=native", f"duration={QUICK if quick else SECONDS}"]
     rows = []
     with temporary_folders.room() as room, ExitStack() as stack:
@@ -69,20 +65,20 @@ def bench(
         stack.enter_context(_process(["hapticlink", *arguments], log))
         while "serves at" not in log.read_text():
             sleep(0.1)
-        for i, (name, network) in enumerate(zip(NAMES, NETWORKS, strict=True)):
-            progress(name, i, len(NAMES))
+        for i, (name, network) in enumerate(NETWORKS.items()):
+            progress(name, i, len(NETWORKS))
             with ExitStack() as ends:
                 remote = {}
                 if network:
                     between = _free()
-                    asked = [between, at, str(key), *map(str, network)]
+                    *spread, cut = map(str, network)
+                    asked = [between, at, str(key), *spread, str(SEED), cut]
                     relay = ["benchmarks.network_relay", *asked]
                     ends.enter_context(_process(relay, room / "relay.log"))
                     remote["graphics"] = between
                 rows.append(_row(room / str(i), options, remote, key))
-    folder.mkdir(parents=True, exist_ok=True)
-    _figure(rows).savefig(folder / "network.png", dpi=150)
-    (folder / "README.md").write_text("\n".join(_page(rows, options, command)))
+    _figure(folder, rows)
+    return "\n".join(_page(rows, options, command))
 
 
 def _row(out: Path, options: Sequence[str], remote: dict[str, str], key: Path) -> Row:
@@ -124,16 +120,14 @@ def _process(module: Sequence[str], log: Path) -> Iterator[None]:
             running.wait()
 
 
-def _figure(rows: Sequence[Row]) -> Any:
-    figure = Figure(figsize=(8, 4), layout="constrained")
-    axes = figure.subplots()
+def _figure(folder: Path, rows: Sequence[Row]) -> None:
+    figure, (axes,) = draw.panels(1, width=8, height=4)
     for i in (0, 3, 5, 7):
-        axes.plot(*rows[i].error, label=NAMES[i], linewidth=0.9)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("handle from the operational point (mm)")
+        axes.plot(*rows[i].error, label=[*NETWORKS][i], linewidth=0.9)
+    axes.set(xlabel="time (s)", ylabel="handle from the operational point (mm)")
     axes.set_ylim(bottom=0)
     figure.legend(loc="outside upper center", ncols=4)
-    return figure
+    draw.save(figure, folder, "network.png")
 
 
 def _page(rows: Sequence[Row], options: Sequence[str], command: str) -> Iterator[str]:
@@ -159,11 +153,13 @@ def _page(rows: Sequence[Row], options: Sequence[str], command: str) -> Iterator
         "works: [two computers](../../docs/two-computers.md)."
     )
     yield ""
-    heads = ("each way", "samples", "late", "at most (ms)", "sent again", "error RMS (mm)",
-             "largest (mm)", "energy (mJ)", "deadlines missed", "same again")  # fmt: skip
-    yield f"| {' | '.join(heads)} |"
-    yield "|---|" + "--:|" * (len(heads) - 1)
-    for name, row in zip(NAMES, rows, strict=True):
-        cells = [short(v) if isinstance(v, float) else str(v) for v in row[:-1]]
-        yield f"| {name} | {' | '.join(cells)} |"
+    heads = (
+        "each way | samples | late | at most (ms) | sent again | error RMS (mm) | "
+        "largest (mm) | energy (mJ) | deadlines missed | same again"
+    )
+    cells = (
+        (name, *(short(v) if isinstance(v, float) else v for v in row[:-1]))
+        for name, row in zip(NETWORKS, rows, strict=True)
+    )
+    yield from table(heads, "l" + "r" * 9, cells)
     yield ""

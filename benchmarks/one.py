@@ -9,61 +9,39 @@ bits of the run (tests/programs).
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from time import process_time
-from unittest.mock import patch
 
-from benchmarks.rows import Rows
-from hapticlink.fmus.check import initialize, session
+from benchmarks.page import Progress, table
+from benchmarks.timing import Row, made_anew, measured_scenes, simulated
+from hapticlink.fmus.check import session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.run import execute_plan
-from hapticlink.orchestrator.run.compiled.library import load
+from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.programs.build import build_program
 
-SCENES = (
-    ("closed-loop", ()),
-    ("closed-loop", ("hold=foh",)),
-    ("closed-loop-direct", ("hold=passive",)),
-    ("two-users", ()),
-    ("pendulum", ()),
-)
 FORMS = {"run": 0, "one FMU, 1 tick a step": 1, "one FMU, 16 ticks a step": 16}
 COLUMNS = ("scene", "form", "tick_us", "times_real_time", "bytes", "build_s")
-ROUNDS = 15
-Progress = Callable[[str, int, int], None]
 
 
-def bench(folder: Path, quick: bool, progress: Progress, command: str) -> Path:
-    """Measures all scenes, and writes README.md and runs.csv into `folder`."""
-    (folder / "runs.csv").unlink(missing_ok=True)
-    rows = Rows(folder / "runs.csv", COLUMNS, 2)
-    scenes = SCENES[:1] if quick else SCENES
-    for k, (scene, options) in enumerate(scenes):
-        progress(" ".join((scene, *options)), k, len(scenes))
-        for row in _measured(scene, options, 3 if quick else ROUNDS):
-            rows.add(*row)
-    page = folder / "README.md"
-    page.write_text(_page([*rows.rows.values()], command), encoding="utf-8")
-    return page
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes runs.csv into `folder`."""
+    return _page(measured_scenes(folder, quick, progress, COLUMNS, _measured), command)
 
 
-def _measured(scene: str, options: tuple[str, ...], rounds: int) -> list[tuple[object, ...]]:
-    given = ("packaging=native", *options)
+def _measured(scene: str, options: tuple[str, ...], rounds: int) -> Iterator[tuple[object, ...]]:
     times: dict[str, list[float]] = {form: [] for form in FORMS}
-    with temporary_folders.room() as name:
-        room = Path(name)
-        load()
-        begin = sum(os.times()[:4])
-        with patch.dict("os.environ", {"HAPTICLINK_CACHE": str(room / "cache")}):
-            path = build_program(open_scene.load(scene, options), scene, out=room)
-        build = sum(os.times()[:4]) - begin
+    with temporary_folders.room() as room:
+        path = room / f"{scene.replace('-', '_')}.fmu"
+
+        def build() -> None:
+            build_program(open_scene.load(scene, options), scene, out=room)
+
+        spent = made_anew(build, room / "cache")
         for _ in range(rounds):
-            with patch.object(execute_plan, "perf_counter", process_time):
-                experiment = simulate(scene, room / "run", given, csv=False)
+            given = ("packaging=native", *options)
+            experiment = simulated(scene, room / "run", given, csv=False)
             for form, ticks in FORMS.items():
                 run = experiment.outcome.wall_time
                 times[form].append(_stepped(path, experiment, ticks) if ticks else run)
@@ -71,12 +49,9 @@ def _measured(scene: str, options: tuple[str, ...], rounds: int) -> list[tuple[o
     timeline = experiment.system.timeline
     count = round(experiment.outcome.end_time / _period(experiment))
     duration = timeline.seconds(count * timeline.clocks[0].longest)
-    title = " ".join((scene, *options))
-    return [
-        (title, form, 1e6 * min(t) / count, duration / min(t), *(
-            (size, build) if FORMS[form] else ("", "")))
-        for form, t in times.items()
-    ]  # fmt: skip
+    for form, t in times.items():
+        of_file = (size, spent) if FORMS[form] else ("", "")
+        yield form, 1e6 * min(t) / count, duration / min(t), *of_file
 
 
 def _period(experiment: Experiment) -> float:
@@ -89,15 +64,14 @@ def _stepped(path: Path, experiment: Experiment, ticks: int) -> float:
     step = ticks * _period(experiment)
     count = int(experiment.outcome.end_time / step + 1e-9)
     with session(path) as opened:
-        slave = opened.instance()
-        initialize(slave)
+        slave = opened.initialized()
         begin = process_time()
         for k in range(count):
             slave.doStep(k * step, step)
         return (process_time() - begin) * experiment.outcome.end_time / (count * step)
 
 
-def _page(rows: list[dict[str, str]], command: str) -> str:
+def _page(rows: list[Row], command: str) -> str:
     times = [float(row["times_real_time"]) for row in rows[: len(FORMS)]]
     run, one, sixteen = times
     method = " ".join((__doc__ or "").partition("\n\n")[2].split())
@@ -107,13 +81,15 @@ def _page(rows: list[dict[str, str]], command: str) -> str:
 
 Made by `{command}`. {method} Measured on a machine with much other work, which shares caches and cores: ratios hold, absolute times do not. All rows: [runs.csv](runs.csv).
 
-| scene | form | us a haptic tick | times real time | kB, with sources | s of processors to build |
-|---|---|--:|--:|--:|--:|
 """  # noqa: E501
-    return text + "".join(f"| {' | '.join(_cells(row))} |\n" for row in rows)
+    heads = (
+        "scene | form | us a haptic tick | times real time | kB, with sources | "
+        "s of processors to build"
+    )
+    return text + "\n".join(table(heads, "llrrrr", map(_cells, rows))) + "\n"
 
 
-def _cells(row: dict[str, str]) -> list[str]:
+def _cells(row: Row) -> list[str]:
     tick, times = float(row["tick_us"]), float(row["times_real_time"])
     size = f"{int(row['bytes']) / 1000:.0f}" if row["bytes"] else ""
     build = f"{float(row['build_s']):.1f}" if row["build_s"] else ""

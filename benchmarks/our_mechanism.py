@@ -74,41 +74,41 @@ class Ours:
         return found
 
     def virtual_machine(self) -> Callable[[int], tuple[float, float, float]]:
-        def run(steps: int) -> tuple[float, float, float]:
-            x = self.start.copy()
-            after, t, h = np.zeros_like(x), np.zeros(1), np.array([self.h])
-            _buffer, trigger = in_place(self.component.step, (x, self.u, self.p, t, h), after)
-            began = time.perf_counter()
+        """As a Python FMU: (steps) -> x and y (m) of the operational point, and the time (s) that
+        they took from the start on."""
+        x, after = np.zeros_like(self.start), np.zeros_like(self.start)
+        given = (x, self.u, self.p, np.zeros(1), np.array([self.h]))
+        buffer, trigger = in_place(self.component.step, given, after)
+
+        def advance(start: np.ndarray, steps: int, kept: Any = buffer) -> np.ndarray:
+            x[:] = start
             for k in range(steps):
-                t[0] = k * self.h
+                given[3][0] = k * self.h
                 trigger()
                 x[:] = after
-            seconds = time.perf_counter() - began
-            return (*self._tip(x), seconds)
+            return x
 
-        return run
+        return self._timed(advance)
 
     def native(self, folder: Path) -> Callable[[int], tuple[float, float, float]]:
-        """Compiled as C."""
-        advance = self.advance(folder)
+        """As a native FMU."""
+        return self._timed(self.advance(folder))
 
+    def _timed(
+        self, advance: Callable[..., np.ndarray]
+    ) -> Callable[[int], tuple[float, float, float]]:
         def run(steps: int) -> tuple[float, float, float]:
             x, began = self.start.copy(), time.perf_counter()
             x = advance(x, steps)
             seconds = time.perf_counter() - began
-            return (*self._tip(x), seconds)
+            tip = self.outputs(x)["x"][:2] if np.isfinite(x).all() else (np.nan, np.nan)
+            return float(tip[0]), float(tip[1]), seconds
 
         return run
 
     def advance(self, folder: Path) -> Callable[..., np.ndarray]:
         """(state, steps, h) -> state, compiled; overwrites the state given."""
         return compiled(self.component.step, self.u, self.p, self.h, folder)
-
-    def _tip(self, x: np.ndarray) -> tuple[float, float]:
-        if not np.isfinite(x).all():
-            return np.nan, np.nan
-        found = self.outputs(x)["x"]
-        return float(found[0]), float(found[1])
 
 
 def compiled(

@@ -6,14 +6,13 @@ misses is the machine's.
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from benchmarks.page import Progress, load_average, system, table
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.experiment import simulate
@@ -62,13 +61,10 @@ class EmptyLoop:
         return self.pace.report()
 
 
-def bench(
-    folder: Path, quick: bool, progress: Callable[[str, int, int], None], command: str
-) -> None:
-    """Write the page and its figure to `folder`."""
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes real_time.png to `folder`."""
     seconds = QUICK if quick else SECONDS
-    empty = EmptyLoop(seconds)
-    load_average = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    empty, load = EmptyLoop(seconds), load_average()
     options = ["packaging=native", f"duration={seconds}", f"haptics.rate={RATE}"]
     with temporary_folders.room() as room:
         results = simulate(
@@ -82,12 +78,11 @@ def bench(
     assert report, results.record.fault
     assert not results.record.fault, results.record.fault
     beside = empty.report()
-    folder.mkdir(parents=True, exist_ok=True)
     curves = {"lateness of an empty loop": beside["histograms"]["lateness"]}
     figure = real_time(results, curves, f"an empty loop beside it misses {missed(beside)}")
     assert figure
     figure.savefig(folder / "real_time.png", dpi=150)
-    (folder / "README.md").write_text(page(report, beside, seconds, load_average, command))
+    return page(report, beside, seconds, load, command)
 
 
 def missed(report: Report) -> str:
@@ -111,17 +106,16 @@ def page(ours: Report, empty: Report, seconds: int, load: float, command: str) -
         "",
         "![Share of ticks whose step time and lateness exceed a time](real_time.png)",
         "",
-        f"Made by `{command}`, on {platform.system()} with {os.cpu_count()} "
-        f"cores and a load average of {load:.1f} before. Milliseconds; the deadline of a tick is "
-        f"the next one, {short(1e3 * ours['period'])} ms after it was due. Rows are recorded, the "
+        f"Made by `{command}`, on {system()} and a load average of {load:.1f} before. "
+        f"Milliseconds; the deadline of a tick is the next one, {short(1e3 * ours['period'])} ms "
+        "after it was due. Rows are recorded, the "
         f"graphics clock runs in a thread: {samples['late']} of its {samples['taken']} samples "
         f"were late, at most by {short(1e3 * samples['largest_lateness'])} ms.",
         "",
-        f"| | {' | '.join(ours['lateness'])} |",
-        "|---|" + "--:|" * len(ours["lateness"]),
-        *(
-            f"| {name} | {' | '.join(short(1e3 * value) for value in row.values())} |"
-            for name, row in rows.items()
+        *table(
+            f"| {' | '.join(ours['lateness'])}",
+            "l" + "r" * len(ours["lateness"]),
+            ([name, *(short(1e3 * t) for t in row.values())] for name, row in rows.items()),
         ),
         "",
     ]

@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from benchmarks import code_version, mechanisms
 from benchmarks.our_mechanism import Ours
+from benchmarks.page import Progress, table
 from benchmarks.rows import Rows
 from hapticlink.components.dynamics import closed_loop_solver, projection
 from hapticlink.components.specs.linkage import Linkage, Mechanism
+from studies import draw
 
 N, END, TURN = 2, 10.0, math.radians(30)
 RATES = range(400, 2401, 7)
@@ -40,8 +41,8 @@ COLUMNS = ("mu", "rate", "error_m")
 COLOURS = dict(zip(MUS, ("#8a8a8a", "#d1495b", "#1b6ca8", "#2a9d5c"), strict=True))
 
 
-def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], command: str) -> None:
-    """Write README.md, rates.csv and tip-error.png to `out`."""
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes rates.csv and tip-error.png to `out`."""
     code_version.begin(out, ("rates.csv",))
     rows = Rows(out / "rates.csv", COLUMNS, keys=2)
     rates = RATES[::10] if quick else RATES
@@ -63,9 +64,9 @@ def bench(out: Path, quick: bool, progress: Callable[[str, int, int], None], com
     wanted = {str(r) for r in rates}
     errors = {n: np.array([float(r["error_m"]) for r in rows.rows.values() if r["mu"] == n
                            and r["rate"] in wanted]) for n in MUS}  # fmt: skip
-    figure(out / "tip-error.png", errors)
-    (out / "README.md").write_text(page(errors, command), encoding="utf-8")
+    figure(out, errors)
     shutil.rmtree(out / ".compiled", ignore_errors=True)
+    return page(errors, command)
 
 
 def linkage() -> Linkage:
@@ -91,13 +92,15 @@ def turned(at: tuple[float, float]) -> tuple[float, float]:
 @contextmanager
 def one_mu(mu: float | None) -> Iterator[None]:
     """Within, every right-hand side of a step is solved with `mu`; None leaves each its own."""
-    with ExitStack() as stack:
-        if mu is not None:
-            stack.enter_context(patch.object(closed_loop_solver, "MU_FOLLOWING", mu))
-            stack.enter_context(patch.object(projection, "MU", mu))
-            stack.enter_context(
-                patch.object(closed_loop_solver.ClosedLoopSolver.__init__, "__defaults__", (mu,))
-            )
+    if mu is None:
+        yield
+        return
+    solver = closed_loop_solver.ClosedLoopSolver
+    with (
+        patch.object(closed_loop_solver, "MU_FOLLOWING", mu),
+        patch.object(projection, "MU", mu),
+        patch.object(solver.__init__, "__defaults__", (mu,)),
+    ):
         yield
 
 
@@ -113,18 +116,18 @@ def page(errors: dict[str, np.ndarray], command: str) -> str:
         "times; how close a stage comes to one depends on the rate.\nMade by "
         f"`{command}`; every run is in [rates.csv](rates.csv), the method on\n"
         "[the page of the theory](../../docs/theory.md#mechanism).\n\n"
-        "| integrator, mu | median | 97 % below | worst | branch lost |\n|---|--:|--:|--:|--:|\n"
     )
-    lines = [
-        f"| {name} | {np.median(e):.1e} | {np.quantile(e, 0.97):.1e} | {e.max():.1e} | "
-        f"{int((e > LOST).sum())} of {len(e)} |"
-        for name, e in errors.items()
-    ]
-    return head + "\n".join(lines) + "\n"
+    rows = []
+    for name, e in errors.items():
+        numbers = (np.median(e), np.quantile(e, 0.97), e.max())
+        lost = f"{int((e > LOST).sum())} of {len(e)}"
+        rows.append((name, *(f"{number:.1e}" for number in numbers), lost))
+    heads = "integrator, mu | median | 97 % below | worst | branch lost"
+    return head + "\n".join(table(heads, "lrrrr", rows)) + "\n"
 
 
-def figure(path: Path, errors: dict[str, np.ndarray]) -> None:
-    drawn, axes = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
+def figure(folder: Path, errors: dict[str, np.ndarray]) -> None:
+    drawn, (axes,) = draw.panels(1, width=6.4, height=4.2)
     for name, e in errors.items():
         share = 100 * np.arange(1, len(e) + 1) / len(e)
         axes.step(np.sort(e), share, where="post", color=COLOURS[name], label=name)
@@ -134,7 +137,5 @@ def figure(path: Path, errors: dict[str, np.ndarray]) -> None:
         f"{len(errors[OWN])} rates",
         fontsize="medium",
     )
-    axes.grid(alpha=0.3)
     axes.legend(loc="lower right")
-    drawn.savefig(path, dpi=130)
-    plt.close(drawn)
+    draw.save(drawn, folder, "tip-error.png")

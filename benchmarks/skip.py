@@ -15,8 +15,8 @@ the run with nothing skipped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -26,6 +26,7 @@ import numpy as np
 import hapticlink.orchestrator
 import hapticlink.scenes
 from benchmarks import code_version
+from benchmarks.page import Progress
 from benchmarks.rows import Rows
 from hapticlink.analysis.findings import block_costs
 from hapticlink.orchestrator import experiment
@@ -42,7 +43,6 @@ SAME = ("scene", "compared", "differ", "largest_difference", "apart")
 ON, OFF = "on", "off"
 ROUNDS = 7
 READ = "record.signals=connected"
-Progress = Callable[[str, int, int], None]
 
 
 @contextmanager
@@ -66,15 +66,9 @@ def nothing_skipped() -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _as(skipping: str) -> Iterator[None]:
-    with nothing_skipped() if skipping == OFF else ExitStack():
-        yield
-
-
 def run(scene: str, folder: Path, skipping: str, *options: str) -> Experiment:
     """The scene with native FMUs, skipping ON or OFF."""
-    with _as(skipping):
+    with nothing_skipped() if skipping == OFF else nullcontext():
         return simulate(scene, folder, ["packaging=native", *options], csv=False)
 
 
@@ -145,11 +139,11 @@ def measure(out: Path, scenes: Sequence[str], rounds: int, progress: Progress) -
     return rows, same
 
 
-def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
-    """Write README.md, skip.png and the rows to `out`."""
-    from benchmarks import skip_page  # loads Matplotlib
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes skip.png and the rows to `out`."""
+    from benchmarks import skip_page  # which imports this file
 
     code_version.begin(out, ("runs.csv", "same.csv"), hapticlink.orchestrator, hapticlink.scenes)
     scenes = list(find_scene.shipped())
     rows, same = measure(out, scenes[::6] if quick else scenes, 2 if quick else ROUNDS, progress)
-    skip_page.write(out, rows, same, command)
+    return skip_page.page(out, rows, same, command)

@@ -5,13 +5,10 @@ from __future__ import annotations
 import statistics
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
+from benchmarks.page import table
 from benchmarks.rows import Rows, quartiles
 from benchmarks.skip import OFF, ON
+from studies import draw
 
 COUNTS = ("operations", "calls", "values")
 Ratios = dict[str, dict[str, list[float]]]
@@ -30,14 +27,25 @@ def ratios(rows: Rows) -> Ratios:
     return found
 
 
-def write(out: Path, rows: Rows, same: Rows, command: str) -> None:
+def page(out: Path, rows: Rows, same: Rows, command: str) -> str:
+    """Writes skip.png."""
     found = ratios(rows)
-    finding = _finding(found, same)
-    _figure(out / "skip.png", found)
+    _figure(out, found)
+    cells = []
+    for scene in found:
+        on, off = (rows.rows[scene, s, "0"] for s in (ON, OFF))
+        first, middle, third = quartiles(found[scene]["run_s"])
+        counted = [f"{int(row[n]):,}" for n in COUNTS for row in (on, off)]
+        spread = f"{middle:.2f} ({first:.2f} to {third:.2f})"
+        cells.append((scene, *counted, spread, _same(same.rows[scene,])))
+    heads = (
+        "scene | operations | without skipping | calls | without | values | without | "
+        "run time without / with | the same"
+    )
     lines = [
         "# What leaving out the unneeded saves",
         "",
-        finding,
+        _finding(found, same),
         "",
         "![Operations and run time without skipping, over those with it](skip.png)",
         "",
@@ -50,17 +58,10 @@ def write(out: Path, rows: Rows, same: Rows, command: str) -> None:
         "of the numbers that the scene has in its tables, all outputs recorded, are equal to the "
         "last bit. All rows: [runs.csv](runs.csv), [same.csv](same.csv).",
         "",
-        "| scene | operations | without skipping | calls | without | values | without | "
-        "run time without / with | the same |",
-        "|---|--:|--:|--:|--:|--:|--:|--:|---|",
+        *table(heads, "lrrrrrrrl", cells),
+        "",
     ]
-    for scene in found:
-        on, off = (rows.rows[scene, s, "0"] for s in (ON, OFF))
-        first, middle, third = quartiles(found[scene]["run_s"])
-        cells = " | ".join(f"{int(row[n]):,}" for n in COUNTS for row in (on, off))
-        bits = _same(same.rows[scene,])
-        lines.append(f"| {scene} | {cells} | {middle:.2f} ({first:.2f} to {third:.2f}) | {bits} |")
-    (out / "README.md").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    return "\n".join(lines)
 
 
 def _same(row: dict[str, str]) -> str:
@@ -90,9 +91,10 @@ def _finding(found: Ratios, same: Rows) -> str:
     )
 
 
-def _figure(path: Path, found: Ratios) -> None:
+def _figure(folder: Path, found: Ratios) -> None:
     order = sorted(found, key=lambda s: found[s]["operations"][0])
-    figure, axes = plt.subplots(figsize=(7.5, 0.23 * len(order) + 1.6), layout="constrained")
+    figure, (axes,) = draw.panels(1, width=7.5, height=0.23 * len(order) + 1.6)
+    axes.grid(visible=False)
     places = range(len(order))
     operations = [found[s]["operations"][0] for s in order]
     times = [quartiles(found[s]["run_s"]) for s in order]
@@ -115,5 +117,4 @@ def _figure(path: Path, found: Ratios) -> None:
     axes.set_title(
         f"Without skipping runs take {median:.2f} times as long (median of scenes)", fontsize=11
     )
-    figure.savefig(path, dpi=130, metadata={"Software": None})
-    plt.close(figure)
+    draw.save(figure, folder, "skip.png")

@@ -11,36 +11,20 @@ from __future__ import annotations
 
 import base64
 import json
-import os
-import shutil
 import subprocess
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from time import process_time
 from typing import Any
-from unittest.mock import patch
 
-from benchmarks.rows import Rows
+from benchmarks.dragging import chromium
+from benchmarks.page import Progress, table
+from benchmarks.timing import Row, made_anew, measured_scenes, simulated
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.run import execute_plan
-from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.visualization.browser_code import one_file
 from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
 
-SCENES = (
-    ("closed-loop", ()),
-    ("closed-loop", ("hold=foh",)),
-    ("closed-loop-direct", ("hold=passive",)),
-    ("two-users", ()),
-    ("pendulum", ()),
-)
 DURATION = 3.0
 COLUMNS = ("scene", "bytes", "make_s", "run", "node", "chromium")
-ROUNDS = 15
-Progress = Callable[[str, int, int], None]
 TIMED = """
 const timed = (given, now, rounds) => {
   const module = new WebAssembly.Module(given.program), times = [];
@@ -76,29 +60,15 @@ onmessage = ({ data: [given, rounds] }) => postMessage(timed(given, now, rounds)
 """
 
 
-def bench(folder: Path, quick: bool, progress: Progress, command: str) -> Path:
-    """Measures all scenes, and writes README.md and runs.csv into `folder`."""
-    (folder / "runs.csv").unlink(missing_ok=True)
-    rows = Rows(folder / "runs.csv", COLUMNS, 1)
-    scenes = SCENES[:1] if quick else SCENES
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes runs.csv into `folder`."""
     with chromium() as browser:
-        for k, (scene, options) in enumerate(scenes):
-            title = " ".join((scene, *options))
-            progress(title, k, len(scenes))
-            rows.add(title, *_measured(scene, options, 3 if quick else ROUNDS, browser))
-    path = folder / "README.md"
-    path.write_text(_page([*rows.rows.values()], command), encoding="utf-8")
-    return path
 
+        def measure(scene: str, options: tuple[str, ...], rounds: int) -> list[tuple[object, ...]]:
+            return [_measured(scene, options, rounds, browser)]
 
-@contextmanager
-def chromium() -> Iterator[Any]:
-    """A headless browser of the machine's own."""
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as started:
-        flags = ["--no-sandbox", "--disable-gpu"]
-        yield started.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+        rows = measured_scenes(folder, quick, progress, COLUMNS, measure)
+    return _page(rows, command)
 
 
 def _measured(
@@ -106,22 +76,17 @@ def _measured(
 ) -> tuple[int, float, float, float, float]:
     """Size (bytes), processor time to make (s), and times real time of run, node and Chromium."""
     shown = viewed(scene, (*options, "packaging=native"), DURATION)
-    with temporary_folders.room() as name:
-        room = Path(name)
-        load()
-        begin = sum(os.times()[:4])
-        with patch.dict("os.environ", {"HAPTICLINK_CACHE": str(room / "cache")}):
-            page.write(shown, scene, room / "page.html")
-        make = sum(os.times()[:4]) - begin
-        text = (room / "page.html").read_text(encoding="utf-8")
+    with temporary_folders.room() as room:
+        file = room / "page.html"
+        make = made_anew(lambda: page.write(shown, scene, file), room / "cache")
+        text = file.read_text(encoding="utf-8")
         opened = browser.new_page()
-        opened.goto(f"file://{room / 'page.html'}")
+        opened.goto(f"file://{file}")
         opened.wait_for_function("() => view.frame")
         opened.click("#pause")
         runs, nodes, wall = list[float](), list[float](), list[float]()
         for _ in range(rounds):
-            with patch.object(execute_plan, "perf_counter", process_time):
-                runs.append(simulate(shown, room / "run", csv=False).outcome.wall_time)
+            runs.append(simulated(shown, room / "run", csv=False).outcome.wall_time)
             nodes.append(_node(text))
             worker = one_file.unpacked(text, "worker").decode() + TIMED + IN_WORKER
             wall.append(opened.evaluate(IN_CHROMIUM, [worker, *_program(text).values(), 5]))
@@ -149,7 +114,7 @@ def _program(text: str) -> dict[str, Any]:
     }
 
 
-def _page(rows: list[dict[str, str]], command: str) -> str:
+def _page(rows: list[Row], command: str) -> str:
     first = rows[0]
     method = " ".join((__doc__ or "").partition("\n\n")[2].split())
     run, node, browser = (float(first[c]) for c in ("run", "node", "chromium"))
@@ -159,12 +124,11 @@ def _page(rows: list[dict[str, str]], command: str) -> str:
 
 Made by `{command}`. {method} Measured on a machine with much other work, which shares caches and cores: ratios of processor times hold, other times do not. All rows: [runs.csv](runs.csv).
 
-| scene | kB | s of processors to make | run, times real time | node | Chromium |
-|---|--:|--:|--:|--:|--:|
 """  # noqa: E501
-    return text + "".join(f"| {' | '.join(_cells(row))} |\n" for row in rows)
+    heads = "scene | kB | s of processors to make | run, times real time | node | Chromium"
+    return text + "\n".join(table(heads, "lrrrrr", map(_cells, rows))) + "\n"
 
 
-def _cells(row: dict[str, str]) -> list[str]:
+def _cells(row: Row) -> list[str]:
     times = [f"{float(row[column]):.0f}" for column in ("run", "node", "chromium")]
     return [row["scene"], f"{int(row['bytes']) / 1e3:.0f}", f"{float(row['make_s']):.1f}", *times]

@@ -12,12 +12,10 @@ Both clocks are the machine's: the browser's `performance.timeOrigin` is wall-cl
 from __future__ import annotations
 
 import json
-import os
-import platform
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -26,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import hapticlink as hl
+from benchmarks.page import Progress, load_average, system, table
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
@@ -80,12 +79,9 @@ class Measured(Session):
         live.set, live.noted = noted, True  # type: ignore[method-assign,attr-defined]
 
 
-def bench(
-    folder: Path, quick: bool, progress: Callable[[str, int, int], object], command: str
-) -> None:
-    """Write the page to `folder`. Raises what playwright does without a browser."""
-    seconds = QUICK if quick else SECONDS
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Raises what playwright does without a browser."""
+    seconds, load = QUICK if quick else SECONDS, load_average()
     scene = viewed(SCENE, [f"haptics.rate={RATE}"])
     progress(f"{SCENE}, dragged", 0, seconds)
     arguments = "127.0.0.1", "0", "bench", "", ""  # no second run
@@ -103,11 +99,9 @@ def bench(
             driver.kill()
             driver.wait()
         found = json.loads(log.read_text())
-    folder.mkdir(parents=True, exist_ok=True)
-    text = page(session, found, seconds, load, command)
     readme = folder / "README.md"
     kept = readme.read_text().partition(AFTER)[2] if readme.exists() else ""
-    readme.write_text(text + AFTER + kept)
+    return page(session, found, seconds, load, command) + AFTER + kept
 
 
 AFTER = "\n## Screenshots\n"
@@ -143,34 +137,34 @@ def page(session: Measured, found: dict[str, Any], seconds: int, load: float, co
         f"the screen after {short(shown)} ms (medians). A stability verdict stands "
         f"{short(max(first for first, _ in judged.values()))} s after a change.",
         "",
-        f"Made by `{command}`, on {platform.system()} with {os.cpu_count()} "
-        f"cores, shared with a headless Chromium that draws in software, and a load average of "
-        f"{load:.1f} before. Latencies in milliseconds: mouse to force, from the mouse event to "
-        f"the step of the hand that takes the pull ({taken} of {len(found['sent'])} pulls: newer "
-        "ones replace those that wait for the same step); step to canvas and to screen, from when "
-        "the newest step of a frame was due to the end of drawing it, and to the refresh after "
-        f"that ({len(rows['step to screen'])} frames).",
+        f"Made by `{command}`, on {system()}, shared with a headless Chromium that draws in "
+        f"software, and a load average of {load:.1f} before. Latencies in milliseconds: mouse to "
+        f"force, from the mouse event to the step of the hand that takes the pull ({taken} of "
+        f"{len(found['sent'])} pulls: newer ones replace those that wait for the same step); "
+        "step to canvas and to screen, from when the newest step of a frame was due to the end of "
+        f"drawing it, and to the refresh after that ({len(rows['step to screen'])} frames).",
         "",
-        "| | p50 | p99 | max |",
-        "|---|--:|--:|--:|",
-        *(f"| {name} | {' | '.join(_row(values))} |" for name, values in rows.items()),
-        f"| step time of the haptic loop, since its start | {_times(after['step_time'])} |",
-        f"| lateness of the haptic loop, since its start | {_times(after['lateness'])} |",
+        *table("| p50 | p99 | max", "lrrr", _rows(rows, after)),
         "",
         "Seconds from a change on the page, with the handle held, to the stability verdict on the "
         "first hands and on all:",
         "",
-        "| changed | so far | all hands |",
-        "|---|--:|--:|",
-        *(f"| {name} | {' | '.join(map(short, times))} |" for name, times in judged.items()),
+        *table(
+            "changed | so far | all hands",
+            "lrr",
+            ([name, *map(short, times)] for name, times in judged.items()),
+        ),
         "",
     ]
     return "\n".join(lines)
 
 
-def _row(values: Sequence[float]) -> list[str]:
-    return [short(1e3 * float(v)) for v in np.quantile(values, [0.5, 0.99, 1.0])]
-
-
-def _times(found: dict[str, float]) -> str:
-    return " | ".join(short(1e3 * found[k]) for k in ("p50", "p99", "max"))
+def _rows(
+    latencies: Mapping[str, Sequence[float]], report: Mapping[str, Any]
+) -> Iterator[list[str]]:
+    """Milliseconds of the latencies, and of the haptic loop."""
+    for name, values in latencies.items():
+        yield [name, *(short(1e3 * float(v)) for v in np.quantile(values, [0.5, 0.99, 1.0]))]
+    for name, key in (("step time", "step_time"), ("lateness", "lateness")):
+        times = (short(1e3 * report[key][k]) for k in ("p50", "p99", "max"))
+        yield [f"{name} of the haptic loop, since its start", *times]

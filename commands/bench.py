@@ -28,9 +28,10 @@ Benchmark = Literal[
     "network",
     "advise",
 ]
-"""The function `bench` of the module of this name in benchmarks/, dashes as underscores."""
-FOLDERS = {"stress": "stability"}
-"""Folders in results/ that are not named like the benchmark."""
+"""The function `bench` of the module of this name in benchmarks/, dashes as underscores: it
+measures, writes tables and figures into a folder, and returns the page."""
+PAGES = {"stress": "stability/stress.md"}
+"""Pages in results/ that are not the README.md of a folder named like the benchmark."""
 
 
 def bench(
@@ -71,7 +72,9 @@ def bench(
         print(*status(results, get_args(Benchmark)), sep="\n")
         return 0
     make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
-    folder = out or results / FOLDERS.get(what, what)
+    page = results / PAGES.get(what, f"{what}/README.md")
+    page = (out or page.parent) / page.name
+    page.parent.mkdir(parents=True, exist_ok=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     command = f"hapticlink bench {what}{' --quick' * quick}"
     with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
@@ -81,7 +84,7 @@ def bench(
             interrupt.check()
             bar.update(task, description=text, completed=done, total=total)
 
-        page = make(folder, quick, report, command) or folder / "README.md"
+        page.write_text(make(page.parent, quick, report, command), encoding="utf-8")
     if out is None and not quick:
         checkout.function("bench", "benchmarks.code_version:sign")(results, what, page)
     print(page)

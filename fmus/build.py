@@ -11,38 +11,27 @@ from hapticlink.fmus.python_fmu import entries, require_platform
 from hapticlink.fmus.write_fmu import write_fmu
 
 
-def build(
-    component: Component,
-    folder: Path | str,
-    *,
-    stop_time: float = 1.0,
-    step_size: float = 1 / 512,
-) -> Path:
+def build(component: Component, folder: Path | str, **experiment: float) -> Path:
     """Write the Python FMU `<folder>/<component.name>.fmu` and return its path.
 
-    stop_time and step_size (s) are the FMU's default experiment. The same component gives the same
-    bytes. The file is written atomically, and only if FMPy's validation has no finding. Raises
-    FmuError with the findings, and UnsupportedPlatform where pythonfmu has no binary.
+    experiment: stop_time (1 s) and step_size (1/512 s) of the FMU's default experiment. The same
+    component gives the same bytes. The file is written atomically, and only if FMPy's validation
+    has no finding. Raises FmuError with the findings, and UnsupportedPlatform where pythonfmu has
+    no binary.
     """
     require_platform()
-    files = entries(component, stop_time=stop_time, step_size=step_size)
-    return write_fmu(files, folder, component.name)
+    return write_fmu(entries(component, **experiment), folder, component.name)
 
 
 def build_engine(
-    component: Component,
-    settings: Mapping[str, Any],
-    folder: Path | str,
-    *,
-    stop_time: float = 1.0,
-    step_size: float = 1 / 512,
+    component: Component, settings: Mapping[str, Any], folder: Path | str, **experiment: float
 ) -> Path:
     """As `build`, with the component's ports by a physics engine (`engine.mujoco_fmu`); `settings`
     are those of its block."""
     from hapticlink.fmus.engine import mujoco_fmu
 
     require_platform()
-    files = mujoco_fmu.entries(component, settings, stop_time=stop_time, step_size=step_size)
+    files = mujoco_fmu.entries(component, settings, **experiment)
     return write_fmu(files, folder, component.name)
 
 
@@ -51,9 +40,8 @@ def build_native(
     folder: Path | str,
     *,
     platforms: Sequence[str] = (),
-    stop_time: float = 1.0,
-    step_size: float = 1 / 512,
     fmi: int = 2,
+    **experiment: float,
 ) -> Path:
     """As `build`, with the component compiled for each of `platforms` (as the version `fmi` of the
     standard calls them: `hapticlink.fmus.native.compiler.TARGETS`), by default for this machine.
@@ -66,12 +54,6 @@ def build_native(
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    files = native_fmu.entries(
-        component,
-        folder,
-        stop_time=stop_time,
-        step_size=step_size,
-        platforms=tuple(platforms) or (host_platform(fmi),),
-        fmi=fmi,
-    )
+    platforms = tuple(platforms) or (host_platform(fmi),)
+    files = native_fmu.entries(component, folder, platforms, fmi, **experiment)
     return write_fmu(files, folder, component.name)

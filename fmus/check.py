@@ -116,6 +116,12 @@ class Session:
         self._instances.append(slave)
         return slave
 
+    def initialized(self, name: str = "instance") -> FMU2Slave:
+        """A new instance, ready for its first step."""
+        slave = self.instance(name)
+        initialize(slave)
+        return slave
+
     def _log(self, *about: Any) -> None:
         self.messages.append(about[-1].decode())
 
@@ -166,8 +172,7 @@ def check_fmu(path: Path | str) -> list[str]:
     if findings:
         return findings
     with session(path) as opened:
-        slave = opened.instance()
-        initialize(slave)
+        slave = opened.initialized()
         try:
             reference = run(slave, opened)
         except FMICallException as error:
@@ -196,8 +201,7 @@ def _alone(path: Path | str, step_size: float) -> list[str]:
 
 
 def _inputs_read_back(session: Session, _: Trace) -> str | None:
-    slave = session.instance()
-    initialize(slave)
+    slave = session.initialized()
     references = [v.valueReference for v in session.inputs]
     values = [float(v.start or 0.0) + 0.1 * (i + 1) for i, v in enumerate(session.inputs)]
     if references:
@@ -208,14 +212,11 @@ def _inputs_read_back(session: Session, _: Trace) -> str | None:
 
 
 def _load_again(session: Session, reference: Trace) -> str | None:
-    slave = session.instance()
-    initialize(slave)
-    return _compare(run(slave, session), reference)
+    return _compare(run(session.initialized(), session), reference)
 
 
 def _reset(session: Session, reference: Trace) -> str | None:
-    slave = session.instance()
-    initialize(slave)
+    slave = session.initialized()
     run(slave, session)
     slave.reset()
     initialize(slave)
@@ -223,9 +224,7 @@ def _reset(session: Session, reference: Trace) -> str | None:
 
 
 def _two_instances(session: Session, reference: Trace) -> str | None:
-    one, two = session.instance("one"), session.instance("two")
-    initialize(one)
-    initialize(two)
+    one, two = session.initialized("one"), session.initialized("two")
     run(one, session, count=1)
     trace = run(two, session)
     rest = run(one, session, first=1, count=STEPS - 1)
@@ -233,8 +232,7 @@ def _two_instances(session: Session, reference: Trace) -> str | None:
 
 
 def _save_and_restore(session: Session, reference: Trace) -> str | None:
-    slave = session.instance()
-    initialize(slave)
+    slave = session.initialized()
     run(slave, session, count=2)
     state = slave.getFMUState()
     saved = slave.serializeFMUstate(state)
@@ -247,8 +245,7 @@ def _save_and_restore(session: Session, reference: Trace) -> str | None:
 
 def _deserialize(session: Session, saved: bytes, reference: Trace) -> str | None:
     """A state restored into another instance has to continue as the first one did."""
-    slave = session.instance("other")
-    initialize(slave)
+    slave = session.initialized("other")
     state = slave.deSerializeFMUstate(saved)
     if slave.serializeFMUstate(state) != saved:
         return "serialised, read and serialised again, the bytes differ"

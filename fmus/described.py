@@ -87,10 +87,15 @@ class Described:
 
 
 def described(
-    component: Component, *, stop_time: float, step_size: float, needs_tool: bool = True
+    component: Component,
+    needs_tool: bool = True,
+    /,
+    *,
+    stop_time: float = 1.0,
+    step_size: float = 1 / 512,
 ) -> Described:
-    """A component. Raises FmuError for a declared derivative that is not of the shape of its
-    output, InvalidUnit for a unit."""
+    """A component. stop_time and step_size (s): of the default experiment. Raises FmuError for a
+    declared derivative that is not of the shape of its output, InvalidUnit for a unit."""
     variables = scalar_variables(component)
     outputs = [v.name for v in variables if v.kind == "OUTPUT"]
     at_start = initial_dependencies(component)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus.block_drawing import diagram, strips
 from hapticlink.fmus.reference_run import ReferenceRun
 
+PAGE = "documentation/index.html"
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 52em; margin: 2em auto; padding: 0 1em; }
 pre { background: #f4f6f8; padding: .8em; overflow-x: auto; }
@@ -47,14 +48,24 @@ def documentation(component: Component, run: ReferenceRun | None = None) -> byte
         *_table("Parameters", component.parameters),
         *_table("Outputs", component.outputs),
     ]
-    page = [
+    return page(component.name, body)
+
+
+def page(title: str, body: Iterable[str]) -> bytes:
+    """A page of HTML with its style."""
+    head = [
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        f"<title>{escape(component.name)}</title><style>{STYLE}</style></head><body>",
-        *body,
-        "</body></html>",
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>",
     ]
-    return "\n".join(page).encode() + b"\n"
+    return "\n".join([*head, *body, "</body></html>", ""]).encode()
+
+
+def table(title: str, heads: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """A table under its title; nothing without rows."""
+    lines = ["<tr>" + "".join(f"<td>{escape(c)}</td>" for c in cells) + "</tr>" for cells in rows]
+    head = "".join(f"<th>{name}</th>" for name in heads)
+    return [f"<h2>{title}</h2>", f"<table><tr>{head}</tr>", *lines, "</table>"] if lines else []
 
 
 def _run(run: ReferenceRun) -> list[str]:
@@ -79,23 +90,18 @@ def _paragraphs(text: str) -> list[str]:
 
 
 def _table(title: str, variables: Sequence[Variable]) -> list[str]:
-    if not variables:
-        return []
-    has_start = title != "Outputs"
-    heads = ["name", "shape", "unit", *(["start"] if has_start else []), "description"]
+    heads = ["name", "shape", "unit", *(["start"] if title != "Outputs" else []), "description"]
     if title == "Parameters":
         heads.insert(4, "may change")
     rows = []
     for v in variables:
         cells = [v.name, " x ".join(map(str, v.shape)) or "scalar", _short(v.units)]
-        if has_start:
+        if title != "Outputs":
             cells.append(_short(tuple(repr(float(start)) for start in v.starts)))
         if title == "Parameters":
             cells.append("any time" if v.variability == "tunable" else "before the run")
-        rows.append("<tr>" + "".join(f"<td>{escape(c)}</td>" for c in [*cells, v.description]))
-    head = "".join(f"<th>{h}</th>" for h in heads)
-    return [f"<h2>{title}</h2>", f"<table><tr>{head}</tr>", *(row + "</tr>" for row in rows),
-            "</table>"]  # fmt: skip
+        rows.append([*cells, v.description])
+    return table(title, heads, rows)
 
 
 def _short(values: tuple[str, ...]) -> str:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 import platform
 import sys
-import uuid
 from collections.abc import Mapping
 from importlib.metadata import distribution
 from pathlib import Path
@@ -24,11 +23,11 @@ import casadi as ca
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus import model_description
 from hapticlink.fmus.described import described
-from hapticlink.fmus.documentation import documentation
+from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.fmus.reference_run import reference_run
-from hapticlink.fmus.reproducible_zip import digest
+from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.straight_line import program
 
 PYTHONFMU = Path(str(distribution("pythonfmu").locate_file("pythonfmu")))
@@ -60,12 +59,10 @@ def require_platform() -> None:
     )
 
 
-def entries(component: Component, *, stop_time: float, step_size: float) -> dict[str, bytes]:
-    """All files of the FMU; GUID and name of the slave contain a hash of them. stop_time and
-    step_size (s) are the default experiment. Raises FmuError where the component's functions and
-    variables do not fit."""
+def entries(component: Component, **experiment: float) -> dict[str, bytes]:
+    """All files of the FMU; GUID and name of the slave contain a hash of them. experiment: as of
+    `described`. Raises FmuError where the component's functions and variables do not fit."""
     check_functions(component)
-
     parts = one_pass(component)
     texts = {f.name(): f.serialize() for f in parts.functions}
     functions = {
@@ -73,24 +70,23 @@ def entries(component: Component, *, stop_time: float, step_size: float) -> dict
         "resources/functions.txt": program(parts.functions, component.look_ups).encode(),
     }
     about = {"n_shared": parts.n_shared}
-    return packed(component, functions, about, stop_time=stop_time, step_size=step_size)
+    return packed(component, functions, about, **experiment)
 
 
 def packed(
     component: Component,
     functions: Mapping[str, bytes],
     about: Mapping[str, object],
-    *,
-    stop_time: float,
-    step_size: float,
     engine: bytes = b"",
+    /,
+    **experiment: float,
 ) -> dict[str, bytes]:
     """As `entries`, with the files that hold the functions, and what the slave needs to know of
     them. engine: the text of a module whose functions replace these."""
-
-    described_as = described(component, stop_time=stop_time, step_size=step_size)
-    run = None if engine else reference_run(component, step_size)  # whose equations are others
-    files = {"documentation/index.html": documentation(component, run), **functions}
+    described_as = described(component, **experiment)
+    own_equations = not engine
+    run = reference_run(component, described_as.step_size) if own_equations else None
+    files = {PAGE: documentation(component, run), **functions}
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
     for path in sorted((PYTHONFMU / "resources" / "binaries").rglob("*.*")):
@@ -108,7 +104,7 @@ def packed(
         **model_description.files(described_as, ""),
     }
     whole = digest(content)
-    module, guid = f"hapticlink_{whole[:16]}", f"{{{uuid.UUID(whole[:32])}}}"
+    module, guid = f"hapticlink_{whole[:16]}", guid_of(whole)
     files |= {
         **model_description.files(described_as, guid),
         "resources/component.json": json.dumps(about | {"digest": whole, "guid": guid}).encode(),

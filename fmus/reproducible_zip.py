@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import uuid
 import zipfile
 from collections.abc import Mapping
 from typing import BinaryIO
@@ -28,3 +29,8 @@ def digest(content: Mapping[str, bytes]) -> str:
     for name in sorted(content):
         sha.update(f"{name}\0{len(content[name])}\0".encode() + content[name])
     return sha.hexdigest()
+
+
+def guid_of(sha: str) -> str:
+    """The GUID of a hash."""
+    return f"{{{uuid.UUID(sha[:32])}}}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
-import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from hapticlink.fmus.native.compiler import (
     host_platform,
 )
 from hapticlink.fmus.native.fmi3_interface import fmi3_sources
-from hapticlink.fmus.reproducible_zip import digest
+from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault
@@ -34,6 +33,7 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
 from hapticlink.programs.description import described, documentation
+from hapticlink.programs.foreign import written
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolve_scene import Resolved, resolved
 from hapticlink.programs.sources import identifiers, sources
@@ -119,7 +119,7 @@ def program_files(
     content = {f"sources/{name}": text.encode() for name, text in texts.items()} | resources
     content |= documentation(scene, variables, pictures())
     whole = digest(content | model_description.files(about, "", fmi, compiled))
-    guid = f"{{{uuid.UUID(whole[:32])}}}"
+    guid = guid_of(whole)
     content["sources/scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["sources/scene.h"]
     return content | model_description.files(about, guid, fmi, compiled)
 
@@ -163,11 +163,8 @@ def _built(
 ) -> Path:
     """The FMU with a binary for each platform, written once FMPy finds nothing wrong with it."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
-        room, entries = Path(name), dict(files)
-        for entry in (e for e in files if e.startswith("sources/")):
-            path = room / entry.removeprefix("sources/")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(files[entry])
-        texts = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
-        entries |= binaries(texts, identifier, room, platforms, OPTIONS)
+        listed = (e for e in files if e.startswith("sources/"))
+        texts = {e.removeprefix("sources/"): files[e].decode() for e in listed}
+        room, compiled = Path(name), written(texts, Path(name))
+        entries = {**files, **dict(binaries(compiled, identifier, room, platforms, OPTIONS))}
     return write_fmu(entries, folder, identifier)

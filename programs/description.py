@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import PurePosixPath
 
 from hapticlink.components.base_units import BASES
 from hapticlink.fmus.described import Described, base_attributes
-from hapticlink.fmus.documentation import STYLE
+from hapticlink.fmus.documentation import PAGE, page, table
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.ports import Port
-
-PAGE = "documentation/index.html"
 
 
 def described(
@@ -71,24 +69,13 @@ def documentation(
         ("Outputs", ("OUTPUT",)),
         ("Measured", ("ENERGY", "STEP_ERROR")),
     ):
-        if chosen := [port for port in ports if port.kind in kinds]:
-            body += [f"<h2>{title}</h2>", *_table(chosen)]
-    page = [
-        "<!DOCTYPE html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        f"<title>{escape(scene.title)}</title><style>{STYLE}</style></head><body>",
-        *body,
-        "</body></html>",
-    ]
-    files = {PAGE: "\n".join(page).encode() + b"\n"}
-    return files | {f"{PurePosixPath(PAGE).parent}/{image}": images[image] for image in images}
+        rows = (_cells(port) for port in ports if port.kind in kinds)
+        body += table(title, ("name", "unit", "start", "description"), rows)
+    return {PAGE: page(scene.title, body)} | {
+        f"{PurePosixPath(PAGE).parent}/{image}": data for image, data in images.items()
+    }
 
 
-def _table(ports: Iterable[Port]) -> list[str]:
-    rows = []
-    for port in ports:
-        start = "" if port.start is None else repr(float(port.start))
-        cells = (port.name, port.unit, start, port.description)
-        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-    head = "".join(f"<th>{name}</th>" for name in ("name", "unit", "start", "description"))
-    return [f"<table><tr>{head}</tr>", *rows, "</table>"]
+def _cells(port: Port) -> tuple[str, ...]:
+    start = "" if port.start is None else repr(float(port.start))
+    return port.name, port.unit, start, port.description

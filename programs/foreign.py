@@ -74,19 +74,19 @@ class Foreign:
     def _defined(self, files: Mapping[str, str]) -> list[str]:
         with tempfile.TemporaryDirectory() as folder:
             room = Path(folder)
-            write_texts(files, room)
             try:
-                return global_names(sorted(room.glob("*.c")), room)
+                return global_names(written(files, room), room)
             except CompilerError as error:
                 raise InputFault(f"{self.description.path}: of its sources, {error}") from error
 
 
-def write_texts(files: Mapping[str, str], folder: Path) -> None:
-    """Writes C files, by path, into a folder."""
+def written(files: Mapping[str, str], folder: Path) -> list[Path]:
+    """Writes C files, by path, into a folder; returns those to compile, the largest first."""
     for name, text in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
+    return sorted(folder.glob("*.c"), key=lambda path: -path.stat().st_size)
 
 
 def _header(name: str, id_: str) -> str:

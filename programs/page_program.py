@@ -11,13 +11,13 @@ import casadi as ca
 
 from hapticlink.components.component import Component
 from hapticlink.fmus.native.compiler import compile_webassembly
-from hapticlink.fmus.native.source import functions
+from hapticlink.fmus.native.source import functions, table
 from hapticlink.programs import refusals
 from hapticlink.programs.build import OPTIONS
-from hapticlink.programs.foreign import write_texts
+from hapticlink.programs.foreign import written
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.programs.sources import HERE, prefixed, sources, table
+from hapticlink.programs.sources import HERE, prefixed, sources
 
 PAGE = "page.c"
 """What stands in place of the FMU's own file, and includes it."""
@@ -36,7 +36,9 @@ def webassembly_files(
 ) -> dict[str, str]:
     """The C files of the module, whose functions are those of page.c. Raises InputFault for FMUs of
     others with resources."""
-    refusals.of_page(program.foreign, program.scene.title)
+    reading = (name for name, foreign in program.foreign.items() if foreign.resources)
+    reasons = (f"{name} has resources, files that a page lacks" for name in reading)
+    refusals.refuse(program.scene.title, reasons)
     texts = sources(program, components, ports)
     texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
     texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')
@@ -48,9 +50,7 @@ def webassembly(texts: Mapping[str, str], folder: Path) -> bytes:
     """The module of these files, compiled in `folder`. Raises CompilerError."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
-        write_texts(texts, room)
-        files = sorted(room.glob("*.c"), key=lambda path: -path.stat().st_size)
-        return compile_webassembly(files, room, OPTIONS)
+        return compile_webassembly(written(texts, room), room, OPTIONS)
 
 
 def _picture(drawing: Drawing) -> dict[str, str]:

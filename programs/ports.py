@@ -6,8 +6,9 @@ Value references count [inputs | parameters | outputs | energies | step errors] 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from hapticlink.components.base_units import BASES
 from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component
@@ -46,17 +47,20 @@ class Port(ScalarVariable):
         return others.get(self.kind, self.kind.lower())
 
 
+KINDS = ("OUTSIDE", "INPUT", "PARAMETER", "OUTPUT", "ENERGY", "STEP_ERROR")
+"""In the order of their value references."""
+
+
 def ports(resolved: Resolved, components: Mapping[str, Component]) -> list[Port]:
     """The variables, in the order of their value references. components: of the members that are
     blocks of this project."""
-    own = {fmu: [*_of_block(resolved, fmu, c)] for fmu, c in components.items()}
-    every = [
-        *_inputs(resolved, own),
-        *_parameters(resolved, own),
-        *_outputs(resolved, own),
-        *_energies(resolved),
-        *_step_errors(resolved),
-    ]
+    every = [*_outside(resolved), *_energies(resolved), *_step_errors(resolved)]
+    for member, fmu in enumerate(resolved.members):
+        if fmu in resolved.foreign:
+            every += _of_others(resolved, fmu, member)
+        else:
+            every += _of_block(resolved, fmu, member, components[fmu])
+    every.sort(key=lambda port: KINDS.index(port.kind))
     units: dict[str, Unit | None] = {}
     return [
         port if units.setdefault(port.unit, port.defined) == port.defined else
@@ -70,105 +74,84 @@ def fed(system: System, fmu: str) -> set[str]:
     return {s.name for c in system.connections if c.target == fmu for s in c.inputs}
 
 
-def _of_block(resolved: Resolved, fmu: str, component: Component) -> Iterator[Port]:
-    """All variables of a block of this project that no connection sets; step sizes are those of
-    the scene."""
-    set_by_others = {
-        f"{fmu}.{name}" for name in (*fed(resolved.system, fmu), STEP_SIZE, FRAME_SIZE)
-    }
+def _of_block(resolved: Resolved, fmu: str, member: int, component: Component) -> Iterator[Port]:
+    """The variables of a block of this project that no connection sets, of its outputs those that
+    the scene records (all by default); step sizes are those of the scene."""
+    system = resolved.system
+    set_by_others = {f"{fmu}.{name}" for name in (*fed(system, fmu), STEP_SIZE, FRAME_SIZE)}
+    chosen = {f"{fmu}.{s.name}" for s in system.fmu[fmu].description.outputs} & resolved.recorded
+    given = {s.name: float(v) for s, v in system.fmu[fmu].starts}
     for reference, v in enumerate(scalar_variables(component)):
-        of = v.derivative_of and f"{fmu}.{v.derivative_of}"
+        name, of = f"{fmu}.{v.name}", f"{fmu}.{v.derivative_of}"
+        if name in set_by_others or (v.kind == "OUTPUT" and name not in chosen):
+            continue
         depends = () if v.sampled else (f"{fmu}.{name}" for name in v.depends)
-        free = tuple(name for name in depends if name not in set_by_others)
-        named = {"name": f"{fmu}.{v.name}", "derivative_of": of, "depends": free}
-        if named["name"] not in set_by_others:
-            member = resolved.members.index(fmu)
-            yield Port(**vars(v) | named, member=member, reference=reference)
+        own: dict[str, Any] = {
+            "name": name,
+            "derivative_of": of if of in resolved.recorded else None,
+            "depends": tuple(name for name in depends if name not in set_by_others),
+        }
+        if v.kind == "PARAMETER":
+            own["start"] = given.get(v.name, v.start)
+        if v.kind == "OUTPUT":
+            own["place"] = resolved.simulation.signals.scalar(fmu, v.name)
+        yield Port(**vars(v) | own, member=member, reference=reference)
 
 
-def _inputs(resolved: Resolved, own: Mapping[str, Sequence[Port]]) -> Iterator[Port]:
-    if resolved.outside:
-        span = resolved.simulation.signals.fmu(resolved.outside)
-        outputs = resolved.system.fmu[resolved.outside].description.outputs
-        used = {s.name for c in resolved.system.out_of(resolved.outside) for s in c.outputs}
-        values = resolved.simulation.signals.values[span].tolist()
-        names = {s.port: s.name for s in outputs}  # of the last entry
-        for place, (scalar, start) in enumerate(zip(outputs, values, strict=True), span.start):
-            if scalar.name in used:
-                name = f"{resolved.outside}.{scalar.name}"
-                unit, defined = _unit(resolved.system.fmu[resolved.outside].description, scalar)
-                text = f"{scalar.port} of the {resolved.outside}, which is left out."
-                last = names[scalar.port].removeprefix(scalar.port)
-                shape = tuple(map(int, re.findall(r"\d+", last)))
-                yield Port(
-                    "OUTSIDE", name, unit, text, place=place, start=start, shape=shape,
-                    defined=defined,
-                )  # fmt: skip
-    for member, fmu in enumerate(resolved.members):
-        if fmu in resolved.foreign:
-            yield from _settable(resolved, fmu, member, "input")
-        else:
-            yield from (port for port in own[fmu] if port.kind == "INPUT")
+def _outside(resolved: Resolved) -> Iterator[Port]:
+    """The outputs of the block that is left out which connections need."""
+    if not resolved.outside:
+        return
+    span = resolved.simulation.signals.fmu(resolved.outside)
+    description = resolved.system.fmu[resolved.outside].description
+    used = {s.name for c in resolved.system.out_of(resolved.outside) for s in c.outputs}
+    values = resolved.simulation.signals.values[span].tolist()
+    names = {s.port: s.name for s in description.outputs}  # of the last entry
+    for place, (scalar, start) in enumerate(
+        zip(description.outputs, values, strict=True), span.start
+    ):
+        if scalar.name in used:
+            unit, defined = _unit(description, scalar)
+            last = names[scalar.port].removeprefix(scalar.port)
+            yield Port(
+                "OUTSIDE",
+                f"{resolved.outside}.{scalar.name}",
+                unit,
+                f"{scalar.port} of the {resolved.outside}, which is left out.",
+                place=place,
+                start=start,
+                shape=tuple(map(int, re.findall(r"\d+", last))),
+                defined=defined,
+            )
 
 
-def _parameters(resolved: Resolved, own: Mapping[str, Sequence[Port]]) -> Iterator[Port]:
-    for member, fmu in enumerate(resolved.members):
-        if fmu in resolved.foreign:
-            yield from _settable(resolved, fmu, member, "parameter")
-            continue
-        given = {f"{fmu}.{s.name}": float(v) for s, v in resolved.system.fmu[fmu].starts}
-        for port in (port for port in own[fmu] if port.kind == "PARAMETER"):
-            yield replace(port, start=given.get(port.name, port.start))
-
-
-def _outputs(resolved: Resolved, own: Mapping[str, Sequence[Port]]) -> Iterator[Port]:
-    """The outputs that the scene records, all by default."""
-    signals, chosen = resolved.simulation.signals, resolved.recorded
-    for member, fmu in enumerate(resolved.members):
-        if fmu in resolved.foreign:
-            yield from _foreign_outputs(resolved, fmu, member)
-            continue
-        there = {f"{fmu}.{s.name}" for s in resolved.system.fmu[fmu].description.outputs}
-        for port in own[fmu]:
-            if port.kind == "OUTPUT" and port.name in there & chosen:
-                place = signals.scalar(fmu, port.name.removeprefix(f"{fmu}."))
-                of = port.derivative_of if port.derivative_of in chosen else None
-                yield replace(port, place=place, derivative_of=of)
-
-
-def _settable(resolved: Resolved, fmu: str, member: int, causality: str) -> Iterator[Port]:
-    """The real inputs or parameters of an FMU of others that no connection sets."""
+def _of_others(resolved: Resolved, fmu: str, member: int) -> Iterator[Port]:
+    """The real inputs and parameters of an FMU of others that no connection sets, and its outputs
+    that the scene records."""
     description, taken = resolved.foreign[fmu].description, fed(resolved.system, fmu)
     given = {s.name: float(v) for s, v in resolved.system.fmu[fmu].starts if s.type == "Real"}
-    for s in description.scalars:
-        if s.causality != causality or s.type != "Real" or not s.settable or s.name in taken:
-            continue
-        unit, defined = _unit(description, s)
-        yield Port(
-            "INPUT" if causality == "input" else "PARAMETER", f"{fmu}.{s.name}", unit,
-            f"{s.name} of {description.path.name}.", member, s.reference,
-            start=given.get(s.name, s.start), fixed=s.variability == "fixed", defined=defined,
-            is_set=s.name in given,
-        )  # fmt: skip
+    real = [s for s in description.scalars if s.type == "Real" and s.name not in taken]
+    inputs = [s for s in real if s.causality == "input"]
+    sampled = description.timing == "sampled"
 
-
-def _foreign_outputs(resolved: Resolved, fmu: str, member: int) -> Iterator[Port]:
-    description, signals = resolved.foreign[fmu].description, resolved.simulation.signals
-    taken = fed(resolved.system, fmu)
-    inputs = [s for s in description.scalars if s.causality == "input" and s.type == "Real"]
-    free = [s for s in inputs if s.name not in taken]
-    for s in description.outputs:
-        if f"{fmu}.{s.name}" not in resolved.recorded:
-            continue
+    def port(s: Scalar, **known: Any) -> Port:
         unit, defined = _unit(description, s)
-        sampled = description.timing == "sampled"
-        yield Port(
-            "OUTPUT", f"{fmu}.{s.name}", unit, f"{s.name} of {description.path.name}.", member,
-            s.reference, signals.scalar(fmu, s.name), sampled=sampled or s.type != "Real",
-            depends=() if sampled
-            else tuple(f"{fmu}.{u.name}" for u in free if description.follows(s, [u])),
-            type=s.type, defined=defined,
-        )  # fmt: skip
+        name, text = f"{fmu}.{s.name}", f"{s.name} of {description.path.name}."
+        kind = s.causality.upper()
+        return Port(kind, name, unit, text, member, s.reference, defined=defined, **known)
+
+    for s in (s for s in real if s.causality in ("input", "parameter") and s.settable):
+        fixed, start = s.variability == "fixed", given.get(s.name, s.start)
+        yield port(s, start=start, fixed=fixed, is_set=s.name in given)
+    for s in (s for s in description.outputs if f"{fmu}.{s.name}" in resolved.recorded):
+        known = () if sampled else (u for u in inputs if description.follows(s, [u]))
+        yield port(
+            s,
+            place=resolved.simulation.signals.scalar(fmu, s.name),
+            sampled=sampled or s.type != "Real",
+            depends=tuple(f"{fmu}.{u.name}" for u in known),
+            type=s.type,
+        )
 
 
 def _unit(description: Description, scalar: Scalar) -> tuple[str, Unit | None]:
@@ -191,12 +174,7 @@ def _energies(resolved: Resolved) -> Iterator[Port]:
 
 
 def _step_errors(resolved: Resolved) -> Iterator[Port]:
-    for fmu in _checked(resolved):
+    for fmu in (m for m in resolved.members if m in resolved.simulation.step_checks):
         text = f"Estimated sum of the relative errors of the steps of {fmu}, by step doubling."
         index = resolved.fmus.index(fmu)
         yield Port("STEP_ERROR", f"step_error.{fmu}", "1", text, index)
-
-
-def _checked(resolved: Resolved) -> Sequence[str]:
-    checks = resolved.simulation.step_checks
-    return [fmu for fmu in resolved.members if fmu in checks]

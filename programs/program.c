@@ -23,7 +23,8 @@
 
 #include "fmi2Functions.h"
 
-#include "program.h"
+#include "loop.h"
+#include "latencies.h"
 
 typedef const fmi2ValueReference *References;
 
@@ -59,11 +60,6 @@ typedef struct {
 typedef struct {
     int64_t first, n, dticks, slopes, key[8];
 } Family;
-
-enum {
-    GET_REAL, SET_REAL, GET_INTEGER, SET_INTEGER, GET_BOOLEAN, SET_BOOLEAN, DO_STEP, GET_STATE, SET_STATE,
-    FREE_STATE
-};
 
 /* The functions of a block that are called. */
 #define FUNCTIONS(X, id)                                                                            \
@@ -168,30 +164,16 @@ static void put(Model *m, size_t at, const void *pointer) {
     memcpy((char *)&m->now.scene + at, &pointer, sizeof pointer);
 }
 
-static const void *function(const Member *member, int which) {
-    switch (which) {
-    case GET_REAL: return (const void *)member->get;
-    case SET_REAL: return (const void *)member->set;
-    case GET_INTEGER: return (const void *)member->get_integer;
-    case SET_INTEGER: return (const void *)member->set_integer;
-    case GET_BOOLEAN: return (const void *)member->get_boolean;
-    case SET_BOOLEAN: return (const void *)member->set_boolean;
-    case DO_STEP: return (const void *)member->step;
-    case GET_STATE: return (const void *)member->get_state;
-    case FREE_STATE: return (const void *)member->free_state;
-    }
-    return (const void *)member->set_state;
-}
-
 static void use_chosen(Model *m);
 
-/* Writes all pointers of the scene: into itself, to the blocks and to their functions. */
+/* Writes all pointers of the scene: into itself, to the blocks and to their functions, the pointers of a
+ * Member. */
 static void relocate(Model *m) {
     for (int i = 0; i < N_POINTERS; i++)
         put(m, pointers[i].at, (char *)&m->now.scene + pointers[i].to);
     for (int i = 0; i < N_HANDLES; i++) put(m, handles[i].at, m->members[handles[i].member]);
     for (int i = 0; i < N_CALLS; i++)
-        put(m, calls[i].at, function(members + calls[i].member, calls[i].function));
+        put(m, calls[i].at, *(void *const *)((const char *)(members + calls[i].member) + calls[i].function));
     for (int i = 0; i < N_SLOTS; i++) put(m, slots[i], m->slots + i);
     use_chosen(m);
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
@@ -20,7 +20,7 @@ def of_scene(scene: Scene) -> None:
     try:
         load()
     except Unavailable as why:
-        _refuse(scene.title, [f"there is no compiled loop here: {why}"])
+        refuse(scene.title, [f"there is no compiled loop here: {why}"])
     reasons = []
     if scene.at:
         reasons.append("[[at]]: what happens at given times is done by Python")
@@ -29,7 +29,7 @@ def of_scene(scene: Scene) -> None:
         reasons.append("coupling = 'iterated': steps are repeated by Python")
     if scene.faults.discard == "retry":
         reasons.append("faults.discard = 'retry': steps are repeated by Python")
-    _refuse(scene.title, reasons)
+    refuse(scene.title, reasons)
 
 
 def of_system(system: System, outside: str | None, scene: Scene) -> dict[str, Foreign]:
@@ -48,7 +48,7 @@ def of_system(system: System, outside: str | None, scene: Scene) -> dict[str, Fo
             reasons.append(f"{name} ({description.path}) is an FMU that exists already, and {why}")
     if reasons:
         reasons.append(f"an FMU can be left out: --without {reasons[0].partition(' ')[0]}")
-    _refuse(scene.title, reasons)
+    refuse(scene.title, reasons)
     return foreign
 
 
@@ -65,28 +65,10 @@ def of_simulation(simulation: Simulation, title: str) -> None:
         assert isinstance(instance, InProcess)
         if instance.retry:
             reasons.append(f"{name} repeats steps, which a program does not")
-    _refuse(title, reasons)
+    refuse(title, reasons)
 
 
-def of_start(simulation: Simulation, title: str) -> None:
-    """Raises InputFault for start values that sweeps over the blocks do not settle."""
-    if not simulation.swept:
-        _refuse(title, ["an algebraic loop at t = 0 is solved by Newton's method, in Python"])
-
-
-def of_machine(in_python: Mapping[str, str], title: str) -> None:
-    """Raises InputFault for operations that the compiled loop leaves to Python."""
-    _refuse(title, [f"{operation}: {why}" for operation, why in in_python.items()])
-
-
-def of_page(foreign: Mapping[str, Foreign], title: str) -> None:
-    """Raises InputFault for FMUs that read files, which a page does not have."""
-    _refuse(
-        title,
-        (f"{n} has resources, files that a page lacks" for n in foreign if foreign[n].resources),
-    )
-
-
-def _refuse(title: str, reasons: Iterable[str]) -> None:
+def refuse(title: str, reasons: Iterable[str]) -> None:
+    """Raises InputFault where there are reasons."""
     if lines := [f"  {reason}" for reason in reasons]:
         raise InputFault("\n".join([f"{title} cannot become one program:", *lines]))

@@ -138,7 +138,9 @@ def resolved(
         simulation = Simulation(system, RunFolder(room), stack)
         refusals.of_simulation(simulation, scene.title)
         simulation.start()
-        refusals.of_start(simulation, scene.title)
+        if not simulation.swept:
+            why = "an algebraic loop at t = 0 is solved by Newton's method, in Python"
+            refusals.refuse(scene.title, [why])
         recorded = _recorded(fetched)
         yield _resolved(scene, plan, simulation, outside, foreign, rooms, recorded, changing)
 
@@ -199,7 +201,8 @@ def _resolved(
         every = instructions(plan.block(event), simulation)
         kinds[event] = machine.block([i for i in every if getattr(i, "fmu", "") != outside])
     possible = changes(machine, simulation, plan, kinds) if changing else NONE
-    refusals.of_machine(machine.in_python, scene.title)
+    left = machine.in_python.items()
+    refusals.refuse(scene.title, (f"{operation}: {why}" for operation, why in left))
     events = Events(system.timeline, kinds, possible)
     fmus, memory = machine.names("fmu"), Memory()
     into = [n for n in fmus if any(c.target == n for c in system.connections)]

@@ -3,45 +3,30 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import json
 import re
-import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hapticlink.components.component import Component
+from hapticlink.fmus.cache import sha
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
 from hapticlink.fmus.native.native_fmu import COMMON, WRAPPER
-from hapticlink.fmus.native.source import component_source, number
+from hapticlink.fmus.native.source import component_source, number, table
+from hapticlink.fmus.reproducible_zip import guid_of
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
-from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.run.compiled import build as loop
-from hapticlink.programs.memory_regions import Regions
+from hapticlink.programs.memory_as_c import Regions, TypedData
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.programs.typed_data import TypedData
 
 HERE = Path(__file__).parent
-OWN = ("program.h", "program.c", "changes.h", "platform.c", "latencies.c")
+OWN = ("program.c", "changes.h", "latencies.h", "platform.c")
 REPLACED = ("platform.c", "process_state.c")
 """Files of the loop in whose place a program has its own platform.c."""
-FUNCTIONS = {
-    "fmi2GetReal": "GET_REAL",
-    "fmi2SetReal": "SET_REAL",
-    "fmi2GetInteger": "GET_INTEGER",
-    "fmi2SetInteger": "SET_INTEGER",
-    "fmi2GetBoolean": "GET_BOOLEAN",
-    "fmi2SetBoolean": "SET_BOOLEAN",
-    "fmi2DoStep": "DO_STEP",
-    "fmi2GetFMUstate": "GET_STATE",
-    "fmi2SetFMUstate": "SET_STATE",
-    "fmi2FreeFMUstate": "FREE_STATE",
-}
 
 
 def sources(
@@ -55,15 +40,16 @@ def sources(
     files |= {name: (HERE / name).read_text() for name in OWN}
     files |= {name: (HEADERS / name).read_text(errors="replace") for name in FMI2_HEADERS}
     ids, guids = identifiers(resolved.members), {}
-    required = {f"fmi2{name}" for name in re.findall(r"X\(id, (\w+),", files["program.c"])}
+    listed = re.findall(r"X\(id, (\w+), (\w+)\)", files["program.c"])
+    functions = {f"fmi2{name}": field for name, field in listed}
     for fmu, id_ in ids.items():
         if fmu in resolved.foreign:
             guids[fmu] = resolved.foreign[fmu].description.guid
-            files |= resolved.foreign[fmu].sources(id_, required)
+            files |= resolved.foreign[fmu].sources(id_, {*functions})
         else:
             guids[fmu], own = _member(id_, components[fmu])
             files |= own
-    files["scene.h"] = _scene(resolved, ports, ids, guids)
+    files["scene.h"] = _scene(resolved, ports, ids, guids, functions)
     return files
 
 
@@ -76,7 +62,7 @@ def _member(id_: str, component: Component) -> tuple[str, dict[str, str]]:
     """The GUID of a block, and its files: fmi2.c with the component's functions, all names that the
     linker sees with the block's prefix."""
     header, pieces = component_source(component)
-    guid = f"{{{uuid.UUID(hashlib.sha256(header.encode()).hexdigest()[:32])}}}"
+    guid = guid_of(sha(header))
     prefix = f"#undef fmi2FullName\n#define fmi2FullName(name) {id_}_ ## name\n"
     own = f'{prefix}#define GUID "{guid}"\n{header}'
     text = WRAPPER.read_text().replace('#include "component.h"', own)
@@ -90,17 +76,23 @@ def prefixed(text: str, id_: str) -> str:
 
 
 def _scene(
-    resolved: Resolved, ports: Sequence[Port], ids: Mapping[str, str], guids: Mapping[str, str]
+    resolved: Resolved,
+    ports: Sequence[Port],
+    ids: Mapping[str, str],
+    guids: Mapping[str, str],
+    functions: Mapping[str, str],
 ) -> str:
+    """scene.h. functions: the fields of a Member in program.c by FMI function."""
     members = [*ids]
-    handles = {_component(resolved.instance(fmu)): i for i, fmu in enumerate(members)}
-    functions = {
-        _address(resolved.instance(fmu).slave.dll[name]): name
-        for fmu in members
-        for name in FUNCTIONS
+    slaves = [resolved.instance(fmu).slave for fmu in members]
+    handles = {slave.component: i for i, slave in enumerate(slaves)}
+    addresses = {
+        ctypes.cast(slave.dll[name], ctypes.c_void_p).value or 0: field
+        for slave in slaves
+        for name, field in functions.items()
     }
     regions = Regions(resolved.roots, resolved.counts)
-    data = TypedData(regions, handles, functions)
+    data = TypedData(regions, handles, addresses)
     changes = resolved.changes
     settable = [p for p in ports if p.kind in ("INPUT", "OUTSIDE", "PARAMETER")]
     latencies = [*_latencies(resolved)]
@@ -158,8 +150,9 @@ def _scene(
                 f"{{{_at(a)}, {_at(b)}}}" for a, b in data.pointers)),
             table("struct { size_t at; int member; } handles", (
                 f"{{{_at(a)}, {member}}}" for a, member in data.handles)),
-            table("struct { size_t at; int member, function; } calls", (
-                f"{{{_at(a)}, {member}, {FUNCTIONS[name]}}}" for a, member, name in data.calls)),
+            table("struct { size_t at; int member; size_t function; } calls", (
+                f"{{{_at(a)}, {member}, offsetof(Member, {field})}}"
+                for a, member, field in data.calls)),
             table("size_t slots", (_at(place) for place, _ in data.slots)),
             table("int slot_members", map(str, slot_members)),
             table("int member_fmus", (str(resolved.fmus.index(fmu)) for fmu in members)),
@@ -212,24 +205,8 @@ def _changes(resolved: Resolved, regions: Regions) -> Iterator[str]:
         f"{{{int(b)}, {int(c)}, {int(d)}, {number(x)}}}" for b, c, d, x in slopes))  # fmt: skip
 
 
-def _component(instance: InProcess) -> int:
-    component: int = instance.slave.component
-    return component
-
-
-def _address(function: Any) -> int:
-    return ctypes.cast(function, ctypes.c_void_p).value or 0
-
-
 def _at(place: str) -> str:
     return f"offsetof(Scene, {place})"
-
-
-def table(declared: str, entries: Iterable[str]) -> str:
-    """A C array with an additional entry of zeros at its end, since a C array must not be empty."""
-    rows = [f"    {entry}," for entry in entries]
-    zero = "{0}" if any(row.endswith("},") for row in rows) else "0"
-    return "\n".join([f"static const {declared}[] = {{", *rows, f"    {zero}}};"])
 
 
 def _given(resolved: Resolved, members: Sequence[str]) -> Iterator[str]:

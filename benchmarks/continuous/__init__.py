@@ -12,12 +12,12 @@ start. The largest difference of their handles is the floor: smaller errors mean
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.rows import Rows
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -68,18 +68,11 @@ def reference(name: str, end: float = 3.0, tolerance: float = 1e-12) -> Referenc
 
 def kept(path: Path, name: str) -> Reference:
     """The reference of a scene, from the CSV file `path`, or computed and appended to it."""
-    if path.exists():
-        with path.open(newline="") as file:
-            rows = [row for row in csv.DictReader(file) if row["scene"] == name]
-        if rows:
-            values = np.array([[float(row[c]) for c in COLUMNS[2:]] for row in rows])
-            return Reference(values[:, :2], values[:, 2:])
-    made = reference(name)
-    new = not path.exists()
-    with path.open("a", newline="") as file:
-        writer = csv.writer(file)
-        if new:
-            writer.writerow(COLUMNS)
+    rows = Rows(path, COLUMNS, keys=2)
+    if (name, 0.0) not in rows:
+        made = reference(name)
         for k, (a, b) in enumerate(zip(made.relative, made.absolute, strict=True)):
-            writer.writerow([name, repr(k / GRID), *map(repr, (*a.tolist(), *b.tolist()))])
-    return made
+            rows.add(name, k / GRID, *a.tolist(), *b.tolist())
+    mine = [row for row in rows.rows.values() if row["scene"] == name]
+    values = np.array([[float(row[c]) for c in COLUMNS[2:]] for row in mine])
+    return Reference(values[:, :2], values[:, 2:])

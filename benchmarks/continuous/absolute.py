@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.continuous.device import Pantograph
-from benchmarks.continuous.guards import Guards
 from benchmarks.continuous.hand import Hand
+from benchmarks.continuous.march import Guards
 from benchmarks.continuous.touching import Touching
 from benchmarks.maximal import Bodies
 from hapticlink.components.specs.control import Topology
@@ -42,7 +42,9 @@ class Absolute:
         self._bodies, self._device = Bodies(linkage), Pantograph(scene.device)
         self._touching = Touching(linkage, scene.contacts, self._bodies)
         self._n = self._bodies.mechanism.n
-        self._K, self._B = (np.array(getattr(law.teleoperation, k)) for k in _GAINS)
+        self._K, self._B = (
+            np.array(getattr(law.teleoperation, k)) for k in ("stiffness", "damping")
+        )
         self._topology = Topology() if law.topology is True else law.topology
         self._felt, self._sent = law.contact, law.bias == "full"
         self.guards = Guards(scene, self.mobility)
@@ -96,6 +98,3 @@ class Absolute:
         inside = V.T @ (s[:, None] * np.linalg.inv(M) * s) @ V
         pull = self._topology.stiffness * e + self._topology.damping * rate
         return s * (V @ np.linalg.solve(inside, V.T @ (s * pull)))
-
-
-_GAINS = ("stiffness", "damping")

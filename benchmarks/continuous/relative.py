@@ -17,8 +17,8 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from benchmarks.continuous.guards import Guards
 from benchmarks.continuous.hand import Hand
+from benchmarks.continuous.march import Guards
 from hapticlink.components.component import Component
 from hapticlink.components.device import pantograph
 from hapticlink.components.device.numeric_torques import numbers

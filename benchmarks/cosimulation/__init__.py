@@ -7,18 +7,18 @@ from pathlib import Path
 import hapticlink.orchestrator
 from benchmarks import code_version
 from benchmarks.continuous import kept
-from benchmarks.cosimulation.measure import Progress, measure
+from benchmarks.cosimulation import page
+from benchmarks.cosimulation.measure import measure
 from benchmarks.cosimulation.points import CONTACT, LOOP, points
+from benchmarks.page import Progress
 
 ROUNDS = 5
 KEPT = ("reference.csv", "runs.csv")
 
 
-def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
-    """Write README.md, the figure and the rows to `out`; finished rows and references of the same
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes the figure and the rows to `out`; finished rows and references of the same
     version of the code are reused."""
-    from benchmarks.cosimulation import page  # loads Matplotlib
-
     code_version.begin(out, KEPT, hapticlink.orchestrator)
     references = {}
     for k, name in enumerate((LOOP, CONTACT)):
@@ -26,4 +26,4 @@ def bench(out: Path, quick: bool, progress: Progress, command: str) -> None:
         references[name] = kept(out / "reference.csv", name)
     chosen = points(quick)
     rows = measure(out / "runs.csv", chosen, references, 2 if quick else ROUNDS, progress)
-    page.write(out, rows, references, command)
+    return page.page(out, rows, references, command)

@@ -10,9 +10,9 @@ from textwrap import fill
 
 from benchmarks.continuous import GRID, Reference
 from benchmarks.cosimulation import figure
-from benchmarks.cosimulation.front import Measured, front, measured
-from benchmarks.cosimulation.measure import APART
+from benchmarks.cosimulation.measure import APART, Measured, front, measured
 from benchmarks.cosimulation.points import CONTACT, ITERATED, LOOP, NONE, STUDY, Point
+from benchmarks.page import table
 from benchmarks.rows import Rows, quartiles
 
 DURATION = 3.0
@@ -22,15 +22,15 @@ BASES = {LOOP: Point(rate=RATE), CONTACT: Point(scene=CONTACT, substeps=2, rate=
 FILE = "error-against-run-time.png"
 
 
-def write(out: Path, rows: Rows, references: Mapping[str, Reference], command: str) -> None:
-    """README.md, the figure, and table.csv with a row for each point."""
+def page(out: Path, rows: Rows, references: Mapping[str, Reference], command: str) -> str:
+    """Writes the figure, and table.csv with a row for each point."""
     found = {scene: measured(rows, scene) for scene in (LOOP, CONTACT)}
     _table(out / "table.csv", found)
-    figure.draw(out / FILE, found)
+    figure.write(out, FILE, found)
     parts = ["# Run time against error of the whole co-simulation", _finding(found)]
     parts += [f"![Largest error of the handle against run time]({FILE})"]
     parts += [_how(references, found, command), *_fronts(found), *_choices(found)]
-    (out / "README.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    return "\n\n".join(parts) + "\n"
 
 
 def _finding(found: Mapping[str, Sequence[Measured]]) -> str:
@@ -101,22 +101,23 @@ def _study(found: Mapping[str, Sequence[Measured]]) -> Iterator[str]:
 def _fronts(found: Mapping[str, Sequence[Measured]]) -> Iterator[str]:
     for scene, points in found.items():
         unstable = sum(m.unstable for m in points)
+        rows = []
+        for number, m in enumerate(front(points), 1):
+            first, middle, third = (1e3 * t / DURATION for t in m.time)
+            time = f"{middle:.2f} ({first:.2f} to {third:.2f})"
+            errors = f"{m.most:.3g}", f"{m.first:.2g}", f"{m.rms:.2g}"
+            rows.append((number, ", ".join(m.point.settings()), time, *errors))
+        heads = (
+            "| settings | ms per simulated second, quartiles | largest error, mm | in the first "
+            "second | RMS"
+        )
         lines = [
             f"## The front of `{scene}`",
             "",
             f"Of {len(points)} points, {unstable} unstable.",
             "",
-            "| | settings | ms per simulated second, quartiles | largest error, mm | in the first "
-            "second | RMS |",
-            "|--:|---|---|--:|--:|--:|",
+            *table(heads, "rllrrr", rows),
         ]
-        for number, m in enumerate(front(points), 1):
-            first, middle, third = (1e3 * t / DURATION for t in m.time)
-            time = f"{middle:.2f} ({first:.2f} to {third:.2f})"
-            lines.append(
-                f"| {number} | {', '.join(m.point.settings())} | {time} | "
-                f"{m.most:.3g} | {m.first:.2g} | {m.rms:.2g} |"
-            )
         yield "\n".join(lines)
 
 
@@ -138,9 +139,8 @@ def _choices(found: Mapping[str, Sequence[Measured]]) -> Iterator[str]:
             f"`{scene}`: the base takes {_ms(base):.2f} ms per simulated second and errs by "
             f"{base.most:.3g} mm ({base.first:.2g} mm in the first second).",
             "",
-            "| choice | run time over the base's | largest error, mm | in the first second |",
-            "|---|---|--:|--:|",
         ]
+        rows = []
         for name, point in _singles(BASES[scene]):
             if m := by.get(point):
                 ratios = [a / b for a, b in zip(m.times, base.times, strict=False)]
@@ -148,8 +148,9 @@ def _choices(found: Mapping[str, Sequence[Measured]]) -> Iterator[str]:
                 why = "too far" if m.end == "duration" else m.end
                 error = f"{m.most:.3g}" + (f", unstable ({why})" if m.unstable else "")
                 spread = f"{middle:.2f} ({first:.2f} to {third:.2f})"
-                lines.append(f"| {name} | {spread} | {error} | {m.first:.2g} |")
-        yield "\n".join(lines)
+                rows.append((name, spread, error, f"{m.first:.2g}"))
+        heads = "choice | run time over the base's | largest error, mm | in the first second"
+        yield "\n".join([*lines, *table(heads, "llrr", rows)])
 
 
 def _singles(base: Point) -> Iterator[tuple[str, Point]]:

@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import numpy as np
 from benchmarks import mechanisms
 from benchmarks.mechanism.errors import ALL, setting
 from benchmarks.our_mechanism import Ours
+from benchmarks.page import Progress
 from benchmarks.rows import Rows
 from hapticlink.components.specs.linkage import Mechanism
 
@@ -23,7 +23,7 @@ COLUMNS = ("integrator", "stabilization", "closure_m", "energy_drift")
 ENERGY, END, RATE, NONE = 12.6e-3, 200, 512, (0.0, 0.0, 0.0)
 
 
-def measure(out: Path, progress: Callable[[str, int, int], None]) -> list[dict[str, str]]:
+def measure(out: Path, progress: Progress) -> list[dict[str, str]]:
     """Largest closure error (m) and relative energy change over the run, sampled every 1/8 s."""
     rows = Rows(out / "energy.csv", COLUMNS, keys=2)
     bar = mechanisms.five_bar()

@@ -12,15 +12,17 @@ import importlib
 import json
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import cache, partial
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from benchmarks import mechanisms
-from benchmarks.mechanism import reference
+from benchmarks.maximal import Bodies
 from benchmarks.our_mechanism import Ours
+from benchmarks.page import Progress
 from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.linkage import Linkage, Mechanism
@@ -36,6 +38,7 @@ EVALUATIONS = {
 COLUMNS = ("case", "code", "method", "rate", "round", "seconds", "x", "y")
 LOST = 0.1  # m; with a larger error the run has diverged
 SLOW = 3.0  # s; a run this long is not repeated
+MANY = 40  # bodies with which a step of a loop in Python takes 7 ms and more, and is left out
 NATIVE, MACHINE = "ours, C", "ours, CasADi VM"
 Run = Callable[[int], tuple[float, float, float]]
 
@@ -47,9 +50,8 @@ class Case:
     end: float
     rates: tuple[int, ...]
     exact: Callable[[], tuple[np.ndarray, float]]
+    settings: tuple[tuple[str, str], ...]
     wrench: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    settings: tuple[tuple[str, str], ...] = ()
-    skip: tuple[tuple[str, str], ...] = field(default=())
 
 
 PROJECTED = ("passive-midpoint",)
@@ -73,38 +75,15 @@ def cases(quick: bool) -> list[Case]:
     wrench = (-0.5, 0.0, -0.0025)
     bar = mechanisms.five_bar()
     start = Ours(bar, wrench, Mechanism(), 1 / 512)
-    found = [
-        Case(
-            "five-bar, 3 s",
-            bar,
-            3.0,
-            (128, 512, 2048) if quick else (128, 256, 512, 1024, 2048, 4096),
-            lambda: reference.tip(start, 3.0),
-            wrench,
-            ALL,
-        ),
-        Case(
-            "N-four-bar, N = 2, 10 s",
-            mechanisms.n_four_bar(2),
-            10.0,
-            (250, 1000) if quick else (125, 250, 500, 1000, 2000, 4000),
-            closed_form(2),
-            settings=ALL,
-        ),
-    ]
-    if not quick:
-        python_loop = ("Pinocchio", "rk4, projected (Python loop)")  # 7 ms a step
-        found.append(
-            Case(
-                "N-four-bar, N = 40, 10 s",
-                mechanisms.n_four_bar(40),
-                10.0,
-                (250, 500, 1000),
-                closed_form(40),
-                settings=FEW,
-                skip=(python_loop,),
-            )
-        )
+    exact = partial(tip, start, 3.0)
+    rates: tuple[int, ...] = (128, 512, 2048) if quick else (128, 256, 512, 1024, 2048, 4096)
+    found = [Case("five-bar, 3 s", bar, 3.0, rates, exact, ALL, wrench)]
+    for N, rates, settings in (
+        (2, (250, 1000) if quick else (125, 250, 500, 1000, 2000, 4000), ALL),
+        *([] if quick else [(40, (250, 500, 1000), FEW)]),
+    ):
+        name, linkage = f"N-four-bar, N = {N}, 10 s", mechanisms.n_four_bar(N)
+        found.append(Case(name, linkage, 10.0, rates, closed_form(N), settings))
     return found
 
 
@@ -126,30 +105,19 @@ def tasks(
     start = Ours(case.linkage, case.wrench, Mechanism(), 1 / 512).start
     q, qd = np.split(start, 2)
 
-    @cache
-    def ours(integrator: str, stabilization: str, rate: int) -> Ours:
-        return Ours(case.linkage, case.wrench, setting(integrator, stabilization), 1 / rate)
-
-    def native(integrator: str, stabilization: str, rate: int) -> Run:
-        return ours(integrator, stabilization, rate).native(folder)
-
-    def machine(integrator: str, stabilization: str, rate: int) -> Run:
-        return ours(integrator, stabilization, rate).virtual_machine()
-
     for rate in case.rates:
         for chosen in case.settings:
-            yield NATIVE, ", ".join(chosen), rate, partial(native, *chosen, rate)
-            yield MACHINE, ", ".join(chosen), rate, partial(machine, *chosen, rate)
+            ours = Ours(case.linkage, case.wrench, setting(*chosen), 1 / rate)
+            yield NATIVE, ", ".join(chosen), rate, partial(ours.native, folder)
+            yield MACHINE, ", ".join(chosen), rate, ours.virtual_machine
         for peer in codes:
             for method in peer.METHODS:
-                if (peer.NAME, method) not in case.skip:
+                if "Python loop" not in method or len(case.linkage.body) < MANY:
                     arguments = case.linkage, np.array(case.wrench), q, qd, method, 1 / rate
                     yield peer.NAME, method, rate, partial(peer.prepare, *arguments)
 
 
-def measure(
-    out: Path, quick: bool, progress: Callable[[str, int, int], None]
-) -> tuple[dict[str, list[dict]], list[str]]:
+def measure(out: Path, quick: bool, progress: Progress) -> tuple[dict[str, list[dict]], list[str]]:
     """Run the cases that runs.csv lacks; returns the aggregated rows by case and the codes that are
     not installed."""
     rows = Rows(out / "runs.csv", COLUMNS, keys=5)
@@ -181,11 +149,11 @@ def _exact(case: Case, out: Path) -> tuple[np.ndarray, float]:
     path = out / "references.json"
     kept = json.loads(path.read_text()) if path.exists() else {}
     if case.name not in kept:
-        tip, floor = case.exact()
-        kept[case.name] = [*map(float, tip), floor]
+        exact, floor = case.exact()
+        kept[case.name] = [*map(float, exact), floor]
         path.write_text(json.dumps(kept, indent=1))
-    *tip, floor = kept[case.name]
-    return np.array(tip), floor
+    *known, floor = kept[case.name]
+    return np.array(known), floor
 
 
 def _aggregate(rows: Rows, case: Case, exact: np.ndarray, floor: float) -> list[dict]:
@@ -239,3 +207,41 @@ def advantage(rows: list[dict], peer: str) -> list[tuple[float, float, float]]:
         ratio = row["ms_per_s"] / min(as_good) if as_good else math.nan
         found.append((row["error"], row["ms_per_s"], ratio))
     return found
+
+
+TOLERANCE = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
+
+
+def tip(ours: Ours, end: float) -> tuple[np.ndarray, float]:
+    """(x, y) of the operational point at `end` (s), and the error floor (m), which is by how much
+    two formulations differ: the component's own accelerations in joint coordinates, and every body
+    in absolute coordinates, with multipliers by least squares."""
+    first, second = _relative(ours, end), _maximal(ours, end)
+    return second, float(np.linalg.norm(first - second))
+
+
+def _relative(ours: Ours, end: float) -> np.ndarray:
+    n = len(ours.start) // 2
+
+    def f(_: float, x: np.ndarray) -> np.ndarray:
+        return np.r_[x[n:], ours.outputs(x)["qdd"]]
+
+    last = solve_ivp(f, (0, end), ours.start, **TOLERANCE).y[:, -1]
+    return ours.outputs(last)["x"][:2]
+
+
+def _maximal(ours: Ours, end: float) -> np.ndarray:
+    bodies = Bodies(ours.linkage)
+    joined, n = bodies.mechanism, bodies.mechanism.n
+    wrench = np.array(ours.wrench)
+
+    def f(_: float, y: np.ndarray) -> np.ndarray:
+        z, zd = y[:n], y[n:]
+        G, gamma = joined.closures(z, zd)
+        J = joined.point(z, zd, bodies.tip)[1]
+        force = bodies.weight.ravel() + J.T @ wrench
+        return np.r_[zd, joined.accelerations(G, gamma[:, None], force[:, None])[:, 0]]
+
+    first = np.concatenate(bodies.start(*np.split(ours.start, 2)))
+    last = solve_ivp(f, (0, end), first, **TOLERANCE).y[:, -1]
+    return joined.point(last[:n], last[n:], bodies.tip)[0][:2]

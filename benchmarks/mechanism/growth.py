@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks import mechanisms
 from benchmarks.our_mechanism import Ours
+from benchmarks.page import Progress
 from benchmarks.rows import Rows
 from hapticlink.components.specs.linkage import Mechanism
 
@@ -15,9 +15,7 @@ COLUMNS = ("mechanism", "bodies", "build_s", "instructions", "vm_us", "c_us")
 STEPS = 500
 
 
-def measure(
-    out: Path, quick: bool, progress: Callable[[str, int, int], None]
-) -> list[dict[str, str]]:
+def measure(out: Path, quick: bool, progress: Progress) -> list[dict[str, str]]:
     rows = Rows(out / "growth.csv", COLUMNS, keys=2)
     sizes = (5, 10, 20) if quick else (5, 10, 20, 40, 80, 160)
     wanted = [("serial chain", n, mechanisms.chain(n)) for n in sizes]

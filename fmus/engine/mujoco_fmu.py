@@ -42,9 +42,10 @@ accelerations by forces Q that the closures allow:
 
 
 def entries(
-    component: Component, settings: Mapping[str, Any], *, stop_time: float, step_size: float
+    component: Component, settings: Mapping[str, Any], **experiment: float
 ) -> dict[str, bytes]:
-    """All files of the FMU of `component` by MuJoCo; `settings` are those of its block. Raises
+    """All files of the FMU of `component` by MuJoCo; `settings` are those of its block, experiment
+    as of `described`. Raises
     FmuError, with the remedy, where mujoco is not installed and for what it does not hold."""
     if find_spec("mujoco") is None:
         raise FmuError('engine = "mujoco" needs MuJoCo: pip install "hapticlink[engine]"')
@@ -82,9 +83,7 @@ def entries(
         "resources/engine.json": json.dumps(about).encode(),
     }
     module = Path(__file__).with_name("mujoco_functions.py").read_bytes()
-    return packed(
-        reduced, functions, {"n_shared": 0}, stop_time=stop_time, step_size=step_size, engine=module
-    )
+    return packed(reduced, functions, {"n_shared": 0}, module, **experiment)
 
 
 def _misfits(component: Component, settings: Mapping[str, Any]) -> Iterator[str]:

@@ -1,6 +1,11 @@
 """Compiles C to a shared library, for this machine or another one, with the package `ziglang`.
 
 The same source, platform and version of ziglang give the same bytes on every machine.
+
+zig keeps the C library that it builds for each target, which linking needs, in a cache. A second
+zig that starts within a tenth of a second of a first one with the same cache waits for a lock until
+the first one has compiled, and two that find no library build it both. So each target has a cache,
+which one zig uses at a time to link; compiling needs no cache.
 """
 
 from __future__ import annotations
@@ -13,14 +18,14 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import fmpy
 
+from hapticlink.fmus import cache, lock
 from hapticlink.fmus.errors import CompilerError, FmuError
-from hapticlink.fmus.native.compiler_cache import CHOICE, linker_cache
 from hapticlink.fmus.native.linking import system_libraries
 from hapticlink.fmus.versions import install_command, version
 
@@ -52,6 +57,8 @@ LINK = ("-shared", "-s")
 WEBASSEMBLY = "wasm32-wasi"
 WEBASSEMBLY_FLAGS = ("-std=gnu11", "-Os", *_ARITHMETIC, "-g0", "-fvisibility=hidden")
 _ZIG = (sys.executable, "-m", "ziglang")
+ZIG_CACHE = "ZIG_GLOBAL_CACHE_DIR"
+"""zig's own environment variable: a folder that the user has chosen is used as it is."""
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 FMI2_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 
@@ -96,38 +103,35 @@ def compile_library(
     (-DNAME=VALUE, -fvisibility=default). Raises FmuError for an unknown platform, CompilerError
     with the compiler's output if the source does not compile.
     """
-    compiler_version()
-    library = Path(library).resolve()
-    targets = TARGETS.get(platform or host_platform())
-    if targets is None:
-        raise FmuError(f"no platform {platform!r}; there are {', '.join(PLATFORMS)}")
-    if len(targets) > 1 and not isinstance(source, (Path, str)):
-        source = [*source]
+    library, files = Path(library).resolve(), source
+    if isinstance(files, (Path, str)):
+        files = [Path(files)]
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        slices = [_compiled(source, Path(folder), target, options) for target in targets]
-        library.write_bytes(_joined(slices))
+        made = binaries(files, "", Path(folder), [platform or host_platform()], options)
+        library.write_bytes(next(made)[1])
     return library
 
 
 def binaries(
-    source: Sequence[Path],
+    source: Iterable[Path],
     name: str,
     folder: Path,
     platforms: Sequence[str],
-    options: Sequence[str],
+    options: Sequence[str] = (),
 ) -> Iterator[tuple[str, bytes]]:
     """Entries of an FMU with the shared library `name` for each of the platforms, compiled side by
     side in `folder`. Raises as `compile_library`."""
+    compiler_version()
+    if unknown := [platform for platform in platforms if platform not in TARGETS]:
+        raise FmuError(f"no platform {unknown[0]!r}; there are {', '.join(PLATFORMS)}")
     targets = [target for platform in platforms for target in TARGETS[platform]]
+    files = source if len(targets) == 1 else [*source]
     with ThreadPoolExecutor(len(targets)) as pool:
-        compiled = pool.map(lambda target: _compiled(source, folder, target, options), targets)
+        compiled = pool.map(lambda target: _compiled(files, folder, target, options), targets)
         made = dict(zip(targets, compiled, strict=True))
     for platform in platforms:
-        yield entry(platform, name), _joined([made[target] for target in TARGETS[platform]])
-
-
-def _joined(slices: Sequence[bytes]) -> bytes:
-    return universal(slices) if len(slices) > 1 else slices[0]
+        slices = [made[target] for target in TARGETS[platform]]
+        yield entry(platform, name), universal(slices) if len(slices) > 1 else slices[0]
 
 
 def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[str] = ()) -> bytes:
@@ -137,9 +141,7 @@ def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[
     return _compiled(source, folder, WEBASSEMBLY, options)
 
 
-def _compiled(
-    source: Path | str | Iterable[Path], folder: Path, target: str, options: Sequence[str]
-) -> bytes:
+def _compiled(source: Iterable[Path], folder: Path, target: str, options: Sequence[str]) -> bytes:
     own_folder = folder / target
     own_folder.mkdir()
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
@@ -155,12 +157,12 @@ def _compiled(
 
 
 def _objects(
-    source: Path | str | Iterable[Path], folder: Path, target: str, options: Sequence[str]
+    source: Iterable[Path], folder: Path, target: str, options: Sequence[str]
 ) -> list[str]:
     """Compiles C files side by side, and returns the names of the object files in `folder`."""
     jobs = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for file in [Path(source)] if isinstance(source, (Path, str)) else source:
+        for file in source:
             command = [*options, "-c", "-o", f"{file.stem}.o", str(file.resolve())]
             jobs[f"{file.stem}.o"] = pool.submit(_zig, command, folder, target)
     for job in jobs.values():
@@ -192,15 +194,34 @@ def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
     command = [*_ZIG, "cc", "-target", target, *flags, f"-I{HEADERS}", *arguments]
     with tempfile.TemporaryDirectory(dir=folder) as local:
         # zig keeps its own C library in its cache, but not our code.
-        compiles = nullcontext({CHOICE: local}) if "-c" in command else linker_cache(target)
-        with compiles as cache:
-            environment = {**os.environ, **cache, "ZIG_LOCAL_CACHE_DIR": local}
+        compiles = nullcontext({ZIG_CACHE: local}) if "-c" in command else linker_cache(target)
+        with compiles as chosen:
+            environment = {**os.environ, **chosen, "ZIG_LOCAL_CACHE_DIR": local}
             done = subprocess.run(
                 command, cwd=folder, env=environment, capture_output=True, text=True, check=False
             )
     if done.returncode:
         name = Path(command[-1]).name
         raise CompilerError(f"{name} does not compile for {target}:\n{done.stderr.strip()}")
+
+
+@contextmanager
+def linker_cache(target: str) -> Iterator[dict[str, str]]:
+    """The environment variables to link for a target; none where no cache can be written."""
+    root = cache.user_folder() / "zig"
+    if ZIG_CACHE not in os.environ and _writable(root):
+        with lock.held(root / f"{target}.lock", lambda: None):
+            yield {ZIG_CACHE: str(root / target)}
+    else:
+        yield {}
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
 
 
 _CPU = {0x01000007: 3, 0x0100000C: 0}  # x86-64 and ARM64, with the subtype "all" of each

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
@@ -12,23 +11,22 @@ from pathlib import Path
 from hapticlink.components.component import Component
 from hapticlink.fmus import model_description
 from hapticlink.fmus.described import described
-from hapticlink.fmus.documentation import documentation
+from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.fmu_functions import GRAPHS
 from hapticlink.fmus.native.compiler import (
     FLAGS,
     FMI2_HEADERS,
     HEADERS,
     TARGETS,
-    compile_library,
+    binaries,
     compiler_version,
-    entry,
 )
 from hapticlink.fmus.native.fmi3_interface import fmi3_sources
 from hapticlink.fmus.native.linking import WINDOWS
 from hapticlink.fmus.native.source import component_source
 from hapticlink.fmus.python_fmu import check_functions
 from hapticlink.fmus.reference_run import reference_run
-from hapticlink.fmus.reproducible_zip import digest
+from hapticlink.fmus.reproducible_zip import digest, guid_of
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
 COMMON = Path(__file__).parent / "fmi2_common.h"
@@ -38,14 +36,12 @@ COMMON = Path(__file__).parent / "fmi2_common.h"
 def entries(
     component: Component,
     folder: Path,
-    *,
-    stop_time: float,
-    step_size: float,
     platforms: Sequence[str],
     fmi: int = 2,
+    **experiment: float,
 ) -> dict[str, bytes]:
     """All files of the FMU, with a binary for each of `platforms`, compiled in `folder`, and in
-    sources/ the C files from which `cc *.c` makes one for any other.
+    sources/ the C files from which `cc *.c` makes one for any other. experiment: as of `described`.
 
     The GUID is a hash of the binaries' sources (component.h has that of pieces), so that a
     platform's binary does not depend on the other platforms. Raises FmuError if no FMU can be built
@@ -54,9 +50,9 @@ def entries(
     with GRAPHS:
         check_functions(component)
         header, pieces = component_source(component)
-        about = described(component, stop_time=stop_time, step_size=step_size, needs_tool=False)
-        run = reference_run(component, step_size)
-        files = {"documentation/index.html": documentation(component, run)}
+        about = described(component, False, **experiment)
+        run = reference_run(component, about.step_size)
+        files = {PAGE: documentation(component, run)}
     own = {path.name: path.read_bytes() for path in (WRAPPER, COMMON)}
     if fmi == 3:
         own |= {name: text.encode() for name, text in fmi3_sources(about.variables).items()}
@@ -69,19 +65,16 @@ def entries(
         "compiler": json.dumps(made_by).encode(),
         **model_description.files(about, "", fmi),
     }
-    guid = f"{{{uuid.UUID(digest(content)[:32])}}}"
+    guid = guid_of(digest(content))
     own["component.h"] = f'#define GUID "{guid}"\n'.encode() + content["component.h"]
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
         for file, text in own.items():
             (room / file).write_bytes(text)
         interface = [room / file for file in own if file.endswith(".c")]
-        sources: Iterable[Path] = chain(interface, _written(pieces, room))
-        for platform in platforms:
-            library = compile_library(sources, room / "library", platform)
-            sources = [*interface, *sorted(room.glob("piece*.c"))]
-            files[entry(platform, component.name)] = library.read_bytes()
-        own |= {path.name: path.read_bytes() for path in sources}
+        sources = chain(interface, _written(pieces, room))
+        files |= binaries(sources, component.name, room, platforms)
+        own |= {path.name: path.read_bytes() for path in sorted(room.glob("piece*.c"))}
     own |= {file: (HEADERS / file).read_bytes() for file in FMI2_HEADERS}
     listed = [file for file in own if file.endswith(".c")]
     files |= {f"sources/{file}": text for file, text in own.items()}

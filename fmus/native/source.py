@@ -41,19 +41,21 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
     header = "\n".join(
         [
             *(f"#define {name} {value}" for name, value in sizes.items()),
-            _table("char *const names", map(json.dumps, names)),
-            _table("char *const state_names", map(json.dumps, component.state_texts)),
-            _table("double starts", map(number, starts)),
-            _table("char is_fixed", (str(int(flag)) for flag in fixed)),
+            table("char *const names", map(json.dumps, names)),
+            table("char *const state_names", map(json.dumps, component.state_texts)),
+            table("double starts", map(number, starts)),
+            table("char is_fixed", (str(int(flag)) for flag in fixed)),
             text,
         ]
     )
     return header, pieces
 
 
-def _table(declared: str, entries: Iterable[str]) -> str:
-    """A C array with an additional 0 at its end, since a C array must not be empty."""
-    return f"static const {declared}[] = {{{', '.join([*entries, '0'])}}};"
+def table(declared: str, entries: Iterable[str]) -> str:
+    """A C array with an additional entry of zeros at its end, since a C array must not be empty."""
+    rows = [f"    {entry}," for entry in entries]
+    zero = "{0}" if any(row.endswith("},") for row in rows) else "0"
+    return "\n".join([f"static const {declared}[] = {{", *rows, f"    {zero}}};"])
 
 
 def number(value: float) -> str:

@@ -22,7 +22,7 @@ SECONDS = {"run": 0.07, "map": 0.8}
 def expected(processes: int) -> float:
     """Minutes that the whole study takes about."""
     known, apart = cases.trained(), cases.kept_apart()
-    runs = design.count(len(known)) + design.count_apart(len(apart))
+    runs = design.count(len(known)) + design.count(len(apart), apart=True)
     linkages = len({case.linkage for case in known})
     maps = linkages * len(design.all_margins())
     return (SECONDS["run"] * runs + SECONDS["map"] * maps) / processes / 60
@@ -61,7 +61,7 @@ def study(
         row = arrangement, bias, NEAREST
         advice[arrangement, bias, KEPT_APART] = advice[row]
         listed[arrangement, bias, KEPT_APART] = listed[row]
-    tried = measure.compared(all_of("kept apart", design.kept_apart_runs(apart), measure.of_run))
+    tried = measure.compared(all_of("kept apart", design.runs(apart, apart=True), measure.of_run))
     new = [x for x in dict.fromkeys(case.linkage for case in apart) if x not in linkages]
     wanted = dict.fromkeys(
         (a, design.of_map(a, c.best), r)

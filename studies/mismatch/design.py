@@ -95,14 +95,28 @@ def methods(arrangement: str, bias: str, rate: str) -> list[Method]:
     return found + [Method(h, "medium", i) for h, i in product(COMPARED, others)]
 
 
-def runs(cases: Sequence[Case]) -> list[Job]:
-    """All runs by which methods are chosen, the references first."""
+def cells(apart: bool) -> Iterator[tuple[str, str, str, list[Method]]]:
+    """Arrangement, bias and rate with the methods that are tried there; of the cases kept apart
+    those that can be advised, also at the rate kept apart."""
+    columns = (*COLUMNS, KEPT_APART) if apart else COLUMNS
+    for arrangement, bias, rate in product((DIRECT, MOBILITY), BIAS, columns):
+        every = methods(arrangement, bias, rate)
+        yield arrangement, bias, rate, [m for m in every if m.candidate or not apart]
+
+
+def runs(cases: Sequence[Case], *, apart: bool = False) -> list[Job]:
+    """All runs by which methods are chosen, the references first; of cases kept apart those by
+    which advice is compared with the best of all methods."""
     found = [*references(cases)]
-    for arrangement in (DIRECT, MOBILITY):
-        for bias, rate in product(BIAS, COLUMNS):
-            for method, case in product(methods(arrangement, bias, rate), cases):
-                found.append(run(arrangement, case, method, bias, rate))
+    for arrangement, bias, rate, tried in cells(apart):
+        for method, case in product(tried, cases):
+            found.append(run(arrangement, case, method, bias, rate))
     return found
+
+
+def count(cases: int, *, apart: bool = False) -> int:
+    """How many runs `runs` has on so many cases."""
+    return cases * (sum(len(tried) for *_, tried in cells(apart)) + 2 * len(BIAS))
 
 
 def margins(linkages: Iterable[str], wanted: Iterable[tuple[str, Method, str]]) -> list[Job]:
@@ -114,18 +128,6 @@ def margins(linkages: Iterable[str], wanted: Iterable[tuple[str, Method, str]]) 
         if rate != VARIABLE:
             found.append(run(arrangement, at_rest(linkage), method, "none", rate))
     return found
-
-
-def count(cases: int) -> int:
-    """How many runs `runs` has on so many cases."""
-    every = product((DIRECT, MOBILITY), BIAS, COLUMNS)
-    return cases * (sum(len(methods(*cell)) for cell in every) + 2 * len(BIAS))
-
-
-def count_apart(cases: int) -> int:
-    """How many runs `kept_apart_runs` has on so many cases."""
-    every = product((DIRECT, MOBILITY), BIAS, (*COLUMNS, KEPT_APART))
-    return cases * (sum(len(methods_apart(*cell)) for cell in every) + 2 * len(BIAS))
 
 
 def mapped(method: Method) -> bool:
@@ -149,18 +151,3 @@ def of_map(arrangement: str, method: Method) -> Method:
     """The method whose lifted map is that of `method`: of held mobilities `zoh`, since at rest
     there is no force that they turn into motion, and no hold of them has a slope."""
     return method._replace(hold="zoh") if arrangement == MOBILITY else method
-
-
-def methods_apart(arrangement: str, bias: str, rate: str) -> list[Method]:
-    """The methods that are tried on the cases kept apart."""
-    return [m for m in methods(arrangement, bias, rate) if m.candidate]
-
-
-def kept_apart_runs(cases: Sequence[Case]) -> list[Job]:
-    """Runs of the cases kept apart, by which advice is compared with the best of all methods."""
-    found = [*references(cases)]
-    for cell in product((DIRECT, MOBILITY), BIAS, (*COLUMNS, KEPT_APART)):
-        arrangement, bias, rate = cell
-        for method, case in product(methods_apart(*cell), cases):
-            found.append(run(arrangement, case, method, bias, rate))
-    return found

@@ -7,8 +7,8 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
 
+from studies.draw import BLUE, GREEN, GREY, ORANGE, panels, save
 from studies.mismatch.methods import RATES, VARIABLE
-from studies.report.draw import BLUE, GREEN, GREY, ORANGE, panels, save
 
 
 class Point(NamedTuple):

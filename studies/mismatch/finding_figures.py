@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from itertools import product
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from hapticlink.analysis.findings.user_port import NOTICEABLE_J, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
 from studies.mismatch.design import CONTINUOUS, DIRECT, MOBILITY, REFERENCE, mapped
 from studies.mismatch.figures import Panel, Point, lines, short
-from studies.mismatch.findings import COMPENSATION, Found, both
+from studies.mismatch.findings import COMPENSATION, Found, both, paragraph
 from studies.mismatch.measure import COUPLING, KICK, MARGIN, RUN, draw, stable
 from studies.mismatch.method_choice import energy, margin, within
 from studies.mismatch.methods import (
@@ -59,33 +59,38 @@ def _by_hold(
     found: Found, arrangement: str, value: Callable[[Row], float], of: Callable[..., float]
 ) -> list[Panel]:
     """Panels by model: a line for each hold, with the gains that were taken for the cell."""
-    drawn: list[Panel] = []
-    for bias in BIAS:
-        by_line: dict[str, dict[str, Point]] = {}
-        holds = OF_MATRICES if arrangement == MOBILITY else HOLDS
-        for hold, rate in product(holds, COLUMNS):
-            chosen = found.advice[arrangement, bias, rate]
-            tried = found.cells[arrangement, bias, rate]
-            rows = tried.get(Method(hold, chosen.best.gains), {})
-            if point := _point(rows, value, of):
-                taken = chosen.admitted and chosen.best.hold == hold
-                by_line.setdefault(hold, {})[rate] = point._replace(taken=taken)
-        drawn.append((COMPENSATION[bias], by_line))
-    return drawn
+
+    def at(bias: str, hold: str, rate: str) -> Point | None:
+        chosen = found.advice[arrangement, bias, rate]
+        rows = found.cells[arrangement, bias, rate].get(Method(hold, chosen.best.gains), {})
+        point = _point(rows, value, of)
+        return point and point._replace(taken=chosen.admitted and chosen.best.hold == hold)
+
+    holds = OF_MATRICES if arrangement == MOBILITY else HOLDS
+    return [_panel(COMPENSATION[bias], holds, COLUMNS, partial(at, bias)) for bias in BIAS]
+
+
+def _panel(
+    heading: str,
+    lines: Iterable[str],
+    rates: Iterable[str],
+    at: Callable[[str, str], Point | None],
+) -> Panel:
+    """The points of each line that has any."""
+    by_line = {x: {r: point for r in rates if (point := at(x, r))} for x in lines}
+    return heading, {x: points for x, points in by_line.items() if points}
 
 
 def _text(text: str, figure: str, alt: str) -> str:
-    return f"{fill(text, 108, break_on_hyphens=False)}\n\n![{alt}]({figure})"
+    return f"{paragraph(text)}\n\n![{alt}]({figure})"
 
 
 def _gains(folder: Path, found: Found) -> Iterator[str]:
-    drawn: list[Panel] = []
-    for bias in BIAS:
-        by_line: dict[str, dict[str, Point]] = {}
-        for gains, rate in product(GAINS, COLUMNS):
-            if (share := _share(found, bias, gains, rate)) is not None:
-                by_line.setdefault(gains, {})[rate] = Point(share)
-        drawn.append((COMPENSATION[bias], by_line))
+    def at(bias: str, gains: str, rate: str) -> Point | None:
+        share = _share(found, bias, gains, rate)
+        return None if share is None else Point(share)
+
+    drawn = [_panel(COMPENSATION[bias], GAINS, COLUMNS, partial(at, bias)) for bias in BIAS]
     low = [short(_share(found, "none", g, "10")) for g in GAINS]
     title = (
         f"Gains decide before holds: at 10 Hz, without Coriolis compensation, {low[0]} % of the "
@@ -155,14 +160,12 @@ def _energy(folder: Path, found: Found) -> Iterator[str]:
 
 def _margins(folder: Path, found: Found) -> Iterator[str]:
     holds = [h for h in HOLDS if mapped(Method(h, "soft"))]
-    drawn: list[Panel] = []
-    for gains in GAINS:
-        by_line: dict[str, dict[str, Point]] = {}
-        for hold, rate in product(holds, RATES):
-            least = margin(found.margins, DIRECT, Method(hold, gains), rate)
-            if least is not None:
-                by_line.setdefault(hold, {})[rate] = Point(max(-STRONGEST, least), least > 0)
-        drawn.append((f"{gains} gains", by_line))
+
+    def at(gains: str, hold: str, rate: str) -> Point | None:
+        least = margin(found.margins, DIRECT, Method(hold, gains), rate)
+        return None if least is None else Point(max(-STRONGEST, least), least > 0)
+
+    drawn = [_panel(f"{gains} gains", holds, RATES, partial(at, gains)) for gains in GAINS]
     every = [p for _, by in drawn for points in by.values() for p in points.values()]
     bad = sum(not p.whole for p in every)
     title = (
@@ -289,4 +292,4 @@ def _modelling(found: Found) -> str:
         f"{short(float(np.median(by['full'])))} mm with it (up to {short(worst[METRIC])}, "
         f"{worst['case']})."
     )
-    return fill(text, 108, break_on_hyphens=False)
+    return paragraph(text)

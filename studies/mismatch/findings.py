@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 from hapticlink.analysis.sweep.row import Row
 from studies.mismatch.method_choice import Cell, Cells, Choice, Margins
@@ -36,3 +37,7 @@ def named(method: Method) -> str:
 def both(names: Sequence[str]) -> str:
     """Names with commas and an `and`."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def paragraph(text: str) -> str:
+    return fill(text, 108, break_on_hyphens=False)

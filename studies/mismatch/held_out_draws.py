@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
-from textwrap import fill
 
 import numpy as np
 
 from studies.mismatch.design import CONTINUOUS, DIRECT, MOBILITY
-from studies.mismatch.findings import Found
+from studies.mismatch.findings import Found, paragraph
 from studies.mismatch.measure import stable
 from studies.mismatch.method_choice import (
     NEAR,
@@ -69,7 +68,7 @@ def section(found: Found) -> Iterator[str]:
             )
         lines.append("| " + " | ".join(row) + " |")
     bad = _unstable_maps(found)
-    yield fill(
+    yield paragraph(
         "The slider-crank, a massless spring hand of 200 N/m, and the rate of "
         f"{KEPT_APART} Hz, whose frames end between ticks and which takes the row of {NEAREST} Hz, "
         f"were in no choice. With the advised methods {sound} of {of} of these runs are stable, "
@@ -79,20 +78,16 @@ def section(found: Found) -> Iterator[str]:
         "any method keeps the limits it does, with an error within a tenth of the smallest, the "
         "row's method alone, and the best of it and of those to try, too, which at 512 Hz are all "
         "that there are. The error is that of tracking, of a "
-        "mechanism at 512 Hz the coupling error ([kept-apart.csv](kept-apart.csv)).",
-        108,
-        break_on_hyphens=False,
+        "mechanism at 512 Hz the coupling error ([kept-apart.csv](kept-apart.csv))."
     )
     heads = [f"{PLACES[a]}, {'on' if b == 'full' else 'off'}" for a, b in every]
     table = ["| Hz | " + " | ".join(heads) + " |", "|---" * (1 + len(heads)) + "|", *lines]
     yield "\n".join(table)
     looked_up = [_near(by_cell, c, [_nearest(by_cell, c)]) for c in found.advice if c[0] == DIRECT]
-    yield fill(
+    yield paragraph(
         "One method for all hands cannot reach that with the mechanism at the graphics rate: the "
         "one that is right most often at a rate, looked up on these very cases, is so in "
         f"{_share(looked_up)}. `hapticlink advise` runs all methods on a scene of yours.",
-        108,
-        break_on_hyphens=False,
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from studies.mismatch import finding_figures, held_out_draws
 from studies.mismatch.cases import SEEDS
 from studies.mismatch.design import DIRECT, FLOOR, MOBILITY, REFERENCE, SUBSTEPS
 from studies.mismatch.figures import short
-from studies.mismatch.findings import COMPENSATION, Found, both, named
+from studies.mismatch.findings import COMPENSATION, Found, both, named, paragraph
 from studies.mismatch.measure import APART, COUPLING, MARGIN, floor, stable
 from studies.mismatch.method_choice import (
     LEVEL,
@@ -31,8 +30,6 @@ from studies.mismatch.method_choice import (
 )
 from studies.mismatch.methods import BIAS, COLUMNS, FEW, LIKELY, TICKS, VARIABLE, Method
 
-WIDTH = 108
-
 
 def write(folder: Path, found: Found) -> Path:
     """Writes the page, README.md of `folder`, and its figures; returns its path."""
@@ -42,10 +39,6 @@ def write(folder: Path, found: Found) -> Path:
     path = folder / "README.md"
     path.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
     return path
-
-
-def paragraph(text: str) -> str:
-    return fill(text, WIDTH, break_on_hyphens=False)
 
 
 def _answer(found: Found) -> Iterator[str]:

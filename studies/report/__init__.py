@@ -8,8 +8,8 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.results import folders
-from studies.report import chapter1, chapter3, chapter4, chapter6, graphics_copy, page, section_b6
-from studies.report.entry import Entry, Runs
+from studies.report import chapter1, chapter3, chapter4, chapter6, graphics_copy, section_b6
+from studies.report.entry import Entry, Runs, write
 
 CHAPTERS = (chapter1, chapter3, chapter4, chapter6, graphics_copy, section_b6)
 
@@ -25,4 +25,4 @@ def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Pat
             for entry in chapter.entries(runs, folder):
                 tell(f"{entry.title}: {entry.figure}")
                 entries.append(entry)
-    return page.write(folder, entries)
+    return write(folder, entries)

@@ -10,7 +10,7 @@ import numpy as np
 from hapticlink.fmus.blocks import build_block
 from hapticlink.fmus.check import session
 from hapticlink.orchestrator.base import temporary_folders
-from studies.report import draw
+from studies import draw
 from studies.report.entry import Entry, Runs, command
 
 RULES = ("forward", "backward", "trapezoidal")

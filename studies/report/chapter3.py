@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.report import draw
+from studies import draw
 from studies.report.entry import Entry, Runs, command
 
 SHORTEST_LINK = 0.0184  # m, l3 of Table 6.1

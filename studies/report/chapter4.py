@@ -12,7 +12,7 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH
 from hapticlink.orchestrator.results.tables import Results
-from studies.report import draw
+from studies import draw
 from studies.report.entry import Entry, Runs, command
 
 SCENES = {"enclosure": draw.BLUE, "obstacles": draw.ORANGE, "push-disc": draw.GREEN}

@@ -10,7 +10,8 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.tables import Results
-from studies.report import draw, measures
+from studies import draw
+from studies.report import measures
 from studies.report.entry import Entry, Runs, command
 
 DIRECTIONS = "mechanism.directions=true"
@@ -28,24 +29,23 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
     yield _order_of_calls(runs, folder)
 
 
-def paths(axes: Any, pair: tuple[Results, Results]) -> None:
-    """Trajectories of handle and operational point, topology on beside off."""
-    for axis, results, name in zip(axes, pair, PANELS, strict=True):
-        haptics = results.haptics
-        point = 1e3 * haptics["virtual_mechanism.x"]
-        handle = 1e3 * haptics["haptic_device.x_true"]
-        axis.plot(point[:, 0], point[:, 1], color=draw.BLUE, label="operational point (HS)")
-        axis.plot(handle[:, 0], handle[:, 1], "--", color=draw.ORANGE, label="handle (HD)")
-        axis.plot(*point[0, :2], "k.", ms=8, label="start")
-        gap = tracking(results)[1].max()
-        axis.set(xlabel="x (mm)", ylabel="y (mm)", title=f"{name}: apart by at most {gap:.3g} mm")
-        axis.set_aspect("equal", adjustable="datalim")
-    axes[0].legend(fontsize="small")
+def path(axis: Any, results: Results, point_name: str) -> Any:
+    """The trajectories of handle and operational point; returns the latter, (k, 3), in mm."""
+    point = 1e3 * results.haptics["virtual_mechanism.x"]
+    handle = 1e3 * results.haptics["haptic_device.x_true"]
+    axis.plot(point[:, 0], point[:, 1], color=draw.BLUE, label=point_name)
+    axis.plot(handle[:, 0], handle[:, 1], "--", color=draw.ORANGE, label="handle (HD)")
+    axis.set(xlabel="x (mm)", ylabel="y (mm)")
+    axis.set_aspect("equal", adjustable="datalim")
+    return point
 
 
 def _trajectories(on: Results, off: Results, folder: Path) -> Entry:
     figure, axes = draw.panels(2)
-    paths(axes, (on, off))
+    for axis, results, name in zip(axes, (on, off), PANELS, strict=True):
+        axis.plot(*path(axis, results, "operational point (HS)")[0, :2], "k.", ms=8, label="start")
+        axis.set_title(f"{name}: apart by at most {tracking(results)[1].max():.3g} mm")
+    axes[0].legend(fontsize="small")
     time, gap = tracking(on)
     ended, wide = tracking(off)
     common = gap[time <= ended[-1]].max()
@@ -61,7 +61,7 @@ def _trajectories(on: Results, off: Results, folder: Path) -> Entry:
         f"t = 0 is Lambda^-1 F_h to {measures.acceleration_error(on):.0e}; F_T leaves "
         f"{measures.free_work(on, LENGTH_SCALE):.0e} of itself on free motion. The mechanism's "
         f"own count of constrained directions is 2 in {len(count.episodes)} episodes "
-        f"({', '.join(f'{a:.3f}-{b:.3f}' for a, b in count.episodes)} s), links 3 and 4 then "
+        f"({count.listed} s), links 3 and 4 then "
         f"within {count.fold:.2f} rad of a line; of {count.frames} frames {count.wrong} disagree "
         f"with it, and {count.unseen} episodes fall between frames",
         command("closed-loop", *ON),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import folded, tracking
-from studies.report import draw
+from studies import draw
 from studies.report.entry import Entry, Runs, command
 
 PULLED = "graphics.sync=operational"

@@ -75,6 +75,11 @@ class Count:
     unseen: int
     fold: float  # rad, largest angle between links 3 and 4 with two constrained directions
 
+    @property
+    def listed(self) -> str:
+        """The intervals (s)."""
+        return ", ".join(f"{a:.3f}-{b:.3f}" for a, b in self.episodes)
+
 
 def count(results: Results) -> Count:
     """Compares the graphics frames of a run with its mechanism."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.tables import Results
-from studies.report import draw, measures
-from studies.report.chapter6 import OFF, ON
+from studies import draw
+from studies.report import measures
+from studies.report.chapter6 import OFF, ON, path
 from studies.report.entry import Entry, Runs, command
 
 SCENE = "closed-loop-b1"
@@ -28,7 +29,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         "at least one constraint throughout, two while the loop closure is active; the device "
         "follows the operational point; the constraint wrench is larger while two are active",
         f"one constraint throughout, two in {len(count.episodes)} episodes "
-        f"({', '.join(f'{a:.3f}-{b:.3f}' for a, b in count.episodes)} s), of which {count.unseen} "
+        f"({count.listed} s), of which {count.unseen} "
         f"fall between the frames; at most {tracking(on)[1].max():.2g} mm apart; |F_T| "
         f"{measures.rms(force[two]) if two.any() else 0:.2g} N RMS while the mechanism has two, "
         f"{measures.rms(force[~two]):.2g} N otherwise",
@@ -59,12 +60,8 @@ def _draw(results: Results, folder: Path, name: str) -> str:
     axes[0].set(xlabel="time (s)", ylabel="constrained directions", yticks=[0, 1, 2, 3])
     axes[0].set_title(f"(a) two in {100 * np.mean(own >= 2):.1f} % of the time")
     axes[0].legend(fontsize="small")
-    point, handle = 1e3 * haptics["virtual_mechanism.x"], 1e3 * haptics["haptic_device.x_true"]
-    axes[1].plot(point[:, 0], point[:, 1], color=draw.BLUE, label="operational point (OP)")
-    axes[1].plot(handle[:, 0], handle[:, 1], "--", color=draw.ORANGE, label="handle (HD)")
-    axes[1].set(xlabel="x (mm)", ylabel="y (mm)")
+    path(axes[1], results, "operational point (OP)")
     axes[1].set_title(f"(b) apart by at most {tracking(results)[1].max():.3g} mm")
-    axes[1].set_aspect("equal", adjustable="datalim")
     axes[1].legend(fontsize="small")
     if wrench:
         force = haptics["controller.F_constraint"]

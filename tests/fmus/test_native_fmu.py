@@ -48,7 +48,7 @@ from hapticlink.fmus.build import build, build_native
 from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native import compile_library, compiler, split_functions
-from hapticlink.fmus.native.compiler_cache import linker_cache
+from hapticlink.fmus.native.compiler import linker_cache
 from hapticlink.fmus.native.source import component_source
 from hapticlink.fmus.reproducible_zip import write
 from hapticlink.orchestrator import open_scene

@@ -9,8 +9,15 @@ from benchmarks import continuous
 from benchmarks.continuous.absolute import Absolute
 from benchmarks.continuous.march import march
 from benchmarks.continuous.relative import Relative
-from benchmarks.cosimulation.front import front, measured
-from benchmarks.cosimulation.measure import COLUMNS, SETTINGS, errors, measure, run
+from benchmarks.cosimulation.measure import (
+    COLUMNS,
+    SETTINGS,
+    errors,
+    front,
+    measure,
+    measured,
+    run,
+)
 from benchmarks.cosimulation.points import CONTACT, LOOP, Point, points
 from benchmarks.rows import Rows
 from hapticlink.orchestrator import open_scene

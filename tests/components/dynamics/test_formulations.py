@@ -4,8 +4,8 @@ five-bars: multipliers, coordinate partitioning, and closed forms of the depende
 import numpy as np
 import pytest
 
-from benchmarks.formulations.five_bar import PAIRS, FiveBar
-from benchmarks.formulations.page import cases
+from benchmarks.five_bar import PAIRS, FiveBar
+from benchmarks.formulations import cases
 from benchmarks.our_mechanism import Ours
 from hapticlink.components.specs.linkage import Mechanism
 from tests.blocks import once

@@ -86,15 +86,14 @@ def test_all_platforms_are_for_what_is_compiled(tmp_path, capsys):
 @pytest.fixture
 def asked(monkeypatch):
     """The platforms compiled for, by a stand-in: tests/fmus/test_native_fmu.py compiles."""
-    platforms = []
+    asked = []
 
-    def compiled(source, library, platform):
-        platforms.append(platform)
-        library.write_bytes(platform.encode())
-        return library
+    def compiled(source, name, folder, platforms):
+        asked.extend(platforms)
+        return {compiler.entry(p, name): p.encode() for p in platforms}
 
-    monkeypatch.setattr("hapticlink.fmus.native.native_fmu.compile_library", compiled)
-    return platforms
+    monkeypatch.setattr("hapticlink.fmus.native.native_fmu.binaries", compiled)
+    return asked
 
 
 def test_all_platforms_are_asked_for(tmp_path, monkeypatch, asked):

@@ -73,7 +73,7 @@ def test_the_expected_time_counts_all_jobs() -> None:
     one = [cases.trained()[0]]
     made = design.runs(one)
     assert len(made) == design.count(1)
-    assert len(design.kept_apart_runs(one)) == design.count_apart(1)
+    assert len(design.runs(one, apart=True)) == design.count(1, apart=True)
     assert 0 < expected(2) == 2 * expected(4)
 
 

@@ -1,4 +1,4 @@
-"""Layout and colours that all figures of the report share."""
+"""Layout and colours that the figures of studies and benchmarks share."""
 
 from __future__ import annotations
 

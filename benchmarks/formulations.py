@@ -1,20 +1,24 @@
-"""Error, operations and time of the formulations over random five-bars, as a page and a figure."""
+"""The three ways of section B.2 to simulate a closed loop, beside each other: error, operations and
+time over random five-bars."""
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal
 
 import casadi as ca
-import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks.formulations.five_bar import NEWTON, PAIRS, FiveBar
+from benchmarks import code_version
+from benchmarks.five_bar import NEWTON, PAIRS, FiveBar
 from benchmarks.our_mechanism import Ours, compiled
+from benchmarks.page import Progress, table
 from benchmarks.rows import Rows
 from hapticlink.components.specs.linkage import Mechanism
+from studies import draw
 
 SEED, END, RATE = 1, 2.0, 512
 METHODS = {
@@ -29,6 +33,15 @@ UNKNOWNS = dict(zip(METHODS, ("n + m = 6", "n + m = 6", "n - m = 2", "n - m = 2"
 COLUMNS = ("case", "method", "straightness", "error_mm", "operations", "us_a_step")
 LOST = 10.0  # mm
 SAME = 1e-7  # rad by which references of two tolerances may differ
+
+
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes cases.csv and formulations.png to `out`."""
+    code_version.begin(out, ("cases.csv",))
+    rows = Rows(out / "cases.csv", COLUMNS, keys=2)
+    measure(rows, 6 if quick else 60, out / ".compiled", progress)
+    shutil.rmtree(out / ".compiled", ignore_errors=True)
+    return page(out, rows, command)
 
 
 def cases(count: int) -> Iterator[tuple[int, FiveBar, np.ndarray]]:
@@ -78,9 +91,7 @@ def steps(
     yield "symbolic embedding", embedded.n_instructions(), advance, advance
 
 
-def measure(
-    rows: Rows, count: int, folder: Path, progress: Callable[[str, int, int], None]
-) -> None:
+def measure(rows: Rows, count: int, folder: Path, progress: Progress) -> None:
     """A row for each case and method; cases whose own reference is not certain are left out."""
     every = RATE // 16
     times = np.arange(0, int(END * RATE) + 1, every) / RATE
@@ -109,13 +120,7 @@ def _tip(bar: FiveBar, states: np.ndarray) -> np.ndarray:
     """The operational point, (k, 2), of states (k, 8)."""
     first, second = states[:, 0], states[:, 0] + states[:, 1]
     l1, l2 = bar.lengths[:2]
-    return np.stack(
-        [
-            l1 * np.cos(first) + l2 / 2 * np.cos(second),
-            l1 * np.sin(first) + l2 / 2 * np.sin(second),
-        ],
-        axis=1,
-    )
+    return np.stack([l1 * f(first) + l2 / 2 * f(second) for f in (np.cos, np.sin)], axis=1)
 
 
 def _seconds(advance: Callable[..., np.ndarray], start: np.ndarray, count: int = 2000) -> float:
@@ -125,8 +130,8 @@ def _seconds(advance: Callable[..., np.ndarray], start: np.ndarray, count: int =
     return (time.process_time() - began) / count
 
 
-def write(out: Path, rows: Rows, command: str) -> None:
-    """README.md and formulations.png."""
+def page(out: Path, rows: Rows, command: str) -> str:
+    """Writes formulations.png."""
     kept = [r for r in rows.rows.values() if r["method"] in METHODS]
     by = {
         name: np.array([[float(r[c]) for c in COLUMNS[2:]] for r in kept if r["method"] == name])
@@ -135,16 +140,16 @@ def write(out: Path, rows: Rows, command: str) -> None:
     count, left = len(by["symbolic embedding"]), len(rows.rows) - len(kept)
     lost = {name: int((~(v[:, 1] < LOST)).sum()) for name, v in by.items()}
     near = np.median(by["symbolic embedding"][:, 0])
-    lines = []
+    cells = []
     for name, v in by.items():
-        close, far = v[v[:, 0] < near, 1], v[v[:, 0] >= near, 1]
-        lines.append(
-            f"| {name} | {UNKNOWNS[name]} | {_quartiles(far)} | {_quartiles(close)} | "
-            f"{lost[name]} | {np.median(v[:, 2]):.0f} | {np.median(v[:, 3]):.2f} |"
-        )
+        apart = (_quartiles(v[v[:, 0] >= near, 1]), _quartiles(v[v[:, 0] < near, 1]))
+        costs = f"{np.median(v[:, 2]):.0f}", f"{np.median(v[:, 3]):.2f}"
+        cells.append((name, UNKNOWNS[name], *apart, lost[name], *costs))
+    heads = "formulation | unknowns | error, far | error, near | lost | operations | us a step"
+    lines = "\n".join(table(heads, "llllrrr", cells))
+    _figure(out, by, lost)
     projected, partitioned, embedded = (np.median(by[n][:, 3]) for n in list(METHODS)[1:])
-    out.joinpath("README.md").write_text(
-        f"""# Multipliers, partitioning and embedding
+    return f"""# Multipliers, partitioning and embedding
 
 Of {count} random five-bars, run for {END:g} s at {RATE} Hz, symbolic embedding loses
 {lost["symbolic embedding"]}, coordinate partitioning {lost["coordinate partitioning"]}, multipliers
@@ -169,35 +174,32 @@ and 4 gets below {near:.2f}, or not. {left} cases are left out, whose references
 differ by more than {SAME:g} rad. Operations are those of CasADi's graph of a step; time is that of
 the processor, the least of five rounds of 2,000 steps, median over cases.
 
-| formulation | unknowns | error, far | error, near | lost | operations | us a step |
-|---|---|---|---|--:|--:|--:|
+{lines}
+
+Made by `{command}`; every case is in [cases.csv](cases.csv).
 """
-        + "\n".join(lines)
-        + f"\n\nMade by `{command}`; every case is in [cases.csv](cases.csv).\n",
-        encoding="utf-8",
-    )
-    drawn, axes = plt.subplots(figsize=(7.0, 4.4), layout="constrained")
+
+
+def _figure(out: Path, by: dict[str, np.ndarray], lost: dict[str, int]) -> None:
+    """The error over the distance from a singular pose."""
+    drawn, (axes,) = draw.panels(1, width=7.0, height=4.4)
     for (name, colour), marker in zip(METHODS.items(), "osv^", strict=True):
         v = by[name]
         shown = np.where(v[:, 1] < LOST, v[:, 1], LOST)
         axes.scatter(v[:, 0], shown, s=18, color=colour, marker=marker, label=name, alpha=0.8)
     axes.axhline(LOST, color="#8a8a8a", linewidth=0.8)
-    axes.annotate("lost", (0.99, LOST), ha="right", va="bottom", color="#555555",
-                  xycoords=("axes fraction", "data"))  # fmt: skip
-    axes.set(
-        xscale="log", yscale="log",
-        xlabel="least |sin| of the angle between links 2 and 4 along the motion",
-        ylabel="largest error of the operational point (mm)",
-    )  # fmt: skip
+    at = {"ha": "right", "va": "bottom", "xycoords": ("axes fraction", "data")}
+    axes.annotate("lost", (0.99, LOST), color="#555555", **at)
+    axes.set(xscale="log", yscale="log", ylabel="largest error of the operational point (mm)")
+    axes.set_xlabel("least |sin| of the angle between links 2 and 4 along the motion")
     axes.set_title(
-        f"Symbolic embedding loses {lost['symbolic embedding']} of {count} five-bars, multipliers "
-        f"with projection {lost['multipliers, projection']}",
+        f"Symbolic embedding loses {lost['symbolic embedding']} of "
+        f"{len(by['symbolic embedding'])} five-bars, multipliers with projection "
+        f"{lost['multipliers, projection']}",
         fontsize="medium",
     )
-    axes.grid(alpha=0.3)
     axes.legend(loc="upper left", bbox_to_anchor=(0.01, 0.93))
-    drawn.savefig(out / "formulations.png", dpi=130)
-    plt.close(drawn)
+    draw.save(drawn, out, "formulations.png")
 
 
 def _quartiles(values: np.ndarray) -> str:
