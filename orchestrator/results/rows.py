@@ -33,8 +33,8 @@ Rows = NDArray[np.float64]
 class Block:
     """The newest rows of a table, of `width` numbers: `filled` of `rows`."""
 
-    def __init__(self, room: int, width: int) -> None:
-        self.filled, self.rows = ctypes.c_int64(), np.empty((room, width))
+    def __init__(self, width: int) -> None:
+        self.filled, self.rows = ctypes.c_int64(), np.empty((max(ROOM // (8 * width), 1), width))
 
 
 class FileBlock(Block):

@@ -39,7 +39,7 @@ def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how:
     """The largest error of a position within 1 s after the start."""
     steps = round((1 + WARM) * rate)
     made = coupled.masses(fmus, Fraction(1, rate), steps, hold, substeps=substeps, **how)
-    return coupled.error(coupled.rows(made, folder))
+    return coupled.error(coupled.rows(made))
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def growth(
 ) -> float:
     """Of the envelope between the last quarters of a run; 1 is the limit of stability."""
     made = coupled.masses(fmus, step, steps, hold, substeps=substeps, **how)
-    size = np.abs(coupled.motion(coupled.rows(made, folder)) / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
+    size = np.abs(coupled.motion(coupled.rows(made)) / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
     quarter = steps // 4
     return float(size[-quarter:].max() / size[-2 * quarter : -quarter].max())
 

@@ -49,7 +49,7 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
     """The process is killed while it writes a block: rows that the table has already are left out,
     one that it has in part is whole in the block, or is counted as lost."""
     values = np.zeros(2)
-    recorder = FileRecorder(tmp_path / "haptics.csv", ["a", "b"], values, [0, 1], lambda: None)
+    recorder = FileRecorder(tmp_path / "haptics.csv", {"a": 0, "b": 1}, values, lambda: None)
     recorder.publish()
     for k in range(5):
         values[:] = k, -k
