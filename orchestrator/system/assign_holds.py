@@ -18,7 +18,7 @@ from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system import annotated_ports, springs
+from hapticlink.orchestrator.system import springs
 from hapticlink.orchestrator.system.ports import beside, carries_power, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
@@ -100,8 +100,8 @@ def _with_springs(
 ) -> Iterator[Connection]:
     """The connections, with `zoh` where the hold needs a spring and has none that fits."""
     for c in connections:
-        needs = HOLDS[c.hold].needs if c.hold else None
-        reason = springs.misfit(c, rules.springs, connections, fmus) if needs == "spring" else None
+        needs_one = c.needs == "spring"
+        reason = springs.misfit(c, rules.springs, connections, fmus) if needs_one else None
         if c.hold and reason:
             key = next((k for k in names(c) if k in rules.holds), None)
             refused.append(Refused(key, c, c.hold, reason))
@@ -160,6 +160,11 @@ def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connec
     """The rules of `scene`. Power ports and springs of the scene come before those that its FMUs
     declare, so that they take precedence."""
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
+    power = (
+        PowerPort(effort=f"{u.name}.{port}", displacement=f"{u.name}.{p.displacement}", sign=p.sign)
+        for u in fmus
+        for port, p in u.description.power.items()
+    )
     delays = {
         key: d if isinstance(d, Latency) else Latency(min=d) for key, d in scene.delays.items()
     }
@@ -169,7 +174,7 @@ def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connec
         {**scene.holds, **own},
         delays,
         scene.kinds,
-        (*scene.power, *annotated_ports.power(fmus)),
+        (*scene.power, *power),
         scene.iteration.interpolation if scene.coupling == "iterated" else None,
-        (*scene.spring, *annotated_ports.springs(fmus, connections)),
+        (*scene.spring, *springs.declared(fmus, connections)),
     )
