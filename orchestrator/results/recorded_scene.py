@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import by_user
 from hapticlink.orchestrator.results.run_record import first_error
 from hapticlink.orchestrator.results.tables import Results
 
@@ -30,12 +31,7 @@ def scene_part(results: Results, name: str, kind: Any) -> Any:
 def all_devices(results: Results) -> dict[str, Device]:
     """The devices of all users of a run, as `by_user`."""
     others = scene_part(results, "devices", Mapping[str, Device])
-    return by_user(scene_part(results, "device", Device), others)
-
-
-def by_user(first: Device | None, others: Mapping[str, Device] | None) -> dict[str, Device]:
-    """The devices of all users by their points; the first one's name is empty."""
-    return ({"": first} if first else {}) | dict(others or {})
+    return by_user(scene_part(results, "device", Device), others or {})
 
 
 @cache  # which takes longer to make than most figures take to draw
