@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import current_directory, interpreter_state, interrupt
+from hapticlink.orchestrator.base import interpreter_state, interrupt
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.describe_run import setup
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
@@ -157,7 +157,7 @@ def simulate(
         with RunFolder(folder, before, csv) as results:
             with (
                 crash_monitor.watched(folder) if foreign else nullcontext(),
-                current_directory.restored(*foreign),
+                interpreter_state.directory_restored(*foreign),
                 interpreter_state.restored(),
             ):
                 outcome = run(plan, results, progress, real_time)

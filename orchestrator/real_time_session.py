@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
-from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.base.ticks import Frames, exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy

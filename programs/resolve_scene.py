@@ -13,8 +13,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.base.communication_points import Frames
-from hapticlink.orchestrator.base.ticks import Timeline, exact
+from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS

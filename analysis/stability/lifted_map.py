@@ -19,9 +19,8 @@ from hapticlink.analysis.stability.frozen_nonlinearities import discrete, withou
 from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Event, Operation, Record, Repeat, StopWhen
 from hapticlink.orchestrator.plan.plan import Plan

@@ -12,7 +12,7 @@ from typing import Any
 from hapticlink.analysis.sweep.row import FAILED, METRIC, Row
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.text_table import aligned
+from hapticlink.orchestrator.base.terminal_output import aligned
 from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.files import write_json
 from hapticlink.orchestrator.results.numbers import short

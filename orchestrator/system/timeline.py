@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.base.ticks import (
     Clock,
+    Frames,
     Timeline,
     aligned,
     common_base,
