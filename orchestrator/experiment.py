@@ -24,7 +24,7 @@ from hapticlink.orchestrator.results.files import remove_rows
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.results.tables import Results, Table, with_record
+from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.windows import WINDOW_BYTES, opened
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
@@ -71,7 +71,7 @@ class Experiment:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
                 return opened(self.folder, record)
-            return with_record(Results(None, self.run, self.memory.tables()), record)
+            return Results(None, self.run, self.memory.tables(), known=record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:
