@@ -10,6 +10,7 @@ from typing import Any
 from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault, shortened, unknown
 from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find_scene import find
+from hapticlink.orchestrator.scene.rates import traced
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import (
@@ -157,15 +158,3 @@ def tables_of(data: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
 
 def _alike(below: Mapping[str, Any], table: Mapping[str, Any]) -> bool:
     return bool(table.get("type", below.get("type")) == below.get("type"))
-
-
-def traced(data: Mapping[str, Any]) -> list[tuple[Path, dict[str, Any]]]:
-    """The [graphics] and [[fmu]] tables with `rate = { trace = FILE }`, and their paths."""
-    fmus = data.get("fmu")
-    tables: list[tuple[Path, Any]] = [(("graphics",), data.get("graphics"))]
-    tables += [(("fmu", i), f) for i, f in enumerate(fmus if isinstance(fmus, list) else ())]
-    return [(path, t) for path, t in tables if isinstance(t, dict) and _is_trace(t.get("rate"))]
-
-
-def _is_trace(rate: Any) -> bool:
-    return isinstance(rate, dict) and rate.keys() == {"trace"} and isinstance(rate["trace"], str)

@@ -12,9 +12,9 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
-from hapticlink.orchestrator.scene import checks, families, overrides, read_registry_tables
-from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
-from hapticlink.orchestrator.scene.frame_trace import frame_times
+from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
+from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
+from hapticlink.orchestrator.scene.rates import frame_times, traced
 from hapticlink.orchestrator.scene.refused_keys_and_values import beyond, problems
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
@@ -61,15 +61,15 @@ def from_source(source: Source) -> Scene:
         for key in ("start", "derivatives"):
             if isinstance(fmu.get(key), dict):
                 fmu[key] = dict(flat(fmu[key]))
-    parts, unread = read_registry_tables.read(data)
+    parts, errors, unread = registry_tables.read(data)
     wrong += unread
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
         scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
-        wrong += problems(error.errors(include_url=False), data)
-    if wrong:
+        errors += error.errors(include_url=False)
+    if wrong := wrong + problems(errors, data):
         refuse([*wrong, *beyond(wrong, data)[: COUNTED - len(wrong)]])
     refuse(checks.check(scene))
-    scene = read_registry_tables.put(scene, parts)
+    scene = registry_tables.put(scene, parts)
     return WrittenScene(**vars(scene), read_from=source, origin=origin, written=scene)
