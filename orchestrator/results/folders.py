@@ -8,8 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.files import write_json
 
 
@@ -34,7 +34,7 @@ def add(
     folder: Path, names: Iterable[str], more: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
     """Adds files of a run to the list in its run.json, and `more` keys; returns the new content."""
-    run: dict[str, Any] = json_file.read(folder / "run.json")
+    run: dict[str, Any] = text_files.read_json(folder / "run.json")
     run["files"] = list(dict.fromkeys([*run["files"], *names]))
     run |= more
     write_json(folder / "run.json", run)

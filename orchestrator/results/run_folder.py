@@ -9,10 +9,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
-from hapticlink.orchestrator.results import json_file, rows
+from hapticlink.orchestrator.results import rows
 from hapticlink.orchestrator.results.files import FileRecorder, text, write, write_json, write_over
 from hapticlink.orchestrator.results.run_record import (
     End,
@@ -137,7 +137,7 @@ def _listed(folder: Path) -> set[str]:
     """The files that the run.json of an earlier run lists, without paths outside of `folder`, and
     the rows and blocks that a run leaves that was killed."""
     try:
-        names = json_file.read(folder / RUN).get("files", ())
+        names = text_files.read_json(folder / RUN).get("files", ())
         texts = (n for n in names if isinstance(n, str) and "\0" not in n)
         files = {n for n in texts if n != ".." and Path(n).name == n}
     except (InputFault, AttributeError, TypeError):

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.results import json_file, rows, run_record
+from hapticlink.orchestrator.results import rows, run_record
 from hapticlink.orchestrator.results.run_record import RunRecord
 
 TABLES = (".csv", rows.SUFFIX)
@@ -210,7 +211,7 @@ def load(folder: Path | str, binary: bool = False, record: RunRecord | None = No
 def run_json(folder: Path) -> dict[str, Any]:
     """The content of the run.json of a run's folder. Raises InputFault where there is none."""
     try:
-        content: dict[str, Any] = json_file.read(folder / "run.json")
+        content: dict[str, Any] = text_files.read_json(folder / "run.json")
     except InputFault as error:
         raise InputFault(f"{folder}: not the folder of a run: {error}") from error
     return content

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.results import json_file, rows, run_record
+from hapticlink.orchestrator.base import temporary_folders, text_files
+from hapticlink.orchestrator.results import rows, run_record
 from hapticlink.orchestrator.results.run_record import RunRecord
 from hapticlink.orchestrator.results.tables import (
     TABLES,
@@ -38,7 +38,7 @@ STEPS_BESIDE = 2
 def opened(folder: Path, record: RunRecord | None = None) -> Results:
     """The results of a run whose rows are still there, all of them read unless they are more than a
     window; `load` for others. record: the content of its run.json, where it is known."""
-    run = json_file.read(folder / "run.json")
+    run = text_files.read_json(folder / "run.json")
     if size(folder, run, binary=True) <= WINDOW_BYTES:
         return load(folder, binary=True, record=record)
     return Streamed(folder, run, FolderTables(folder, run["rates"], run["files"]), known=record)

@@ -19,7 +19,7 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import springs
-from hapticlink.orchestrator.system.ports import beside, carries_power, kind, names
+from hapticlink.orchestrator.system.ports import beside, between_plants, carries_power, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 
@@ -50,7 +50,7 @@ def assign(
         # A default hold that fits no connection is an error. Between iterated plants it was the
         # interpolation that did not fit, which is replaced silently.
         refused = [
-            r if r.key or _between_plants(r.connection, by_name) else replace(r, key="hold")
+            r if r.key or between_plants(r.connection, by_name) else replace(r, key="hold")
             for r in refused
         ]
     return assigned, tuple(refused)
@@ -83,7 +83,7 @@ def _assign(
             hold = "zoh"
         named = (rules.kinds[k] for k in names(c) if k in rules.kinds)
         c = replace(c, latency=latency, kind=next(named, kind(c, fmus)))
-        iterated = rules.between_plants if _between_plants(c, fmus) else None
+        iterated = rules.between_plants if between_plants(c, fmus) else None
         hold = hold or iterated
         reason = hold and misfit(hold, c, fmus, rules.power, iterated is not None)
         if hold and reason:
@@ -107,12 +107,6 @@ def _with_springs(
             refused.append(Refused(key, c, c.hold, reason))
             c = replace(c, hold="zoh")
         yield c
-
-
-def _between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
-    """Whether the connection is between two plants of one clock."""
-    source, target = fmus[c.source], fmus[c.target]
-    return source.clock == target.clock and not source.sampled and not target.sampled
 
 
 def _has_rows(c: Connection) -> bool:

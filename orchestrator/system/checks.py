@@ -13,7 +13,7 @@ from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 from hapticlink.orchestrator.system import springs
-from hapticlink.orchestrator.system.ports import names
+from hapticlink.orchestrator.system.ports import between_plants, names, size
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
@@ -79,10 +79,8 @@ def _refused(scene: Scene, system: System) -> Iterator[Problem]:
 def _power(i: int, p: PowerPort, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     sizes = {}
     for end, causality in (("effort", "input"), ("displacement", "output")):
-        fmu, _, name = getattr(p, end).partition(".")
-        entries = fmus[fmu].description.port(name, causality) if fmu in fmus else ()
-        sizes[end] = len(entries)
-        if not entries:
+        sizes[end] = size(getattr(p, end), fmus, causality)
+        if not sizes[end]:
             yield ("power", i, end), f"there is no {causality} {getattr(p, end)}"
     if p.displacement.partition(".")[0] != p.fmu:
         message = "effort and displacement are of one FMU: give the motion of the FMU it acts on"
@@ -110,11 +108,7 @@ def _step_sizes(system: System) -> Iterator[Problem]:
 
 def _iterated(system: System) -> Iterator[Problem]:
     """A finding where coupling "iterated" has no connected plants of one rate to iterate."""
-    plants = {u.name: u.clock for u in system.fmus if not u.sampled}
-    between = any(
-        c.source in plants and plants[c.source] == plants.get(c.target) and not c.initial
-        for c in system.connections
-    )
+    between = any(between_plants(c, system.fmu) and not c.initial for c in system.connections)
     if system.coupling.scheme == "iterated" and not between:
         yield (
             ("coupling",),

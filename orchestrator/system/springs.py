@@ -10,6 +10,7 @@ from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.system.ports import size
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
@@ -88,30 +89,25 @@ def unfit(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     """A finding for each [[spring]] with ports that do not exist or that do not fit together."""
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
-        size = _size(s.set_position, fmus, "input")
+        inputs = size(s.set_position, fmus, "input")
         for end, kinds in SPRING_ENDS.items():
             port = getattr(s, end)
             if not port:
                 continue
-            if not (entries := _size(port, fmus, *kinds)):
+            if not (entries := size(port, fmus, *kinds)):
                 yield ("spring", i, end), f"there is no {' or '.join(kinds)} {port}"
             elif port.partition(".")[0] != fmu:
                 message = f"{port} is not of {fmu}: the ends of a spring are ports of one FMU"
                 yield ("spring", i, end), message
-            elif size and entries != size:
-                message = f"{port} has {entries} entries, {s.set_position} {size}"
+            elif inputs and entries != inputs:
+                message = f"{port} has {entries} entries, {s.set_position} {inputs}"
                 yield ("spring", i, end), message
         for gain in ("stiffness", "damping"):
             values = getattr(s, gain)
-            if size and len(values) != size and (values or gain == "stiffness"):
-                message = f"{len(values)} gains for the {size} of {s.set_position}"
+            if inputs and len(values) != inputs and (values or gain == "stiffness"):
+                message = f"{len(values)} gains for the {inputs} of {s.set_position}"
                 yield ("spring", i, gain), message
 
 
 def _end(c: Connection) -> str:
     return f"{c.target}.{c.target_port}"
-
-
-def _size(end: str, fmus: Mapping[str, Fmu], *causalities: str) -> int:
-    fmu, _, name = end.partition(".")
-    return len(fmus[fmu].description.port(name, *causalities)) if fmu in fmus else 0
