@@ -95,12 +95,6 @@ def write_csv(source: Path, target: BinaryIO) -> int:
     return len(table)
 
 
-def read(path: Path) -> tuple[tuple[str, ...], Rows]:
-    """The columns and the rows of a table; a row that is not whole is left out."""
-    table = Written(path)
-    return table.columns, table[:]
-
-
 class Written:
     """The rows of a table on the disk, read where they are asked for: those of its file that are
     whole, then those of its block that the file does not have.

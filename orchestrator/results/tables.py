@@ -234,7 +234,8 @@ def read_table(
     tables. Raises InputFault for a table that is not as a run writes it."""
     if (place := _place(path, binary)) != path:
         _require_file(place)
-        return Table(*rows.read(place), {} if others is None else others)
+        written = rows.Written(place)
+        return Table(written.columns, written[:], {} if others is None else others)
     (columns, values), *_ = csv_parts(path)
     return Table(columns, values, {} if others is None else others)
 

@@ -12,6 +12,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.records import TimedEvent, Value
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem, reported
+from hapticlink.orchestrator.system.fmu_tables import entries_of
 from hapticlink.orchestrator.system.ports import carries_power, scalars_of
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import Change, Connection, System
@@ -135,16 +136,9 @@ class _Events:
 
 
 def _numbers(name: str, value: Value, scalars: tuple[Scalar, ...]) -> tuple[float, ...]:
-    def flat(part: object) -> Iterator[float]:
-        if isinstance(part, tuple | list):
-            for entry in part:
-                yield from flat(entry)
-        elif isinstance(part, str):
-            raise ValueError(f"{name} = {part!r}: give numbers")
-        else:
-            yield float(part)  # type: ignore[arg-type]
-
-    numbers = tuple(flat(value))
+    numbers = tuple(entries_of(value, scalars[-1].indices, name))
+    if texts := [entry for entry in numbers if isinstance(entry, str)]:
+        raise ValueError(f"{name} = {texts[0]!r}: give numbers")
     if len(numbers) != len(scalars):
         raise ValueError(f"{len(numbers)} values for the {len(scalars)} of {name}")
-    return numbers
+    return tuple(map(float, numbers))

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.results.named_runs import named
+from hapticlink.orchestrator.results.folders import named
 from hapticlink.orchestrator.results.recorded_scene import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, page, settings

@@ -189,9 +189,7 @@ def test_windows_give_the_same_and_memory_stays_flat(
     hl.export_results(folders[16], to=to, out=tmp_path / "whole")
     monkeypatch.setattr(windows, "WINDOW_BYTES", 10_000)
     monkeypatch.setattr(mcap.writer, "Writer", partial(mcap.writer.Writer, chunk_size=2**16))
-    monkeypatch.setattr(
-        text_files, "LARGEST_JSON", 1 << 16
-    )  # as much memory as that
+    monkeypatch.setattr(text_files, "LARGEST_JSON", 1 << 16)  # as much memory as that
 
     def peak(times: int) -> int:
         tracemalloc.start()
