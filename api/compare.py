@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import named_runs
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.folders import names
+from hapticlink.orchestrator.results.tables import Results, load
 from hapticlink.visualization.compare import numbers, overlay, page, settings, text
 from hapticlink.visualization.compare.numbers import Row
 
@@ -99,13 +99,13 @@ def compare(
     given = runs if isinstance(runs, Mapping) else dict(enumerate(runs))
     if len(given) < 2:
         raise InputFault("compare takes two runs or more; `print(run)` says how one ended")
-    found = {n: r if isinstance(r, Results) else named_runs.load(r) for n, r in given.items()}
+    found = {n: r if isinstance(r, Results) else load(r) for n, r in given.items()}
     if isinstance(runs, Mapping):
         return Comparison({str(name): run for name, run in found.items()})
     every = list(found.values())
     folders = [run.folder for run in every if run.folder]
     if len(folders) == len(every):
-        return Comparison(dict(zip(named_runs.names(folders), every, strict=True)))
+        return Comparison(dict(zip(names(folders), every, strict=True)))
     return Comparison(dict(zip(_by_settings(every), every, strict=True)))
 
 

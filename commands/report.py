@@ -25,7 +25,7 @@ def report(runs: Runs, /, *, out: Out = None) -> int:
     """
     from hapticlink.fmus.atomic_file import atomic_file
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.named_runs import named
+    from hapticlink.orchestrator.results.folders import named
     from hapticlink.visualization.compare import page
 
     results = named(runs)

@@ -12,7 +12,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 import hapticlink as hl
-from hapticlink.orchestrator.results.named_runs import named
+from hapticlink.orchestrator.results.folders import named
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.compare import overlay
 from hapticlink.visualization.compare import page as report

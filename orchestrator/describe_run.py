@@ -32,10 +32,12 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
     system, timeline = plan.system, plan.system.timeline
     seconds, base = timeline.seconds, timeline.base
     held = [c for c in system.connections if c.hold]
+    compiled = scene.packaging == "native" and blocks(scene).built
+    packages = (*PACKAGES, "ziglang") if compiled else PACKAGES
     return RunSetup(
         scene=scene.tables(),
         options=list(scene.source.options) if scene.source else [],
-        versions=installed((*PACKAGES, *_compilers(scene))) | {"python": platform.python_version()},
+        versions=installed(packages) | {"python": platform.python_version()},
         plugins=plugins.loaded(),
         seeds=_seeds(scene, system),
         files=["run.json", *(f"{table}.{scene.record.format}" for table in tables)],
@@ -106,10 +108,6 @@ def _friction_speeds(scene: Scene, system: System) -> dict[str, float]:
     timeline = system.timeline
     period = timeline.seconds(timeline.clock(system.fmu[MECHANISM].clock).longest)
     return friction_scale.speeds(scene.linkage, period / scene.mechanism.substeps)
-
-
-def _compilers(scene: Scene) -> tuple[str, ...]:
-    return ("ziglang",) if scene.packaging == "native" and blocks(scene).built else ()
 
 
 def _seeds(scene: Scene, system: System) -> dict[str, int]:

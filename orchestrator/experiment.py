@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import current_directory, interpreter_state, interrupt
+from hapticlink.orchestrator.base import interpreter_state, interrupt
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.describe_run import setup
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
@@ -23,8 +23,8 @@ from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.files import remove_rows
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
-from hapticlink.orchestrator.results.run_results import ResultsInMemory
-from hapticlink.orchestrator.results.tables import Results, Table, with_record
+from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.windows import WINDOW_BYTES, opened
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
@@ -51,7 +51,7 @@ class Experiment:
     folder: Path
     before: RunSetup
     ending: RunEnding
-    memory: ResultsInMemory | None = None
+    memory: RunResults | None = None
 
     @cached_property
     def run(self) -> dict[str, Any]:
@@ -71,7 +71,7 @@ class Experiment:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
                 return opened(self.folder, record)
-            return with_record(Results(None, self.run, self.memory.tables()), record)
+            return Results(None, self.run, self.memory.tables(), known=record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:
@@ -98,11 +98,11 @@ def _left_out(every: System, system: System) -> list[str]:
     return [*dict.fromkeys(left_out)]
 
 
-def _memory(system: System, columns: Mapping[str, Sequence[str]]) -> ResultsInMemory | None:
-    """Room for the results of a run; None where their rows may be more than a window."""
+def _fits_a_window(system: System, columns: Mapping[str, Sequence[str]]) -> bool:
+    """Whether the rows of a run are no more than a window."""
     counts = {c.name: len(c.starts) for c in system.timeline.clocks}
     written = sum(counts[clock] * (1 + len(names)) for clock, names in columns.items())
-    return ResultsInMemory(counts) if 8 * written <= WINDOW_BYTES else None
+    return 8 * written <= WINDOW_BYTES
 
 
 @interrupt.held()
@@ -145,8 +145,8 @@ def simulate(
         before = setup(read, plan, tables, _left_out(every, system))
         alone = isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
-        memory = _memory(system, tables) if in_memory and not foreign else None
-        if memory:
+        if in_memory and not foreign and _fits_a_window(system, tables):
+            memory = RunResults()
             with interpreter_state.restored():
                 outcome = run(plan, memory, progress, real_time)
             return Experiment(
@@ -157,7 +157,7 @@ def simulate(
         with RunFolder(folder, before, csv) as results:
             with (
                 crash_monitor.watched(folder) if foreign else nullcontext(),
-                current_directory.restored(*foreign),
+                interpreter_state.directory_restored(*foreign),
                 interpreter_state.restored(),
             ):
                 outcome = run(plan, results, progress, real_time)

@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.errors import Finding, SceneFault
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
-from hapticlink.orchestrator.scene.find_scene import find, folder_of
+from hapticlink.orchestrator.scene.find_scene import find
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.read_and_check import from_source
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
@@ -48,8 +48,8 @@ def _find(scene: str) -> Source:
         from hapticlink.orchestrator.ssp import read as ssp
 
         return Source(scene, ssp.tables(FilePath(scene)), {})
-    name, text = find(scene)
-    return Source(name, *document(text, name, folder_of(scene)))
+    name, text, folder = find(scene)
+    return Source(name, *document(text, name, folder))
 
 
 def _of(scene: Scene) -> Source:
@@ -57,7 +57,7 @@ def _of(scene: Scene) -> Source:
         return scene.source
     tables = adapter().dump_python(scene.plain(), mode="json", by_alias=True, exclude_none=True)
     if isinstance(scene, WrittenScene):
-        return replace(scene.origin.source, tables=tables, options=(), set_by=scene.origin.set_by)
+        return replace(scene.origin, tables=tables)
     return Source(scene.title, tables, {})
 
 

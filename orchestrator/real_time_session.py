@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
-from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.base.ticks import Frames, exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
@@ -74,8 +73,7 @@ class LiveRun:
     def time(self) -> float:
         """The simulated time of the newest haptic event (s). Raises InputFault before `run`, as
         does all that reads or changes what runs."""
-        self._require_running()
-        haptics = self._simulation.system.timeline.clocks[0].name
+        haptics = self.system.timeline.clocks[0].name
         return self._simulation.seconds(self._loop.events.previous(haptics))
 
     @property
@@ -135,13 +133,12 @@ class LiveRun:
         as in [holds] of a scene. A hold begins anew with the newest sample of its source. Raises
         InputFault where it does not fit, or cannot be changed while the scene runs, and for a delay
         that no scene may have."""
-        self._require_running()
+        system = self.system
         require_name("connection", name)
         if hold is not None and require_name("hold", hold) not in HOLDS:
             raise InputFault(unknown("hold", hold, HOLDS))
         if delay is not None:
             delay = require(f"delay of {name}", delay, Elapsed)
-        system = self._simulation.system
         connections = [c for c in system.connections if name in names(c) and c.hold]
         if not connections:
             every = [key for c in system.connections if c.hold for key in names(c)]
@@ -159,7 +156,6 @@ class LiveRun:
     def holds(self) -> dict[str, list[str]]:
         """By connection that has a hold, the holds that `hold` can give it, its present one
         first."""
-        self._require_running()
         held = [self._connections.get(c.name, c) for c in self.system.connections if c.hold]
         return {c.name: choices(self.system, c) for c in held}
 
@@ -171,8 +167,7 @@ class LiveRun:
         step's number. Raises InputFault where an FMU cannot vary its step or has a spring whose
         energy `pspm` limits, for a rate that is not between 0 and the haptic one, and for a jitter
         that leaves no haptic tick between two ends."""
-        self._require_running()
-        timeline = self._simulation.system.timeline
+        timeline = self.system.timeline
         haptics, *others = timeline.clocks
         if require_name("clock", clock) not in [c.name for c in others]:
             raise InputFault(unknown("clock", clock, [c.name for c in others]))
@@ -262,13 +257,13 @@ class LiveRun:
 
     def _require_free(self, name: str, scalars: Iterable[Scalar]) -> None:
         fmu = name.partition(".")[0]
-        fed = {s.name: c.name for c in self._simulation.system.into(fmu) for s in c.inputs}
+        fed = {s.name: c.name for c in self.system.into(fmu) for s in c.inputs}
         for scalar in scalars:
             if scalar.name in fed:
                 raise InputFault(f"{name} is fed by a connection, {fed[scalar.name]}")
             if scalar.causality == "parameter" and scalar.variability != "tunable":
                 raise InputFault(f"{name} is not tunable: change the scene, with `reset`")
-        if name in limited_gains(self._simulation.system):
+        if name in limited_gains(self.system):
             raise InputFault(
                 f"{name} is a gain of a spring whose energy `pspm` limits, which counts with that "
                 "of the start: change the scene, with `reset`"

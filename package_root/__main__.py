@@ -4,24 +4,23 @@ imports, and from here to the end of the process."""
 import os
 import signal
 
-from hapticlink.orchestrator.base import cycle_search, interrupt, standard_streams
+from hapticlink.orchestrator.base import interrupt, process
 
 
 def main() -> None:
-    standard_streams.ensure()
+    process.open_streams()
     # Matrices of a hundred rows: threads of BLAS wait for each other, several times as long as one
     # computes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    cycle_search.seldom()
+    process.search_cycles_seldom()
     with interrupt.held(interrupt.end_process, after=signal.SIG_IGN):
         from hapticlink.commands import main as command
-        from hapticlink.orchestrator.base.process_end import leave_threads
 
         try:
             command()
         except SystemExit as ended:
-            leave_threads(int(ended.code or 0))
-            cycle_search.none_of_these()
+            process.leave_threads(int(ended.code or 0))
+            process.search_none_of_these()
             raise
 
 

@@ -9,14 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.base.communication_points import Frames
-from hapticlink.orchestrator.base.ticks import Timeline, exact
+from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
@@ -24,7 +21,7 @@ from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.plan.event_kinds import key_of
 from hapticlink.orchestrator.plan.operations import Event, Push
 from hapticlink.orchestrator.plan.plan import Plan, moments
-from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.fmus import Memory
@@ -132,10 +129,9 @@ def resolved(
         foreign = refusals.of_system(system, outside, scene)
         plan = Plan(system)
         plan.check()
-        room = stack.enter_context(temporary_folders.room())
-        rooms = _rooms(plan, room, scene.title)
+        rooms = _rooms(plan, scene.title)
         stack.enter_context(np.errstate(invalid="ignore", over="ignore"))
-        simulation = Simulation(system, RunFolder(room), stack)
+        simulation = Simulation(system, RunResults(), stack)
         refusals.of_simulation(simulation, scene.title)
         simulation.start()
         if not simulation.swept:
@@ -150,13 +146,13 @@ def _recorded(system: System) -> frozenset[str]:
     return frozenset(outputs if (chosen := system.recording.outputs) is None else chosen)
 
 
-def _rooms(plan: Plan, folder: Path, title: str) -> dict[str, int]:
+def _rooms(plan: Plan, title: str) -> dict[str, int]:
     """The samples in transit, and those of energy accounts, for which each hold needs room: twice
     as many as a run of the scene's duration."""
     if not any(c.latency for c in plan.system.connections) and not _accounts(plan.system):
         return {}
     with ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
-        simulation = Simulation(plan.system, RunFolder(folder), stack)
+        simulation = Simulation(plan.system, RunResults(), stack)
         refusals.of_simulation(simulation, title)
         loop = CompiledLoop(plan, simulation, load())
         simulation.start()

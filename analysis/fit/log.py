@@ -18,7 +18,6 @@ from hapticlink.orchestrator.base.signal_names import (
     MEASURED_HANDLE_POSE,
     MOTOR_WRENCH,
 )
-from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.tables import Table, read_table
 
 UNEVEN = 0.01
@@ -94,7 +93,7 @@ def read(path: Path | str) -> Log:
 
 def _hand_type(run: Path) -> str:
     """The type of [hand] in the record of a run."""
-    return str((json_file.read(run)["scene"].get("hand") or {}).get("type", ""))
+    return str((text_files.read_json(run)["scene"].get("hand") or {}).get("type", ""))
 
 
 def _hdf5(path: Path) -> Table:

@@ -17,15 +17,14 @@ from numpy.typing import NDArray
 from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
 from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
-from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Event, Operation, Record, Repeat, StopWhen
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.instructions import Feed, Instruction, Move, Sample, instructions
 from hapticlink.orchestrator.run.python_loop import OperationsInPython
 from hapticlink.orchestrator.run.simulation import Simulation
@@ -244,13 +243,8 @@ def lifted_map(system: System, scene: Scene | None = None) -> Iterator[LiftedMap
     tolerance = min(system.coupling.iteration.tolerance, CONVERGED)
     exactly = replace(system.coupling.iteration, method="newton", tolerance=tolerance)
     system = replace(system, coupling=replace(system.coupling, iteration=exactly))
-    with (
-        temporary_folders.room() as room,
-        RunFolder(room) as results,
-        ExitStack() as stack,
-        np.errstate(invalid="ignore", over="ignore"),
-    ):
-        simulation = Simulation(system, results, stack)
+    with ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
+        simulation = Simulation(system, RunResults(), stack)
         simulation.step_checks.clear()
         simulation.start()
         without_friction(simulation.holds.values())

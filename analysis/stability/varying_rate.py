@@ -25,9 +25,8 @@ from hapticlink.analysis.stability.switching import (
     mean_square,
 )
 from hapticlink.orchestrator.base.arrays import Matrix
-from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.ticks import Clock, Timeline, bounds, exact
+from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline, bounds, exact
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene

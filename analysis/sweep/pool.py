@@ -25,8 +25,7 @@ from typing import Any
 
 from hapticlink.analysis.sweep.job import Job
 from hapticlink.analysis.sweep.row import DIED, Row, failed
-from hapticlink.orchestrator.base import cycle_search, interrupt, temporary_folders
-from hapticlink.orchestrator.base.process_end import leave_threads
+from hapticlink.orchestrator.base import interrupt, process, temporary_folders
 from hapticlink.orchestrator.fmi import process_cache
 
 Work = Callable[[Job], Row]
@@ -80,12 +79,12 @@ class _Worker(SpawnProcess):
             sys.modules["__main__"] = main
 
     def run(self) -> None:
-        cycle_search.seldom()
-        cycle_search.none_of_these()  # what is loaded by now
+        process.search_cycles_seldom()
+        process.search_none_of_these()  # what is loaded by now
         with process_cache.unpacked_once():
             super().run()
-        cycle_search.none_of_these()
-        leave_threads(0)
+        process.search_none_of_these()
+        process.leave_threads(0)
 
 
 @contextmanager

@@ -11,9 +11,9 @@ from typing import Any
 
 from hapticlink.analysis.sweep.row import FAILED, METRIC, Row
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.text_table import aligned
-from hapticlink.orchestrator.results import json_file
+from hapticlink.orchestrator.base.terminal_output import aligned
 from hapticlink.orchestrator.results.files import write_json
 from hapticlink.orchestrator.results.numbers import short
 
@@ -39,7 +39,7 @@ class Rows:
     def find(self, key: str) -> Row | None:
         """The row of an earlier sweep; None if there is none or it cannot be read."""
         try:
-            row = json_file.read(self._folder / f"{key}.json", "a row")
+            row = text_files.read_json(self._folder / f"{key}.json", "a row")
         except InputFault:
             return None
         return row if isinstance(row, dict) else None

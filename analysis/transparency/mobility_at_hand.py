@@ -36,7 +36,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
-from hapticlink.orchestrator.base.text_table import aligned
+from hapticlink.orchestrator.base.terminal_output import aligned
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene

@@ -13,7 +13,7 @@ from hapticlink.analysis.stability.hands import SPRINGS
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.analysis.tune.felt_stiffness import HERTZ
 from hapticlink.orchestrator.base.arrays import Complex, Vector
-from hapticlink.orchestrator.results.scene_file import scene_file
+from hapticlink.orchestrator.results.recorded_scene import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
 

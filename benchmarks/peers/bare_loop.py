@@ -12,9 +12,8 @@ import numpy as np
 
 from hapticlink.fmus.native import compile_library
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
-from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.build_system import built
 
@@ -43,13 +42,8 @@ def seconds(scene: str, options: list[str], steps: int, folder: Path) -> float:
     loop that hands their outputs on as they are. All variables have to be reals of FMI 2.0 at fixed
     rates."""
     run = bare_loop(folder).loop
-    with (
-        built(open_scene.load(scene, options)) as system,
-        temporary_folders.room() as room,
-        RunFolder(room) as results,
-        ExitStack() as stack,
-    ):
-        simulation = Simulation(system, results, stack)
+    with built(open_scene.load(scene, options)) as system, ExitStack() as stack:
+        simulation = Simulation(system, RunResults(), stack)
         simulation.start()
         kept: list[object] = []
         rates = {c.name: 1 / system.timeline.seconds(c.longest) for c in system.timeline.clocks}

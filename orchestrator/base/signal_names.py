@@ -8,6 +8,9 @@ A further user, who holds a device at the point NAME of the linkage, has the blo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TypeVar
+
 HAND = "hand"
 DEVICE = "haptic_device"
 CONTROLLER = "controller"
@@ -51,6 +54,14 @@ MOBILITIES = (f"{ENVIRONMENT}.Lambda_inv", f"{MECHANISM}.Lambda_inv")
 """The mobility at the operational point, computed by either block."""
 PROJECTORS = (f"{ENVIRONMENT}.P_c", f"{MECHANISM}.P_c")
 """The projector on the constrained directions, computed by either block."""
+
+
+User = TypeVar("User")
+
+
+def by_user(first: User | None, others: Mapping[str, User]) -> dict[str, User]:
+    """What each user has, by the user's name; that of the first one is empty."""
+    return ({} if first is None else {"": first}) | dict(others)
 
 
 def block_of_user(block: str, user: str) -> str:

@@ -1,11 +1,17 @@
-"""Text files from anywhere, read whole: only what is a file, and of bounded size."""
+"""Text files from anywhere, and JSON files of results, which somebody may have changed, read whole:
+only what is a file, and of bounded size."""
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
+from typing import Any
 
 from hapticlink.orchestrator.base.errors import InputFault
+
+LARGEST_JSON = 1 << 28
+"""Bytes: a run.json names its outputs, of which there are a million at most."""
 
 
 def exists(path: str | Path) -> bool:
@@ -27,3 +33,12 @@ def read(path: Path, what: str, most: int, encoding: str = "utf-8") -> str:
         return content.decode(encoding)
     except (OSError, UnicodeDecodeError) as error:
         raise InputFault(f"{why}: {error}") from error
+
+
+def read_json(path: Path, what: str = "run.json") -> Any:
+    """The content of `path`. Raises InputFault for what is no file, too large, or no JSON."""
+    text = read(path, what, LARGEST_JSON)
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:  # the latter of 100,000 brackets
+        raise InputFault(f"{path}: cannot be read as {what}: {error}") from error

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from fmpy import fmi2
 
-from hapticlink.orchestrator.base import current_directory
+from hapticlink.orchestrator.base import interpreter_state
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries, rounding_mode
@@ -67,7 +67,7 @@ class InProcess(Instance):
     def _load(self) -> None:
         try:
             self._folder = process_cache.unpack(self.description, self._folder)
-            with current_directory.restored(self.name):
+            with interpreter_state.directory_restored(self.name):
                 self.slave = self._instantiate()
             self._keep_arithmetic()
         except Exception as error:  # FMPy raises bare Exception

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
-from hapticlink.orchestrator.base.process_end import leave_threads
+from hapticlink.orchestrator.base.process import leave_threads
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance

@@ -2,85 +2,17 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import numpy as np
-
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.results import rows
-from hapticlink.orchestrator.results.tables import Vector
-
-
-class Recorder:
-    """Keeps the rows of a table in memory: `time` and the `values` at `places`, named by `columns`,
-    of every `every`-th row; without columns there is no table, and rows are counted only. A context
-    manager.
-
-    block: the newest rows, `room` of them at most, which `flush` moves to `parts`. `first` is
-    called after the first row.
-
-    `view` is `values` at `places` where these are side by side, else None. `due`: whether the next
-    row is written. `room`: of the block, 0 until the first row is. `count`: rows so far, written or
-    not. `reached`: time of the newest (s). They are shared with the compiled loop.
-    """
-
-    def __init__(
-        self,
-        columns: Sequence[str] | None,
-        values: Vector,
-        places: Sequence[int],
-        first: Callable[[], object],
-        every: int = 1,
-        block: rows.Block | None = None,
-    ) -> None:
-        self.values, self.places, self.every = values, np.array(places, np.int64), every
-        self.columns, self.parts = columns, list[Vector]()
-        span = slice(places[0], places[-1] + 1) if len(places) else slice(0)
-        beside = [*places] == [*range(len(values))[span]]
-        self.view = values[span] if beside else None
-        self._first = first
-        self.due, self.room, self.count = (ctypes.c_int64(n) for n in (1, 0, 0))
-        self.reached = ctypes.c_double()
-        self.block = block
-
-    @property
-    def last(self) -> float | None:
-        """The time (s) of the newest row, None before the first."""
-        return self.reached.value if self.count.value else None
-
-    def row(self, time: float) -> None:
-        """Write a row at `time` (s). Raises OSError, as on a full disk."""
-        if self.due.value and self.block:
-            filled, rows = self.block.filled, self.block.rows
-            if filled.value == len(rows):
-                self.flush()
-            row = rows[filled.value]
-            row[0], row[1:] = time, self.values[self.places] if self.view is None else self.view
-            filled.value += 1
-        self.reached.value = time
-        self.count.value += 1
-        self.due.value = self.count.value % self.every == 0
-        if self.count.value == 1:
-            self._first()
-            self.room.value = len(self.block.rows) if self.block else 1
-
-    def flush(self) -> None:
-        """Make room in the block for further rows."""
-        if self.block and self.block.filled.value:
-            self.parts.append(self.block.rows[: self.block.filled.value].copy())
-            self.block.filled.value = 0
-
-    def __enter__(self) -> Recorder:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Nothing to close."""
+from hapticlink.orchestrator.results.run_results import Recorder
 
 
 class FileRecorder(Recorder):
@@ -92,23 +24,24 @@ class FileRecorder(Recorder):
     def __init__(
         self,
         path: Path,
-        columns: Sequence[str] | None,
+        recorded: Mapping[str, int] | None,
         values: Vector,
-        places: Sequence[int],
         first: Callable[[], object],
         every: int = 1,
     ) -> None:
-        super().__init__(columns, values, places, first, every)
+        super().__init__(recorded, values, first, every)
         self.path, self.target = path, path.with_suffix(rows.SUFFIX)
         self._full: float | None = None
         self._file: BinaryIO | None = None
-        if columns is None:
+        if recorded is None:
             return
-        self.block: rows.FileBlock = rows.FileBlock(path, 1 + len(places))
-        self._unfinished = self._beside(self.target)
+        self.block: rows.FileBlock = rows.FileBlock(path, len(self.columns))
+        self.files = (self.target.name, self.block.path.name)
+        self._unfinished = path.with_name(f".{self.target.name}.{os.getpid()}")
+        self._unfinished.unlink(missing_ok=True)
         self._file = self._unfinished.open("xb", buffering=0)  # never through a link
         try:
-            self._write(rows.header(("time", *columns)))
+            self._write(rows.header(self.columns))
         except OSError:
             self.__exit__()
             raise
@@ -117,10 +50,6 @@ class FileRecorder(Recorder):
     def last(self) -> float | None:
         """As of all recorders, of the last row on the disk where that is full."""
         return super().last if self._full is None else self._full
-
-    @property
-    def files(self) -> list[str]:
-        return [self.target.name, self.block.path.name] if self._file else []
 
     def flush(self) -> None:
         """Write the rows of the block. Raises OSError, as on a full disk, after those that fit."""
@@ -137,29 +66,15 @@ class FileRecorder(Recorder):
             self.block.filled.value = 0
 
     def publish(self) -> None:
-        """Replace the file of an earlier run by this one."""
         if self._file:
             self._file.close()  # Windows moves no open file
             os.replace(self._unfinished, self.target)
             self._file = self.target.open("ab", buffering=0)
 
     def finish(self) -> None:
-        """Make the CSV of the rows, which stay. Raises OSError, as on a full disk."""
         if self._file and self.last is not None:
             self._file.close()
             make_csv(self.path)
-
-    def remove(self) -> None:
-        """Remove the rows."""
-        if self._file and self.last is not None:
-            remove_rows(self.path)
-
-    @staticmethod
-    def _beside(path: Path) -> Path:
-        """The name of an unfinished file, which is not there."""
-        unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-        unfinished.unlink(missing_ok=True)
-        return unfinished
 
     def _write(self, content: bytes | memoryview) -> None:
         """Write all of `content`; or nothing, raising OSError, where the disk is full."""

@@ -10,8 +10,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hapticlink.fmus import lock
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import folders, json_file
+from hapticlink.orchestrator.results import folders
 
 _holders: dict[tuple[int, int], int] = {}
 """The thread that holds the lock of a folder of this process, by device and inode."""
@@ -85,6 +86,6 @@ def _locked(folder: Path) -> Iterator[bool]:
 def _process(folder: Path) -> str:
     """Which process the run in `folder` belongs to, as far as its run.json says so."""
     with suppress(InputFault, ValueError, LookupError, TypeError, AttributeError):
-        end = json_file.read(folder / "run.json")["end"]
+        end = text_files.read_json(folder / "run.json")["end"]
         return f", in process {int(end['process'])}"
     return ""

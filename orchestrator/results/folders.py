@@ -1,16 +1,18 @@
-"""The output folder of a command."""
+"""Folders of results: the one that a command writes to, and several by the names that tell them
+apart."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.results.files import write_json
+from hapticlink.orchestrator.results.tables import Results, load
 
 
 def ensure(folder: Path | str, option: str = "--out") -> Path:
@@ -34,8 +36,26 @@ def add(
     folder: Path, names: Iterable[str], more: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
     """Adds files of a run to the list in its run.json, and `more` keys; returns the new content."""
-    run: dict[str, Any] = json_file.read(folder / "run.json")
+    run: dict[str, Any] = text_files.read_json(folder / "run.json")
     run["files"] = list(dict.fromkeys([*run["files"], *names]))
     run |= more
     write_json(folder / "run.json", run)
     return run
+
+
+def named(folders: Sequence[Path | str]) -> dict[str, Results]:
+    """The runs of folders by the names that tell those apart. Raises InputFault as `load`, and for
+    a folder that is named twice."""
+    return dict(zip(names(folders), map(load, folders), strict=True))
+
+
+def names(folders: Sequence[Path | str]) -> list[str]:
+    """What tells folders apart: their last part, or all parts behind what they have in common.
+    Raises InputFault for one that is named twice."""
+    paths = [Path(folder).resolve() for folder in folders]
+    if twice := next((f for i, f in enumerate(folders) if paths[i] in paths[:i]), None):
+        raise InputFault(f"{twice}: is named twice")
+    if len({path.name for path in paths}) == len(paths):
+        return [path.name for path in paths]
+    common = os.path.commonpath(paths)
+    return [path.relative_to(common).as_posix() for path in paths]

@@ -1,8 +1,8 @@
-"""Parts of the scene of a run, as run.json has them."""
+"""The scene of a run as run.json has it: parts of it as records, all of it as a scene file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
@@ -10,8 +10,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.signal_names import by_user
 from hapticlink.orchestrator.results.run_record import first_error
 from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.scene.overrides import toml
 
 
 def scene_part(results: Results, name: str, kind: Any) -> Any:
@@ -30,14 +32,46 @@ def scene_part(results: Results, name: str, kind: Any) -> Any:
 def all_devices(results: Results) -> dict[str, Device]:
     """The devices of all users of a run, as `by_user`."""
     others = scene_part(results, "devices", Mapping[str, Device])
-    return by_user(scene_part(results, "device", Device), others)
-
-
-def by_user(first: Device | None, others: Mapping[str, Device] | None) -> dict[str, Device]:
-    """The devices of all users by their points; the first one's name is empty."""
-    return ({"": first} if first else {}) | dict(others or {})
+    return by_user(scene_part(results, "device", Device), others or {})
 
 
 @cache  # which takes longer to make than most figures take to draw
 def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
+
+
+def scene_file(run: Results) -> str:
+    """The text of a scene file that stands alone: what run.json has of the scene."""
+    scene = _without_none(run.record.scene)
+    tables = {key: value for key, value in scene.items() if isinstance(value, Mapping)}
+    lines = [f"{key} = {_value(key, v)}" for key, v in scene.items() if key not in tables]
+    for key, table in tables.items():
+        lines += ["", *_table(key, table)]
+    return "\n".join(lines) + "\n"
+
+
+def _table(name: str, table: Mapping[str, Any]) -> Iterator[str]:
+    yield f"[{name}]"
+    for key, value in table.items():
+        yield f"{_key(key)} = {_value(key, value)}"
+
+
+def _value(key: str, value: Any) -> str:
+    if not _tables(value):
+        return toml(value, key)
+    return "[\n" + "".join(f"  {toml(row, key)},\n" for row in value) + "]"
+
+
+def _tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
+
+
+def _key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() else toml(key, key)
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        # A key that is a word of Python has an underscore in its record: `from_`.
+        return {k.removesuffix("_"): _without_none(v) for k, v in value.items() if v is not None}
+    return [_without_none(entry) for entry in value] if isinstance(value, list) else value

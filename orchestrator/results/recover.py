@@ -7,9 +7,9 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base import temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import folder_lock, json_file, rows
+from hapticlink.orchestrator.results import folder_lock, rows
 from hapticlink.orchestrator.results.files import make_csv, remove_rows, write_json
 from hapticlink.orchestrator.results.numbers import last_time
 from hapticlink.orchestrator.results.run_folder import RUN
@@ -55,6 +55,6 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
         changes["end"] = {"reason": "fault", "time": last}
         changes["fault"] = {"kind": kind, "time": last, "message": message}
     if recovered or record.end.process is not None:
-        content = json_file.read(folder / RUN)
+        content = text_files.read_json(folder / RUN)
         write_json(folder / RUN, content | changes)
     return recovered

@@ -33,8 +33,8 @@ Rows = NDArray[np.float64]
 class Block:
     """The newest rows of a table, of `width` numbers: `filled` of `rows`."""
 
-    def __init__(self, room: int, width: int) -> None:
-        self.filled, self.rows = ctypes.c_int64(), np.empty((room, width))
+    def __init__(self, width: int) -> None:
+        self.filled, self.rows = ctypes.c_int64(), np.empty((max(ROOM // (8 * width), 1), width))
 
 
 class FileBlock(Block):
@@ -93,12 +93,6 @@ def write_csv(source: Path, target: BinaryIO) -> int:
     for first in range(0, len(table), step):
         target.write(text(table[first : first + step]))
     return len(table)
-
-
-def read(path: Path) -> tuple[tuple[str, ...], Rows]:
-    """The columns and the rows of a table; a row that is not whole is left out."""
-    table = Written(path)
-    return table.columns, table[:]
 
 
 class Written:

@@ -4,15 +4,15 @@ one are on the disk."""
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
-from hapticlink.orchestrator.results import json_file, rows
+from hapticlink.orchestrator.results import rows
 from hapticlink.orchestrator.results.files import FileRecorder, text, write, write_json, write_over
 from hapticlink.orchestrator.results.run_record import (
     End,
@@ -30,19 +30,17 @@ MAX_HEADER_BYTES = 1 << 28
 """Of the names of a table's columns."""
 
 
-class RunFolder(RunResults[FileRecorder]):
-    """The folder of a run. `setup` is in run.json from the first row on; without it no run.json is
-    written.
+class RunFolder(RunResults):
+    """The folder of a run. `setup` is in run.json from the first row on.
 
     A context manager that records how the run ended in run.json even when an exception or a second
     signal, which ends the process at once, breaks it off. `published`: the folder has the results
     of this run. csv: whether its tables become CSVs.
     """
 
-    def __init__(self, folder: Path, setup: RunSetup | None = None, csv: bool = True) -> None:
+    def __init__(self, folder: Path, setup: RunSetup, csv: bool = True) -> None:
         super().__init__(folder)
-        self._csv = csv
-        self._setup = content(setup) if setup else None
+        self._csv, self._setup = csv, content(setup)
         # What the first row needs, before the time of the loop is taken.
         self._earlier = _listed(folder)
         self._begun = self._text(End(process=os.getpid()))
@@ -57,41 +55,28 @@ class RunFolder(RunResults[FileRecorder]):
             with suppress(OSError):
                 self._broken_off("fault", error)
 
-    def recorder(
-        self,
-        clock: str,
-        columns: Sequence[str] | None,
-        values: Vector,
-        places: Sequence[int],
-        every: int = 1,
+    def _new(
+        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int
     ) -> FileRecorder:
-        """The recorder of a clock. All recorders have to be created before the first row."""
-        path = self.folder / f"{clock}.csv"
-        recorder = FileRecorder(path, columns, values, places, self._publish, every)
-        self._recorders.append(recorder)
-        return recorder
+        return FileRecorder(self.folder / f"{clock}.csv", recorded, values, self._publish, every)
 
     def finish(self) -> None:
-        """Make the CSV of all clocks. Raises OSError, as on a full disk; the rows can be read
-        nevertheless."""
-        for recorder in self._recorders if self._csv else ():
-            recorder.finish()
+        if self._csv:
+            super().finish()
 
     def _publish(self) -> None:
         """Called by each recorder after its first row; once all have one, replaces the results of
         an earlier run."""
-        if any(recorder.last is None for recorder in self._recorders):
+        recorders = self._recorders.values()
+        if any(recorder.last is None for recorder in recorders):
             return
-        if self._begun:
-            write(self.folder / RUN, self._begun + b" " * ROOM)
-        for recorder in self._recorders:
-            recorder.publish()
-        own = {RUN, *(name for recorder in self._recorders for name in recorder.files)}
+        write(self.folder / RUN, self._begun + b" " * ROOM)
+        super()._publish()
+        own = {RUN, *(name for recorder in recorders for name in recorder.files)}
         for name in self._earlier - own:
             (self.folder / name).unlink(missing_ok=True)
-        self.published = True
 
-    def end(self, ending: RunEnding, columns: Mapping[str, Sequence[str]]) -> None:
+    def end(self, ending: RunEnding, columns: Mapping[str, Iterable[str]]) -> None:
         """Record how the run ended in run.json. A run without rows, for which empty tables with
         these `columns` by clock are written, does so only if no earlier run has rows there. Raises
         OSError if the disk is full."""
@@ -101,13 +86,13 @@ class RunFolder(RunResults[FileRecorder]):
                 with atomic_file(self.folder / name) as empty:
                     empty.write_bytes(rows.header(("time", *names)))
             self.published = True
-        if self.published and self._setup is not None:
+        if self.published:
             write_json(self.folder / RUN, self._setup | content(ending))
 
     def end_in_place(self, ending: RunEnding) -> None:
         """As `end`, on a full disk, in the bytes reserved: everything, or only how the run ended,
         or nothing if the disk cannot write in place."""
-        if self.published and self._setup is not None:
+        if self.published:
             whole = content(ending)
             least = {key: whole[key] for key in ("end", "fault")}
             with suppress(OSError):
@@ -115,7 +100,7 @@ class RunFolder(RunResults[FileRecorder]):
 
     def _interrupted(self) -> None:
         self._broken_off("interrupted", Interrupted(self.last))
-        for recorder in self._recorders:
+        for recorder in self._recorders.values():
             with suppress(OSError):
                 recorder.flush()
             recorder.__exit__()
@@ -123,13 +108,10 @@ class RunFolder(RunResults[FileRecorder]):
     def _broken_off(self, reason: str, error: BaseException) -> None:
         if self.published:
             fault = RecordedFault(type(error).__name__, self.last, str(error))
-            if unfinished := self._text(End(reason, self.last), fault):
-                write(self.folder / RUN, unfinished)
+            write(self.folder / RUN, self._text(End(reason, self.last), fault))
 
     def _text(self, end: End, fault: RecordedFault | None = None) -> bytes:
-        """The run.json of a run that has not ended regularly, empty without a setup."""
-        if self._setup is None:
-            return b""
+        """The run.json of a run that has not ended regularly."""
         ending = content(RunEnding(end, fault))
         known = ("end", "fault") if fault else ("end",)
         return text(self._setup | {key: ending[key] for key in known})
@@ -155,7 +137,7 @@ def _listed(folder: Path) -> set[str]:
     """The files that the run.json of an earlier run lists, without paths outside of `folder`, and
     the rows and blocks that a run leaves that was killed."""
     try:
-        names = json_file.read(folder / RUN).get("files", ())
+        names = text_files.read_json(folder / RUN).get("files", ())
         texts = (n for n in names if isinstance(n, str) and "\0" not in n)
         files = {n for n in texts if n != ".." and Path(n).name == n}
     except (InputFault, AttributeError, TypeError):

@@ -1,88 +1,138 @@
-"""The results of a run while it runs, in memory."""
+"""The results of a run while it runs: the rows of each clock, in memory."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import ctypes
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Generic, TypeVar
 
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.results import rows
-from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.tables import Table
 
-R = TypeVar("R", bound=Recorder)
+
+class Recorder:
+    """Records rows of a table: `time` and those `values` whose places the columns `recorded` name,
+    at every `every`-th call of `row`; where `recorded` is None there is no table, and rows are
+    counted only. `first` is called after the first row. A context manager.
+
+    block: the newest rows, which `flush` moves to `parts`. `view` is `values` at `places` where
+    these are side by side, else None. `due`: whether the next row is written. `room`: of the block,
+    0 until the first row is. `count`: rows so far, written or not. `reached`: time of the newest
+    (s). They are shared with the compiled loop.
+    """
+
+    files: tuple[str, ...] = ()
+    """The names of those to which rows are written."""
+
+    def __init__(
+        self,
+        recorded: Mapping[str, int] | None,
+        values: Vector,
+        first: Callable[[], object],
+        every: int = 1,
+        block: rows.Block | None = None,
+    ) -> None:
+        places = [*(recorded or {}).values()]
+        self.values, self.places, self.every = values, np.array(places, np.int64), every
+        self.columns, self.parts = ("time", *(recorded or ())), list[Vector]()
+        span = slice(places[0], places[-1] + 1) if places else slice(0)
+        self.view = values[span] if places == [*range(len(values))[span]] else None
+        self._first = first
+        self.due, self.room, self.count = (ctypes.c_int64(n) for n in (1, 0, 0))
+        self.reached = ctypes.c_double()
+        self.block = block
+
+    @property
+    def last(self) -> float | None:
+        """The time (s) of the newest row, None before the first."""
+        return self.reached.value if self.count.value else None
+
+    def row(self, time: float) -> None:
+        """Write a row at `time` (s). Raises OSError, as on a full disk."""
+        if self.due.value and self.block:
+            filled, rows = self.block.filled, self.block.rows
+            if filled.value == len(rows):
+                self.flush()
+            row = rows[filled.value]
+            row[0], row[1:] = time, self.values[self.places] if self.view is None else self.view
+            filled.value += 1
+        self.reached.value = time
+        self.count.value += 1
+        self.due.value = self.count.value % self.every == 0
+        if self.count.value == 1:
+            self._first()
+            self.room.value = len(self.block.rows) if self.block else 1
+
+    def flush(self) -> None:
+        """Make room in the block for further rows."""
+        if self.block and self.block.filled.value:
+            self.parts.append(self.block.rows[: self.block.filled.value].copy())
+            self.block.filled.value = 0
+
+    def publish(self) -> None:
+        """Replace the table of an earlier run by this one."""
+
+    def finish(self) -> None:
+        """Make the CSV of the rows, which stay. Raises OSError, as on a full disk."""
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing to close."""
 
 
-class RunResults(Generic[R]):
-    """Results whose recorders are of kind R. `published`: every table has a row. `folder` is where
-    they are, for messages."""
+class RunResults:
+    """Results that are in no file. `published`: every table has a row. `folder` is where they are,
+    for messages."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path = Path("memory")) -> None:
         self.folder, self.published = folder, False
-        self._recorders: list[R] = []
+        self._recorders: dict[str, Recorder] = {}
 
     def recorder(
-        self,
-        clock: str,
-        columns: Sequence[str] | None,
-        values: Vector,
-        places: Sequence[int],
-        every: int = 1,
-    ) -> R:
+        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int = 1
+    ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
-        raise NotImplementedError
+        self._recorders[clock] = made = self._new(clock, recorded, values, every)
+        return made
+
+    def _new(
+        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int
+    ) -> Recorder:
+        block = None if recorded is None else rows.Block(1 + len(recorded))
+        return Recorder(recorded, values, self._publish, every, block)
 
     def flush(self) -> None:
         """Move the rows of all clocks out of their blocks. Raises OSError, as on a full disk."""
-        for recorder in self._recorders:
+        for recorder in self._recorders.values():
             recorder.flush()
 
     def finish(self) -> None:
-        """Convert the tables of all clocks where that is asked for. Raises OSError."""
+        """Make the CSVs of all clocks. Raises OSError, as on a full disk; the rows can be read
+        nevertheless."""
+        for recorder in self._recorders.values():
+            recorder.finish()
 
     @property
     def last(self) -> float:
         """The time (s) of the last row of the first clock."""
-        return self._recorders[0].last or 0.0 if self._recorders else 0.0
+        return next((r.last or 0.0 for r in self._recorders.values()), 0.0)
 
     def _publish(self) -> None:
         """Called by each recorder after its first row."""
-        self.published = all(recorder.last is not None for recorder in self._recorders)
-
-
-class ResultsInMemory(RunResults[Recorder]):
-    """Results that are never in a file. `counts`: about how many rows each clock will have."""
-
-    def __init__(self, counts: Mapping[str, int]) -> None:
-        super().__init__(Path("memory"))
-        self._counts = counts
-        self._clocks: list[str] = []
-
-    def recorder(
-        self,
-        clock: str,
-        columns: Sequence[str] | None,
-        values: Vector,
-        places: Sequence[int],
-        every: int = 1,
-    ) -> Recorder:
-        """The recorder of a clock. All recorders have to be created before the first row."""
-        block = None if columns is None else rows.Block(self._counts[clock], 1 + len(places))
-        recorder = Recorder(columns, values, places, self._publish, every, block)
-        self._recorders.append(recorder)
-        self._clocks.append(clock)
-        return recorder
+        if all(recorder.last is not None for recorder in self._recorders.values()):
+            for recorder in self._recorders.values():
+                recorder.publish()
+            self.published = True
 
     def tables(self) -> dict[str, Table]:
         """The tables by clock."""
-        tables: dict[str, Table] = {}
-        for clock, recorder in zip(self._clocks, self._recorders, strict=True):
-            columns = ("time", *(recorder.columns or ()))
-            recorder.flush()
-            parts = recorder.parts or [np.zeros((0, len(columns)))]
-            whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
-            tables[clock] = Table(columns, whole)
-        return tables
+        self.flush()
+        return {
+            clock: Table(r.columns, np.concatenate([np.zeros((0, len(r.columns))), *r.parts]))
+            for clock, r in self._recorders.items()
+        }

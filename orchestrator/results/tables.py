@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.results import json_file, rows, run_record
+from hapticlink.orchestrator.results import rows, run_record
 from hapticlink.orchestrator.results.run_record import RunRecord
 
 TABLES = (".csv", rows.SUFFIX)
@@ -112,6 +113,8 @@ class Results:
     tables: Mapping[str, Table]
     begin: float = -math.inf
     end: float = math.inf
+    known: RunRecord | None = field(default=None, repr=False)
+    """`record`, where it is known without reading it from `run`."""
 
     @property
     def number(self) -> int:
@@ -142,7 +145,7 @@ class Results:
     def record(self) -> RunRecord:
         """The content of run.json as a record. Raises InputFault where it is of another version, or
         was changed."""
-        return run_record.read(self.run, self.folder)
+        return self.known or run_record.read(self.run, self.folder)
 
     @property
     def haptics(self) -> Table:
@@ -168,31 +171,47 @@ def _place(path: Path, binary: bool = False) -> Path:
     return left if left.exists() and (binary or not path.exists()) else path
 
 
-def with_record(results: Results, record: RunRecord | None) -> Results:
-    """The same results with their record, where it is known without reading it from `run`."""
-    if record:
-        results.__dict__["record"] = record
-    return results
+class FolderTables(Mapping[str, Table]):
+    """The tables of a run's folder by rate, each read when it is asked for and kept then. `binary`:
+    from the rows where they are still there."""
+
+    def __init__(
+        self, folder: Path, rates: Sequence[str], files: Sequence[str], binary: bool = False
+    ) -> None:
+        self._folder, self._rates, self._files, self._binary = folder, rates, files, binary
+        self._read: dict[str, Table] = {}
+
+    def __getitem__(self, rate: str) -> Table:
+        if rate not in self._rates:
+            raise KeyError(rate)
+        if rate not in self._read:
+            there = recorded(rate, self._files)
+            path = self._folder / f"{rate}.csv"
+            self._read[rate] = read_table(path, self, self._binary) if there else empty(self)
+        return self._read[rate]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rates)
+
+    def __len__(self) -> int:
+        return len(self._rates)
 
 
 def load(folder: Path | str, binary: bool = False, record: RunRecord | None = None) -> Results:
     """Reads a run's folder; `binary`: from the rows where they are still there. record: the content
     of its run.json, where it is known. Raises InputFault if it contains no run, one of another
     version, or one that was changed."""
-    folder, tables = Path(folder), dict[str, Table]()
-    results = with_record(Results(folder, run_json(folder), tables), record)
-    for name in results.record.rates:
-        if recorded(name, results.record.files):
-            tables[name] = read_table(folder / f"{name}.csv", tables, binary)
-        else:
-            tables[name] = empty(tables)
-    return results
+    folder = Path(folder)
+    run = run_json(folder)
+    record = record or run_record.read(run, folder)
+    tables = FolderTables(folder, record.rates, record.files, binary)
+    return Results(folder, run, dict(tables), known=record)
 
 
 def run_json(folder: Path) -> dict[str, Any]:
     """The content of the run.json of a run's folder. Raises InputFault where there is none."""
     try:
-        content: dict[str, Any] = json_file.read(folder / "run.json")
+        content: dict[str, Any] = text_files.read_json(folder / "run.json")
     except InputFault as error:
         raise InputFault(f"{folder}: not the folder of a run: {error}") from error
     return content
@@ -215,7 +234,8 @@ def read_table(
     tables. Raises InputFault for a table that is not as a run writes it."""
     if (place := _place(path, binary)) != path:
         _require_file(place)
-        return Table(*rows.read(place), {} if others is None else others)
+        written = rows.Written(place)
+        return Table(written.columns, written[:], {} if others is None else others)
     (columns, values), *_ = csv_parts(path)
     return Table(columns, values, {} if others is None else others)
 

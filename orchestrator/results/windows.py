@@ -4,7 +4,7 @@ of what reads them does not grow with the duration."""
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,21 +13,20 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.results import json_file, rows, run_record
+from hapticlink.orchestrator.base import temporary_folders, text_files
+from hapticlink.orchestrator.results import rows, run_record
 from hapticlink.orchestrator.results.run_record import RunRecord
 from hapticlink.orchestrator.results.tables import (
     TABLES,
+    FolderTables,
     Results,
     Table,
     csv_parts,
     empty,
     load,
-    read_table,
     recorded,
     run_json,
     size,
-    with_record,
 )
 
 WINDOW_BYTES = 1 << 24
@@ -39,11 +38,10 @@ STEPS_BESIDE = 2
 def opened(folder: Path, record: RunRecord | None = None) -> Results:
     """The results of a run whose rows are still there, all of them read unless they are more than a
     window; `load` for others. record: the content of its run.json, where it is known."""
-    run = json_file.read(folder / "run.json")
+    run = text_files.read_json(folder / "run.json")
     if size(folder, run, binary=True) <= WINDOW_BYTES:
         return load(folder, binary=True, record=record)
-    later = TablesLater(folder, tuple(run["rates"]), tuple(run["files"]))
-    return with_record(Streamed(folder, run, later), record)
+    return Streamed(folder, run, FolderTables(folder, run["rates"], run["files"]), known=record)
 
 
 @contextmanager
@@ -62,7 +60,7 @@ def of_run(folder: Path | str) -> Iterator[Results]:
         with temporary_folders.room() as room:
             for path in csvs:
                 copy_as_rows(path, room / f"{path.stem}{rows.SUFFIX}")
-            yield Streamed(room, run, TablesLater(room, tuple(run["rates"]), tuple(run["files"])))
+            yield Streamed(room, run, FolderTables(room, run["rates"], run["files"]))
 
 
 def copy_as_rows(path: Path, target: Path) -> None:
@@ -74,32 +72,10 @@ def copy_as_rows(path: Path, target: Path) -> None:
             file.write(part.tobytes())
 
 
-class TablesLater(Mapping[str, Table]):
-    """The tables of a run's folder, each read when it is asked for and kept then."""
-
-    def __init__(self, folder: Path, names: tuple[str, ...], files: tuple[str, ...]) -> None:
-        self._folder, self._names, self._files = folder, names, files
-        self._read: dict[str, Table] = {}
-
-    def __getitem__(self, name: str) -> Table:
-        if name not in self._names:
-            raise KeyError(name)
-        if name not in self._read:
-            path = self._folder / f"{name}.csv" if recorded(name, self._files) else None
-            self._read[name] = read_table(path, self) if path else empty(self)
-        return self._read[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-
 @dataclass(frozen=True, eq=False)
 class Streamed(Results):
     """Results whose windows are read from the rows, while these are there; the tables themselves
-    are read whole, as `TablesLater`."""
+    are read whole, as `FolderTables`."""
 
     @cached_property
     def number(self) -> int:
@@ -123,18 +99,14 @@ class Streamed(Results):
                 name: _part(files[name], *span) if name in files else empty({})
                 for name in record.rates
             }
-            window = Results(self.folder, self.run, tables, begin, until)
-            window.__dict__["record"] = record  # read once
-            yield window
+            yield Results(self.folder, self.run, tables, begin, until, record)
 
 
 def until(results: Results, time: float) -> Iterator[Results]:
     """The windows of results until a time (s)."""
     for window in results.windows():
         if window.begin < time:
-            cut = replace(window, end=min(window.end, time))
-            cut.__dict__["record"] = results.record
-            yield cut
+            yield replace(window, end=min(window.end, time), known=results.record)
 
 
 def last(results: Results) -> Results:

@@ -14,9 +14,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from hapticlink.orchestrator.base import interrupt, temporary_folders
+from hapticlink.orchestrator.base import interrupt, temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import json_file
 from hapticlink.orchestrator.run.compiled import library
 
 
@@ -82,7 +81,7 @@ def record_crash(folder: Path, process: int) -> None:
 def _process(folder: Path) -> int | None:
     """The process ID of the run in progress in `folder`, from its run.json; None without one."""
     try:
-        end = json_file.read(folder / "run.json")["end"]
+        end = text_files.read_json(folder / "run.json")["end"]
         process: int | None = end.get("process")
     except (InputFault, LookupError, TypeError, AttributeError):
         return None

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -51,7 +50,7 @@ class Outcome:
     table_time: float = 0.0
     details: RunEnding = field(default_factory=RunEnding)
 
-    def set_reason(self, error: BaseException, results: RunResults[Any]) -> None:
+    def set_reason(self, error: BaseException, results: RunResults) -> None:
         """Set why the run ended by `error`. Raises `error` again where it is a mistake of this
         package, of neither the scene nor the machine nor a plugin."""
         match error:
@@ -95,7 +94,7 @@ class Outcome:
 
 def run(
     plan: Plan,
-    results: RunResults[Any],
+    results: RunResults,
     progress: Progress | None = None,
     real_time: RealTimeRun | None = None,
 ) -> Outcome:
@@ -145,7 +144,7 @@ def run(
 def _run_events(
     plan: Plan,
     loop: PythonLoop,
-    results: RunResults[Any],
+    results: RunResults,
     outcome: Outcome,
     progress: Progress | None,
     real_time: RealTimeRun | None,

@@ -12,10 +12,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.network.served_part import OF_A_RUN
-from hapticlink.orchestrator.results import json_file, run_record
+from hapticlink.orchestrator.results import run_record
 from hapticlink.orchestrator.results.tables import read_table
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, Job
@@ -80,7 +81,7 @@ class RecordedArrivals(RealTimeRun):
 
     def __init__(self, folder: Path, scene: Scene) -> None:
         self._folder = folder
-        before = run_record.read(json_file.read(folder / "run.json"), folder)
+        before = run_record.read(text_files.read_json(folder / "run.json"), folder)
         if not before.real_time:
             raise InputFault(f"{folder}: no run in real time, so that it has no arrivals")
         plain = scene.tables()

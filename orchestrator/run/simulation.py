@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from typing import Any
 
 import numpy as np
 
@@ -14,9 +13,8 @@ from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
-from hapticlink.orchestrator.results.files import Recorder
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
-from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.results.run_results import Recorder, RunResults
 from hapticlink.orchestrator.run import apply_timed_events
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
@@ -44,7 +42,7 @@ class Simulation(LoadedFmus):
     comes after its own. swept: whether sweeps alone have initialised the FMUs.
     """
 
-    def __init__(self, system: System, results: RunResults[Any], stack: ExitStack) -> None:
+    def __init__(self, system: System, results: RunResults, stack: ExitStack) -> None:
         super().__init__(system, stack)
         stack.callback(self._dismiss)
         self.pace: Pace | None = None
@@ -96,11 +94,8 @@ class Simulation(LoadedFmus):
             if fmu.name in self.system.coupling.get_after_set:
                 self.setters[fmu.name, True] = self.setter(incoming, self.signals.sources)
         for clock in self.system.timeline.clocks:
-            recorded = self.signals.recorded(clock.name)
-            columns = None if recorded is None else [*recorded]
-            places = [*(recorded or {}).values()]
-            every = self.system.recording.every
-            recorder = self._results.recorder(clock.name, columns, values, places, every)
+            recorded, every = self.signals.recorded(clock.name), self.system.recording.every
+            recorder = self._results.recorder(clock.name, recorded, values, every)
             self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:
@@ -112,8 +107,9 @@ class Simulation(LoadedFmus):
 
     def _beside(self, name: str, columns: Sequence[str]) -> Recorder:
         """A table of what runs beside the loop; its row of t = 0 is there at once."""
-        row = np.zeros(len(columns)), range(len(columns))
-        recorder = self._stack.enter_context(self._results.recorder(name, columns, *row))
+        recorded = {column: i for i, column in enumerate(columns)}
+        recorder = self._results.recorder(name, recorded, np.zeros(len(columns)))
+        self._stack.enter_context(recorder)
         recorder.row(0.0)
         return recorder
 

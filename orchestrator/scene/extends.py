@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault
-from hapticlink.orchestrator.scene import dropped_keys as dropping
+from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault, shortened, unknown
 from hapticlink.orchestrator.scene import families, toml_keys
-from hapticlink.orchestrator.scene.find_scene import find, folder_of
-from hapticlink.orchestrator.scene.overrides import as_typed
+from hapticlink.orchestrator.scene.find_scene import find
+from hapticlink.orchestrator.scene.rates import traced
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml import loads
-from hapticlink.orchestrator.scene.toml_keys import Path, Place, flatten, key_lines, place_of, whole
+from hapticlink.orchestrator.scene.toml_keys import (
+    Path,
+    Place,
+    flatten,
+    key_lines,
+    parts,
+    place_of,
+    whole,
+)
 
 MAX_EXTENDED = 20
 """Scenes that extend one another."""
@@ -68,18 +75,17 @@ def document(
     if not isinstance(base, str):
         raise refuse(f"{base!r}: write a scene's name or path")
     try:
-        _, base_text = find(base, folder)
+        _, base_text, where = find(base, folder)
     except InputFault as fault:
         raise refuse(f"{fault}; a path is relative to this file") from None
     if len(above) >= MAX_EXTENDED:
         raise refuse(f"the last of {MAX_EXTENDED} scenes, each over the next: put some into one")
-    where = folder_of(base, folder)
     base = str(where / FilePath(base).name) if where else base
     so_far = (*(above or (name,)), str(FilePath(base).resolve()) if where else base)
     if so_far[-1] in above:
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
     below, below_places = document(base_text, base, where, so_far, base)
-    below = dropping.taken(below, dropped, lambda message: refuse(message, "drop"))
+    below = _dropped(below, dropped, lambda message: refuse(message, "drop"))
     replaced: set[Path] = set()
     merged = _merged(below, data, replaced)
     inherited = {
@@ -91,23 +97,41 @@ def document(
     return merged, inherited | places
 
 
-def with_family(
-    data: dict[str, Any], name: str, places: Mapping[Path, Place], set_by: Mapping[Path, str]
+def _dropped(base: dict[str, Any], keys: Any, refuse: Callable[[str], Exception]) -> dict[str, Any]:
+    """The tables of `base` without the dotted `keys`. Raises `refuse` with the reason where `keys`
+    is no list of them, or names one that the base does not have."""
+    if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
+        raise refuse(f"{shortened(repr(keys))}: write a list of dotted keys")
+    for key in keys:
+        try:
+            names = parts(key)
+        except ValueError:
+            raise refuse(f"{shortened(key)!r} is no dotted key") from None
+        base = _without(base, names, refuse)
+    return base
+
+
+def _without(
+    table: dict[str, Any], names: tuple[str, ...], refuse: Callable[[str], Exception]
 ) -> dict[str, Any]:
+    first, *rest = names
+    if first not in table:
+        raise refuse(f"not in the base scene: {unknown('key', first, [*table])}")
+    if not rest:
+        return {key: value for key, value in table.items() if key != first}
+    if not isinstance(table[first], Mapping):
+        raise refuse(f"{shortened(first)} is no table in the base scene: drop it as a whole")
+    return {**table, first: _without(table[first], tuple(rest), refuse)}
+
+
+def with_family(data: dict[str, Any]) -> dict[str, Any]:
     """The scene with a linkage's `family` and `n` expanded into bodies, joints and loops, over
-    which its other keys are merged. Raises SceneFault for an unknown family or a bad `n`."""
+    which its other keys are merged. Raises FamilyError for an unknown family or a bad `n`."""
     linkage = data.get("linkage")
     if not isinstance(linkage, dict) or "family" not in linkage:
         return data
-    try:
-        expanded = families.members(linkage)
-    except families.FamilyError as error:
-        option = as_typed(set_by[error.path]) if error.path in set_by else None
-        file, line = place_of(error.path, places)
-        finding = Finding(".".join(map(str, error.path)), error.message, line, option, file)
-        raise SceneFault(name, [finding]) from None
     others = {k: v for k, v in linkage.items() if k not in families.ARGUMENTS}
-    return {**data, "linkage": _merged(expanded, others, set())}
+    return {**data, "linkage": _merged(families.members(linkage), others, set())}
 
 
 def _merged(
@@ -134,15 +158,3 @@ def tables_of(data: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
 
 def _alike(below: Mapping[str, Any], table: Mapping[str, Any]) -> bool:
     return bool(table.get("type", below.get("type")) == below.get("type"))
-
-
-def traced(data: Mapping[str, Any]) -> list[tuple[Path, dict[str, Any]]]:
-    """The [graphics] and [[fmu]] tables with `rate = { trace = FILE }`, and their paths."""
-    fmus = data.get("fmu")
-    tables: list[tuple[Path, Any]] = [(("graphics",), data.get("graphics"))]
-    tables += [(("fmu", i), f) for i, f in enumerate(fmus if isinstance(fmus, list) else ())]
-    return [(path, t) for path, t in tables if isinstance(t, dict) and _is_trace(t.get("rate"))]
-
-
-def _is_trace(rate: Any) -> bool:
-    return isinstance(rate, dict) and rate.keys() == {"trace"} and isinstance(rate["trace"], str)

@@ -19,20 +19,15 @@ def shipped() -> dict[str, Any]:
     return dict(sorted(files.items()))
 
 
-def find(scene: str, folder: FilePath | None = None) -> tuple[str, str]:
-    """Name and text of a scene: a path relative to `folder`, or the name of a shipped one. Raises
-    InputFault where there is none, or where it cannot be read as text."""
+def find(scene: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
+    """Name, text and folder of a scene: a path relative to `folder`, or the name of a shipped one,
+    which has no folder. Raises InputFault where there is none, or where it cannot be read as
+    text."""
     path, known = (folder or FilePath()) / scene, shipped()
     if text_files.exists(path):
-        return path.stem, text_files.read(path, "a scene", LARGEST)
+        return path.stem, text_files.read(path, "a scene", LARGEST), path.parent
     if scene in known:
-        return scene, known[scene].read_text(encoding="utf-8")
+        return scene, known[scene].read_text(encoding="utf-8"), None
     raise InputFault(
         f"{shortened(scene)}: neither a file nor a shipped scene; {near(scene, known)}"
     )
-
-
-def folder_of(scene: str, folder: FilePath | None = None) -> FilePath | None:
-    """The folder of a scene's file, relative paths starting at `folder`; None for a shipped one."""
-    path = (folder or FilePath()) / scene
-    return path.parent if text_files.exists(path) else None

@@ -6,7 +6,7 @@ import ast
 import inspect
 import textwrap
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from itertools import pairwise
 from types import NoneType
@@ -29,10 +29,7 @@ def vector(path: Path, data: Any) -> str:
 def expected(path: Path, data: Any) -> str:
     """What the value at `path` may be, in words."""
     kinds = [pair for kind in annotations_at(path, data) for pair in measured(kind)]
-    units = {_word(k, q): _beside(q.unit if q else unit(k)) for k, q in kinds}
-    if "a number" in units:
-        units.pop("a whole number", None)
-    return _either([word + unit for word, unit in units.items() if word])
+    return _in_words(kinds, lambda kind, q: _beside(q.unit if q else unit(kind)))
 
 
 def number(path: Path, data: Any) -> str:
@@ -52,10 +49,16 @@ def _beside(unit: str) -> str:
 
 def words(kind: Any) -> str:
     """The type of a value in words: `a number`, `three numbers`, `"a" or "b"`, `a table`."""
-    words = [_word(branch, quantity) for branch, quantity in measured(kind)]
-    if "a number" in words:
-        words = [word for word in words if word != "a whole number"]
-    return _either([word for word in dict.fromkeys(words) if word])
+    return _in_words(measured(kind), lambda kind, q: "")
+
+
+def _in_words(
+    kinds: Iterable[tuple[Any, Quantity | None]], beside: Callable[[Any, Quantity | None], str]
+) -> str:
+    found = {_word(kind, quantity): beside(kind, quantity) for kind, quantity in kinds}
+    if "a number" in found:
+        found.pop("a whole number", None)
+    return _either([word + text for word, text in found.items() if word])
 
 
 _WORDS = {

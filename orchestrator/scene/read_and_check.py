@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import deepcopy
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path as FilePath
 
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator.base.errors import COUNTED, InputFault, SceneFault
-from hapticlink.orchestrator.scene import checks, families, overrides, read_registry_tables
-from hapticlink.orchestrator.scene.extends import document, tables_of, traced, with_family
-from hapticlink.orchestrator.scene.frame_trace import frame_times
+from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
+from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
+from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
+from hapticlink.orchestrator.scene.rates import frame_times, traced
 from hapticlink.orchestrator.scene.refused_keys_and_values import beyond, problems
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
-from hapticlink.orchestrator.scene.scene_source import Origin, Source
-from hapticlink.orchestrator.scene.toml_keys import flat, flatten
+from hapticlink.orchestrator.scene.scene_source import Source
+from hapticlink.orchestrator.scene.toml_keys import Problem, flat, flatten, reported
 from hapticlink.orchestrator.scene.unrepresentable_values import unsound
 
 
@@ -33,40 +34,42 @@ def read(
 
 def from_source(source: Source) -> Scene:
     """The scene of the tables of `source`, changed by its options; raises as `read` does."""
-    data, options = deepcopy(dict(source.tables)), source.options
-    name = source.name
+    data, set_by = deepcopy(dict(source.tables)), dict(source.set_by)
     # Options of the family come first, since others may change the bodies that it expands to.
-    of_family = [o for o in options if families.is_argument(overrides.parse(o)[0])]
-    set_by = {**source.set_by, **{overrides.apply(data, option): option for option in of_family}}
-    data = with_family(data, name, source.places, set_by)
-    set_by |= {overrides.apply(data, o): o for o in options if o not in of_family}
-    if wrong := [*islice(unsound(data), COUNTED)]:
-        origin = Origin(source, data, set_by)
-        raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
+    of_family = [o for o in source.options if families.is_argument(overrides.parse(o)[0])]
+    set_by |= {overrides.apply(data, option): option for option in of_family}
+    try:
+        data = with_family(data)
+    except families.FamilyError as error:
+        origin = replace(source, tables=data, options=(), set_by=set_by)
+        raise SceneFault(source.name, [origin.finding(error.path, error.message)]) from None
+    set_by |= {overrides.apply(data, o): o for o in source.options if o not in of_family}
+    origin = replace(source, tables=data, options=(), set_by=set_by)
+
+    def refuse(problems: Iterable[Problem]) -> None:
+        if findings := [origin.finding(*problem) for problem in problems]:
+            raise SceneFault(source.name, findings)
+
+    refuse(islice(unsound(data), COUNTED))
     flatten(data)
+    wrong: list[Problem] = []
     for path, recorded in traced(data):
-        try:
-            recorded["rate"] = frame_times(FilePath(recorded["rate"]["trace"]))
-        except InputFault as fault:
-            wrong.append(((*path, "rate"), str(fault)))
-            del recorded["rate"]
+        with reported(wrong, (*path, "rate")):
+            file = recorded.pop("rate")["trace"]
+            recorded["rate"] = frame_times(FilePath(file))
     for fmu in tables_of(data, "fmu"):
         for key in ("start", "derivatives"):
             if isinstance(fmu.get(key), dict):
                 fmu[key] = dict(flat(fmu[key]))
-
-    origin = Origin(source, data, set_by)
-    parts, unread = read_registry_tables.read(data)
+    parts, errors, unread = registry_tables.read(data)
     wrong += unread
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
         scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
-        wrong += problems(error.errors(include_url=False), data)
-    if wrong:
-        wrong += beyond(wrong, data)[: COUNTED - len(wrong)]
-        raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
-    if wrong := checks.check(scene):
-        raise SceneFault(name, [origin.finding(*problem) for problem in wrong])
-    scene = read_registry_tables.put(scene, parts)
-    return WrittenScene(**vars(scene), origin=origin, written=scene)
+        errors += error.errors(include_url=False)
+    if wrong := wrong + problems(errors, data):
+        refuse([*wrong, *beyond(wrong, data)[: COUNTED - len(wrong)]])
+    refuse(checks.check(scene))
+    scene = registry_tables.put(scene, parts)
+    return WrittenScene(**vars(scene), read_from=source, origin=origin, written=scene)

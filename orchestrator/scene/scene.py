@@ -27,7 +27,7 @@ from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkag
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.base.plain_data import plain
-from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN, by_user
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
@@ -43,7 +43,7 @@ from hapticlink.orchestrator.scene.records import (
     TimedEvent,
     Wire,
 )
-from hapticlink.orchestrator.scene.scene_source import Origin, Source
+from hapticlink.orchestrator.scene.scene_source import Source
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 
@@ -214,19 +214,20 @@ class Scene:
     @property
     def all_hands(self) -> dict[str, Hand]:
         """The hands by the points that they hold; the first one's name is empty."""
-        return ({"": self.hand} if self.hand else {}) | dict(self.hands)
+        return by_user(self.hand, self.hands)
 
     @property
     def all_devices(self) -> dict[str, Device]:
         """The devices by user, who is named by the point; the first one's name is empty."""
-        return ({"": self.device} if self.device else {}) | dict(self.devices)
+        return by_user(self.device, self.devices)
 
     @property
     def all_controllers(self) -> dict[str, Controller]:
         """The controllers of `all_devices`, by user."""
-        first = {"": self.controller} if self.controller else {}
         own = self.controller or Controller()
-        return first | {name: self.controllers.get(name, own) for name in self.devices}
+        return by_user(
+            self.controller, {name: self.controllers.get(name, own) for name in self.devices}
+        )
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""
@@ -249,7 +250,10 @@ class Scene:
 class WrittenScene(Scene):
     """A scene that was read, with the file and line of its keys; changed copies keep them."""
 
-    origin: Origin = field(compare=False, repr=False)
+    read_from: Source = field(compare=False, repr=False)
+    """What it was read from, with the options still to be applied."""
+    origin: Source = field(compare=False, repr=False)
+    """The same with its options applied."""
     written: Scene = field(compare=False, repr=False)
     """The scene as it was read, before any change in Python."""
 
@@ -258,7 +262,7 @@ class WrittenScene(Scene):
 
     @property
     def source(self) -> Source | None:
-        return self.origin.source if self.plain() == self.written else None
+        return self.read_from if self.plain() == self.written else None
 
 
 @cache

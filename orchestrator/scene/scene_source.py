@@ -13,23 +13,15 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Place, place_of
 
 @dataclass(frozen=True)
 class Source:
-    """The tables of a scene, the options (`key=value`) still to be applied, and the file and line
-    of each key. set_by: options already applied to the tables, by the paths that they set."""
+    """The tables of a scene, the options (`key=value`) still to be applied to them, and the file
+    and line of each key. set_by: options already applied to the tables, by the paths that they
+    set."""
 
     name: str
     tables: Mapping[str, Any]
     places: Mapping[Path, Place]
     options: tuple[str, ...] = ()
     set_by: Mapping[Path, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Origin:
-    """The tables of a source with its options applied, and the option that set each path."""
-
-    source: Source
-    tables: Mapping[str, Any]
-    set_by: Mapping[Path, str]
 
     def finding(self, path: Path, message: str) -> Finding:
         """A finding at a path, located by the option that set it, or else by the line of the key or
@@ -38,7 +30,7 @@ class Origin:
         for length in range(len(path), 0, -1):
             if path[:length] in self.set_by:
                 return Finding(key, message, option=as_typed(self.set_by[path[:length]]))
-        file, line = place_of(path, self.source.places)
+        file, line = place_of(path, self.places)
         return Finding(key, message, line or None, file=file)
 
     def _dotted(self, path: Path) -> str:

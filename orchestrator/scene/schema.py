@@ -15,8 +15,7 @@ from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.scene import registry_tables
 from hapticlink.orchestrator.scene.extends import SceneFile
 from hapticlink.orchestrator.scene.families import FamilyLinkage
-from hapticlink.orchestrator.scene.frame_trace import Trace
-from hapticlink.orchestrator.scene.rates import VariableRate
+from hapticlink.orchestrator.scene.rates import Trace, VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, value
 

@@ -12,7 +12,7 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
-from hapticlink.orchestrator.scene.extends import traced
+from hapticlink.orchestrator.scene.rates import traced
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 from hapticlink.orchestrator.scene.unrepresentable_values import unsound

@@ -18,8 +18,8 @@ from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system import annotated_ports, springs
-from hapticlink.orchestrator.system.ports import beside, carries_power, kind, names
+from hapticlink.orchestrator.system import springs
+from hapticlink.orchestrator.system.ports import beside, between_plants, carries_power, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 
@@ -50,7 +50,7 @@ def assign(
         # A default hold that fits no connection is an error. Between iterated plants it was the
         # interpolation that did not fit, which is replaced silently.
         refused = [
-            r if r.key or _between_plants(r.connection, by_name) else replace(r, key="hold")
+            r if r.key or between_plants(r.connection, by_name) else replace(r, key="hold")
             for r in refused
         ]
     return assigned, tuple(refused)
@@ -83,7 +83,7 @@ def _assign(
             hold = "zoh"
         named = (rules.kinds[k] for k in names(c) if k in rules.kinds)
         c = replace(c, latency=latency, kind=next(named, kind(c, fmus)))
-        iterated = rules.between_plants if _between_plants(c, fmus) else None
+        iterated = rules.between_plants if between_plants(c, fmus) else None
         hold = hold or iterated
         reason = hold and misfit(hold, c, fmus, rules.power, iterated is not None)
         if hold and reason:
@@ -100,19 +100,13 @@ def _with_springs(
 ) -> Iterator[Connection]:
     """The connections, with `zoh` where the hold needs a spring and has none that fits."""
     for c in connections:
-        needs = HOLDS[c.hold].needs if c.hold else None
-        reason = springs.misfit(c, rules.springs, connections, fmus) if needs == "spring" else None
+        needs_one = c.needs == "spring"
+        reason = springs.misfit(c, rules.springs, connections, fmus) if needs_one else None
         if c.hold and reason:
             key = next((k for k in names(c) if k in rules.holds), None)
             refused.append(Refused(key, c, c.hold, reason))
             c = replace(c, hold="zoh")
         yield c
-
-
-def _between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
-    """Whether the connection is between two plants of one clock."""
-    source, target = fmus[c.source], fmus[c.target]
-    return source.clock == target.clock and not source.sampled and not target.sampled
 
 
 def _has_rows(c: Connection) -> bool:
@@ -160,6 +154,11 @@ def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connec
     """The rules of `scene`. Power ports and springs of the scene come before those that its FMUs
     declare, so that they take precedence."""
     own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
+    power = (
+        PowerPort(effort=f"{u.name}.{port}", displacement=f"{u.name}.{p.displacement}", sign=p.sign)
+        for u in fmus
+        for port, p in u.description.power.items()
+    )
     delays = {
         key: d if isinstance(d, Latency) else Latency(min=d) for key, d in scene.delays.items()
     }
@@ -169,7 +168,7 @@ def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connec
         {**scene.holds, **own},
         delays,
         scene.kinds,
-        (*scene.power, *annotated_ports.power(fmus)),
+        (*scene.power, *power),
         scene.iteration.interpolation if scene.coupling == "iterated" else None,
-        (*scene.spring, *annotated_ports.springs(fmus, connections)),
+        (*scene.spring, *springs.declared(fmus, connections)),
     )

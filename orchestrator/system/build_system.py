@@ -1,17 +1,45 @@
-"""The system of a scene with its FMUs built: the start of a run, of `info` and of an export."""
+"""Builds the system of a scene, the start of a run, of `info` and of an export: FMUs, connections,
+holds, and their checks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.base.errors import SceneFault
+from hapticlink.orchestrator.base.signal_names import HAND
+from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.fmi.process_cache import described
+from hapticlink.orchestrator.scene.blocks import Blocks, blocks
+from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
+from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.assemble import from_scene
+from hapticlink.orchestrator.scene.toml_keys import Path as Keys
+from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.system import (
+    checks,
+    fmu_tables,
+    haptic_loop,
+    replacements,
+    timed_events,
+)
+from hapticlink.orchestrator.system.assign_holds import assign, rules_of
+from hapticlink.orchestrator.system.connections import connect, whole, with_texts
 from hapticlink.orchestrator.system.fmu_files import fmu_files
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.recorded import recorded
+from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
+from hapticlink.orchestrator.system.system import (
+    Connection,
+    Coupling,
+    EnergyPorts,
+    Fmu,
+    Recording,
+    System,
+)
 from hapticlink.orchestrator.system.timeline import timeline
 
 
@@ -27,4 +55,96 @@ def built(scene: Scene, starts: Mapping[str, Starts] | None = None) -> Iterator[
         planned = blocks(scene)
         time = timeline(scene, planned)
         files = fmu_files(scene, planned, time, room, starts=starts)
-        yield from_scene(scene, planned, time, files)
+        yield _assembled(scene, planned, time, files)
+
+
+def _assembled(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str, Path]) -> System:
+    """The system of `scene`; `files` are the FMU files of its blocks, by name.
+
+    Raises SceneFault with every finding: FMUs that cannot be read or used, connections and holds
+    that do not fit, and names in the scene that its FMUs do not have.
+    """
+    problems: list[Problem] = []
+    replaced, rows = replacements.replaced(planned.replaced), haptic_loop.rows(scene)
+    of, order = time.of, {b.name: i for i, b in enumerate(planned.loop)}
+    ours = [Fmu(b.name, described(files[b.name]), of[b.name]) for b in planned.own]
+    tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
+    foreign = (Fmu(t.name, about, of[t.name], starts, t.isolate) for t, about, starts, _ in tables)
+    every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
+    alone = (replace(u, isolate=u.isolate or scene.isolate) for u in every)
+    fmus = tuple(with_sizes(u, time) for u in alone)
+    problems += (((), why) for fmu in fmus for why in too_long(fmu))
+    connections = _connections(scene, fmus, problems)
+    fmus = tuple(with_texts(u, connections) for u in fmus)
+    rules = rules_of(scene, fmus, connections)
+    assigned, refused = assign(fmus, connections, time, rules)
+    condition = parse_condition(scene.ends_when) if scene.ends_when else None
+    if condition and not _has_output(fmus, condition):
+        if scene.stop_when is not None:
+            problems.append((("stop_when",), f"{condition}: there is no such output"))
+        condition = None
+    read_again = (*scene.get_after_set, *_read_again(scene, ours))
+    system = System(
+        fmus,
+        assigned,
+        time,
+        Coupling(scene.coupling, scene.iteration, scene.substeps, read_again),
+        condition,
+        scene.faults,
+        EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
+        refused=refused,
+    )
+    problems += checks.unfit(scene, system)
+    problems += replacements.unfit(scene, replaced, rows, system)
+    changes = timed_events.changes(scene, system, problems)
+    written = recorded(scene.record, system, problems)
+    if problems:
+        raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
+    mapped = {table.name: names for table, *_, names in tables}
+    return replace(
+        system,
+        recording=Recording(written, scene.record.every),
+        replacements=replacements.replacements(replaced, rows, system, mapped),
+        changes=changes,
+    )
+
+
+def _read_again(scene: Scene, ours: Iterable[Fmu]) -> Iterator[str]:
+    """The hands that are plants, in iterated coupling: their force depends directly on the handle,
+    and errs to order 1 unless it is read with the inputs at the end of the step."""
+    hands = [u.name for u in ours if u.description.block == HAND and not u.sampled]
+    if scene.coupling == "iterated":
+        yield from (name for name in hands if name not in scene.get_after_set)
+
+
+def _connections(
+    scene: Scene, fmus: Iterable[Fmu], problems: list[Problem]
+) -> tuple[Connection, ...]:
+    """The connections of [[connection]], and those of the haptic loop to inputs that no
+    [[connection]] feeds."""
+    described = {u.name: u.description for u in fmus}
+    wires: list[tuple[Keys, Wire]] = [
+        (("connection", i), wire)
+        for i, wire in enumerate(scene.connection)
+        if all(end.split(".")[0] in described for end in (wire.from_, wire.to))
+    ]  # an FMU that cannot be read has its own finding already
+    asked = tuple(connect(wires, described, problems))
+    fed = {f"{c.target}.{s.port}" for _, c in asked for s in c.inputs}
+    own = {f.name for f in scene.fmu if not f.replaces}
+    rows = haptic_loop.wires(scene, {n: d for n, d in described.items() if n not in own})
+    paths: dict[str, Keys] = {f.name: ("fmu", i) for i, f in enumerate(scene.fmu)}
+    wires = [(_path(w, paths), w) for w in rows if w.to not in fed]
+    loop = tuple(connect(wires, described, problems))
+    problems += whole(asked, rows, described)
+    return tuple(c for _, c in (*loop, *asked))
+
+
+def _path(wire: Wire, paths: Mapping[str, Keys]) -> Keys:
+    """Where a connection of the loop comes from a scene's table: from that of a replacement."""
+    ends = (end.partition(".")[0] for end in (wire.from_, wire.to))
+    return next(((*paths[end], "replaces") for end in ends if end in paths), ())
+
+
+def _has_output(fmus: Iterable[Fmu], condition: Condition) -> bool:
+    named = (u for u in fmus if u.name == condition.fmu)
+    return any(s.name == condition.variable for u in named for s in u.description.outputs)

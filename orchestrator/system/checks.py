@@ -3,32 +3,24 @@ ports of its FMUs, and its rates and coupling against their capabilities."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 from hapticlink.orchestrator.base.errors import near
-from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
 from hapticlink.orchestrator.fmi.kind_check import misfit
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
+from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 from hapticlink.orchestrator.system import springs
-from hapticlink.orchestrator.system.ports import names
-from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
+from hapticlink.orchestrator.system.ports import between_plants, names, size
+from hapticlink.orchestrator.system.system import Fmu, System
 
 
-def unfit(
-    scene: Scene,
-    fmus: Iterable[Fmu],
-    connections: Iterable[Connection],
-    refused: Iterable[Refused],
-    sets: Iterable[SetSpring],
-) -> Iterator[Problem]:
+def unfit(scene: Scene, system: System) -> Iterator[Problem]:
     """A finding for each name in these tables that the system does not have, and for each entry
-    that does not fit it; `sets` are the springs of the scene and of its FMUs."""
-    by_name = {u.name: u for u in fmus}
-    held = [c for c in connections if not c.initial]
+    that does not fit it."""
+    held = [c for c in system.connections if not c.initial]
     for table in ("holds", "delays", "kinds"):
         for key in getattr(scene, table):
             known = list(dict.fromkeys(name for c in held for name in names(c)))
@@ -39,20 +31,22 @@ def unfit(
                 yield (table, key), f"is no connection of this scene; {hint}"
     for key, kind in scene.kinds.items():
         for c in (c for c in held if key in names(c)):
-            source = by_name[c.source].description
+            source = system.fmu[c.source].description
             if why := misfit(kind, [source.unit(s) for s in c.outputs]):
                 message = f"{c.source}.{c.source_port} {why}; take another kind, or leave it out"
                 yield ("kinds", key), message
-    yield from _refused(scene, refused, sets)
-    plants = [u.name for u in by_name.values() if not u.sampled]
+    yield from _refused(scene, system)
+    plants = [u.name for u in system.fmus if not u.sampled]
     why = f"is no plant of this scene; there are {', '.join(plants)}"
     yield from ((("substeps", name), why) for name in scene.substeps if name not in plants)
     for name in scene.get_after_set:
         if name not in plants:
             yield ("get_after_set",), f"{name!r} {why}"
     for i, p in enumerate(scene.power):
-        yield from _power(scene, i, p, by_name)
-    yield from springs.unfit(scene, by_name)
+        yield from _power(i, p, system.fmu)
+    yield from springs.unfit(scene, system.fmu)
+    yield from _step_sizes(system)
+    yield from _iterated(system)
 
 
 NOWHERE = {
@@ -65,21 +59,16 @@ NOWHERE = {
 """Why a default hold fits no connection, by what it needs."""
 
 
-def _refused(
-    scene: Scene, refused: Iterable[Refused], sets: Iterable[SetSpring]
-) -> Iterator[Problem]:
+def _refused(scene: Scene, system: System) -> Iterator[Problem]:
     """A finding for each requested hold that does not fit, at its key in the scene. For a default
     that fits no connection: one for each connection that sets a spring, or else a single one."""
     wires = {f"{w.from_} -> {w.to}": i for i, w in enumerate(scene.connection) if w.hold}
-    sets = tuple(sets)
-    asked = [r for r in refused if r.key]
-    default = [r for r in asked if r.key == "hold" and HOLDS[r.hold].needs in NOWHERE]
-    nearly = [
-        r for r in default if HOLDS[r.hold].needs == "spring" and springs.spring(r.connection, sets)
-    ]
+    asked, needs = [r for r in system.refused if r.key], HOLDS[scene.hold].needs or ""
+    default = [r for r in asked if r.key == "hold" and r.hold == scene.hold and needs in NOWHERE]
+    sets = system.energy.springs if needs == "spring" else ()
+    nearly = [r for r in default if springs.spring(r.connection, sets)]
     if default and not nearly:
-        hold, needs = default[0].hold, HOLDS[default[0].hold].needs
-        yield ("hold",), f"{hold!r} fits nowhere here: {NOWHERE[needs or '']}"
+        yield ("hold",), f"{scene.hold!r} fits nowhere here: {NOWHERE[needs]}"
     for r in asked:
         if r in nearly or r not in default:
             path: Path = ("hold",) if r.key == "hold" else ("holds", r.key or "")
@@ -87,13 +76,11 @@ def _refused(
             yield path, f"{r.hold!r} does not fit {r.connection.name}: {r.reason}"
 
 
-def _power(scene: Scene, i: int, p: PowerPort, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
+def _power(i: int, p: PowerPort, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     sizes = {}
     for end, causality in (("effort", "input"), ("displacement", "output")):
-        fmu, _, name = getattr(p, end).partition(".")
-        entries = fmus[fmu].description.port(name, causality) if fmu in fmus else ()
-        sizes[end] = len(entries)
-        if not entries:
+        sizes[end] = size(getattr(p, end), fmus, causality)
+        if not sizes[end]:
             yield ("power", i, end), f"there is no {causality} {getattr(p, end)}"
     if p.displacement.partition(".")[0] != p.fmu:
         message = "effort and displacement are of one FMU: give the motion of the FMU it acts on"
@@ -103,10 +90,10 @@ def _power(scene: Scene, i: int, p: PowerPort, fmus: Mapping[str, Fmu]) -> Itera
         yield ("power", i), message
 
 
-def step_sizes(fmus: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
+def _step_sizes(system: System) -> Iterator[Problem]:
     """A finding for each FMU with a fixed communication step size on a clock whose steps vary."""
-    seconds = timeline.seconds
-    for fmu in fmus:
+    timeline, seconds = system.timeline, system.timeline.seconds
+    for fmu in system.fmus:
         clock = timeline.clock(fmu.clock)
         if clock.first == clock.period or varies_step(fmu.description):
             continue
@@ -119,16 +106,10 @@ def step_sizes(fmus: Iterable[Fmu], timeline: Timeline) -> Iterator[Problem]:
         )
 
 
-def iterated(
-    scene: Scene, fmus: Iterable[Fmu], connections: Iterable[Connection]
-) -> Iterator[Problem]:
+def _iterated(system: System) -> Iterator[Problem]:
     """A finding where coupling "iterated" has no connected plants of one rate to iterate."""
-    plants = {u.name: u.clock for u in fmus if not u.sampled}
-    between = any(
-        c.source in plants and plants[c.source] == plants.get(c.target) and not c.initial
-        for c in connections
-    )
-    if scene.coupling == "iterated" and not between:
+    between = any(between_plants(c, system.fmu) and not c.initial for c in system.connections)
+    if system.coupling.scheme == "iterated" and not between:
         yield (
             ("coupling",),
             "'iterated' repeats the steps of connected plants of one rate until they agree, and "

@@ -35,12 +35,11 @@ def fmu_files(
     """The FMU file of each block by its name, from the cache, or built in `room` where the cache is
     off.
 
-    platforms: those of native FMUs, by default this machine's; fmi: their version of the
-    standard. starts: for FMUs that other tools
-    run, by block, values that replace the start values of its parameters; these also have the
-    scene's step sizes and default experiment, which a run sets itself: it needs one FMU for all
-    rates. Raises InputFault where no FMU can be built from
-    the settings (a loop that does not close), Fault where the compiler fails.
+    platforms: those of native FMUs, by default this machine's; fmi: their version of the standard.
+    starts: for FMUs that other tools run, by block, values that replace the start values of its
+    parameters; these also have the scene's step sizes and default experiment, which a run sets
+    itself: it needs one FMU for all rates. Raises InputFault where no FMU can be built from the
+    settings (a loop that does not close), Fault where the compiler fails.
     """
     every = (*blocks.built, *blocks.engines)
     begun = count(1)

@@ -83,13 +83,13 @@ def _start(description: Description, name: str, value: Value) -> Starts:
     """The start value of each scalar of `name`. Raises ValueError for a name that takes no start
     value, and for a value of a different size, type or range."""
     scalars = settable(description, name, start=True)
-    values = tuple(_entries(value, scalars[-1].indices, name))
+    values = tuple(entries_of(value, scalars[-1].indices, name))
     if len(values) != len(scalars):
         raise ValueError(f"{len(values)} values for the {len(scalars)} of {name}")
     return tuple((s, fitting(s, given)) for s, given in zip(scalars, values, strict=True))
 
 
-def _entries(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
+def entries_of(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
     """The entries of a value, row by row. Raises ValueError for rows that do not fit `shape`."""
     if not isinstance(value, tuple):
         yield value
@@ -97,7 +97,7 @@ def _entries(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
         yield from value
     else:
         rows, size = (shape[0], math.prod(shape[1:])) if shape else (1, 1)
-        entries = [tuple(_entries(row, shape[1:], name)) for row in value]
+        entries = [tuple(entries_of(row, shape[1:], name)) for row in value]
         sizes = [len(row) for row in entries]
         if sizes != [size] * rows:
             raise ValueError(f"rows of {sizes} values for the {rows} rows of {size} of {name}")

@@ -12,7 +12,6 @@ from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import power_across_rates
-from hapticlink.orchestrator.system.springs import limited_fmus
 from hapticlink.orchestrator.system.system import Connection, System
 
 
@@ -29,8 +28,8 @@ def changed(system: System, c: Connection, hold: str | None, delay: float | None
     if system.coupling.scheme == "iterated":
         why = "steps are repeated"
     spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
-    on_force = spring and any(HOLDS[d.hold].needs == "spring" for d in system.connections if d.hold)
-    if on_force or "spring" in (HOLDS[c.hold or ""].needs, HOLDS[new.hold or ""].needs):
+    on_force = spring and any(d.needs == "spring" for d in system.connections)
+    if on_force or "spring" in (c.needs, new.needs):
         why = "holds of a spring share its energy: take `reset`"
     if held_polynomials.order(system, c) or held_polynomials.order(system, new):
         why = "the FMU takes derivatives of its inputs: take `reset`"
@@ -44,11 +43,12 @@ def require_other_rate(system: System, clock: str) -> None:
     fixed = [f.name for f in system.fmus if f.clock == clock and not varies_step(f.description)]
     if fixed:
         raise InputFault(f"rate of {clock}: {fixed[0]} takes steps of one size only")
-    if limited := [f for f in limited_fmus(system) if system.fmu[f].clock == clock]:
-        raise InputFault(
-            f"rate of {clock}: `pspm` limits the energy of a spring of {limited[0]} over the "
-            "steps of the start: change the scene, with `reset`"
-        )
+    for c in system.connections:
+        if c.needs == "spring" and system.fmu[c.target].clock == clock:
+            raise InputFault(
+                f"rate of {clock}: `pspm` limits the energy of a spring of {c.target} over the "
+                "steps of the start: change the scene, with `reset`"
+            )
 
 
 def choices(system: System, c: Connection) -> list[str]:

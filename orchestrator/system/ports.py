@@ -19,6 +19,18 @@ def names(c: Connection) -> tuple[str, str, str]:
     return (c.name, f"{c.target}.{c.target_port}", f"{c.source}.{c.source_port}")
 
 
+def between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:
+    """Whether the connection is between two plants of one clock."""
+    source, target = fmus[c.source], fmus[c.target]
+    return source.clock == target.clock and not source.sampled and not target.sampled
+
+
+def size(end: str, fmus: Mapping[str, Fmu], *causalities: str) -> int:
+    """The number of entries of `fmu.port`; 0 where there is none of these causalities."""
+    fmu, _, port = end.partition(".")
+    return len(fmus[fmu].description.port(port, *causalities)) if fmu in fmus else 0
+
+
 def scalars_of(fmus: Mapping[str, Fmu], name: str, *causalities: str) -> tuple[Scalar, ...]:
     """The scalars of `fmu.port`. Raises InputFault where there are none of these causalities."""
     fmu, _, port = name.partition(".")

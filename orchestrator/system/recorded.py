@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.scene.records import Record
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system.system import Connection, Fmu
+from hapticlink.orchestrator.system.system import System
 
 
-def recorded(
-    record: Record,
-    fmus: Sequence[Fmu],
-    connections: Iterable[Connection],
-    problems: list[Problem],
-) -> tuple[str, ...] | None:
+def recorded(record: Record, system: System, problems: list[Problem]) -> tuple[str, ...] | None:
     """The outputs that are written, `fmu.output`, in the order of the FMUs; None for all. Texts are
     not. Adds a problem for each name that is none of an FMU, a port or an output."""
     called = {
         f"{fmu.name}.{s.name}": {fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}"}
-        for fmu in fmus
+        for fmu in system.fmus
         for s in fmu.description.outputs
         if s.type not in WRITTEN
     }
     if record.signals == "all":
-        every = sum(len(fmu.description.outputs) for fmu in fmus)
+        every = sum(len(fmu.description.outputs) for fmu in system.fmus)
         return None if len(called) == every else tuple(called)
     if record.signals == "none":
         chosen: set[str] = set()
     elif record.signals == "connected":
-        chosen = {f"{c.source}.{s.name}" for c in connections for s in c.outputs}
+        chosen = {f"{c.source}.{s.name}" for c in system.connections for s in c.outputs}
     else:
         chosen = {*record.signals}
         known = list(dict.fromkeys(name for names in called.values() for name in sorted(names)))

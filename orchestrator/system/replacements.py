@@ -13,7 +13,7 @@ from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.port_map import Mapped
-from hapticlink.orchestrator.system.system import Connection, Fmu, Replacement
+from hapticlink.orchestrator.system.system import Replacement, System
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component, Variable
@@ -34,13 +34,11 @@ def replaced(plans: Mapping[str, BlockPlan]) -> dict[str, Component]:
 def replacements(
     blocks: Mapping[str, Component],
     rows: Iterable[Wire],
-    fmus: Iterable[Fmu],
-    connections: Iterable[Connection],
+    system: System,
     mapped: Mapping[str, Mapped],
 ) -> dict[str, Replacement]:
     """By replaced block. `rows` are all connections that the haptic loop may have."""
-    rows, connections = tuple(rows), tuple(connections)
-    described = {u.name: u.description for u in fmus}
+    described = {u.name: u.description for u in system.fmus}
     ports = {name: {s.port for s in description.scalars} for name, description in described.items()}
 
     def lost(name: str, block: Component) -> Iterator[str]:
@@ -55,7 +53,7 @@ def replacements(
                 yield f"{row.from_} -> {row.to}"
 
     def unfed(name: str) -> Iterator[str]:
-        fed = {s.name for c in connections if c.target == name for s in c.inputs}
+        fed = {s.name for c in system.connections if c.target == name for s in c.inputs}
         inputs = (s for s in described[name].scalars if s.causality == "input")
         yield from dict.fromkeys(s.port for s in inputs if s.name not in fed)
 
@@ -67,23 +65,18 @@ def replacements(
 
 
 def unfit(
-    scene: Scene,
-    blocks: Mapping[str, Component],
-    rows: Iterable[Wire],
-    fmus: Iterable[Fmu],
-    connections: Iterable[Connection],
+    scene: Scene, blocks: Mapping[str, Component], rows: Iterable[Wire], system: System
 ) -> Iterator[Problem]:
     """FMUs none of whose outputs reaches another FMU, though those of the block that they replace
     may: each with the ports by which the haptic loop knows the block (`rows`), and those of the
     FMU."""
     ends = {end for row in rows for end in (row.from_, row.to)}
-    described = {u.name: u.description for u in fmus}
-    heard = {c.source for c in connections}
+    heard = {c.source for c in system.connections}
     for i, table in enumerate(scene.fmu):
-        name = table.replaces
-        if table.engine or name not in blocks or name not in described or name in heard:
+        name = table.replaces or ""
+        if table.engine or name not in blocks or name not in system.fmu or name in heard:
             continue
-        block, scalars = blocks[name], described[name].scalars
+        block, scalars = blocks[name], system.fmu[name].description.scalars
         gives, takes = (
             [_port(v) for v in variables if f"{name}.{v.name}" in ends]
             for variables in (block.outputs, block.inputs)

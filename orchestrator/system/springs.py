@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from hapticlink.orchestrator.fmi.annotation import SPRING_ENDS
 from hapticlink.orchestrator.fmi.units import SAME
-from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.system.ports import size
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
@@ -19,28 +19,40 @@ def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     return next((s for s in springs if _end(c) in s.ports), None)
 
 
+def declared(fmus: Iterable[Fmu], connections: Collection[Connection]) -> Iterator[SetSpring]:
+    """The spring-dampers that FMUs declare in their annotations, by their names in a system, with
+    the start values of their gains. Springs whose gains a connection sets are left out: their
+    values are only known once the run begins."""
+    fed = {(c.target, s.port) for c in connections if c.to_parameter for s in c.inputs}
+    for fmu in fmus:
+        for spring in fmu.description.springs:
+            if not {(fmu.name, spring.stiffness), (fmu.name, spring.damping)} & fed:
+                given = {port: getattr(spring, port) for port in SPRING_ENDS}
+                yield SetSpring(
+                    stiffness=_start_values(fmu, spring.stiffness),
+                    damping=_start_values(fmu, spring.damping),
+                    **{port: f"{fmu.name}.{name}" for port, name in given.items() if name},
+                )
+
+
+def _start_values(fmu: Fmu, parameter: str) -> tuple[float, ...]:
+    given = {scalar.name: value for scalar, value in fmu.starts}
+    entries = fmu.description.port(parameter, "parameter")
+    return tuple(float(given.get(s.name, s.start)) for s in entries)
+
+
 def limited_gains(system: System) -> set[str]:
     """The gains, `fmu.parameter`, of springs whose energy a hold limits: its tank has their values
     at the start, so that they may not change while the scene runs."""
-    return gains_of_held(system.fmus, system.connections)
-
-
-def gains_of_held(fmus: Iterable[Fmu], connections: Iterable[Connection]) -> set[str]:
-    """As `limited_gains`, before there is a system."""
-    held = {_end(c) for c in connections if c.hold and HOLDS[c.hold].needs == "spring"}
+    held = {_end(c) for c in system.connections if c.needs == "spring"}
     return {
         f"{fmu.name}.{gain}"
-        for fmu in fmus
+        for fmu in system.fmus
         for spring in fmu.description.springs
         if f"{fmu.name}.{spring.set_position}" in held
         for gain in (spring.stiffness, spring.damping)
         if gain
     }
-
-
-def limited_fmus(system: System) -> set[str]:
-    """The FMUs of springs whose energy a hold limits: its tank has their longest step."""
-    return {c.target for c in system.connections if c.hold and HOLDS[c.hold].needs == "spring"}
 
 
 def misfit(
@@ -77,30 +89,25 @@ def unfit(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     """A finding for each [[spring]] with ports that do not exist or that do not fit together."""
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]
-        size = _size(s.set_position, fmus, "input")
+        inputs = size(s.set_position, fmus, "input")
         for end, kinds in SPRING_ENDS.items():
             port = getattr(s, end)
             if not port:
                 continue
-            if not (entries := _size(port, fmus, *kinds)):
+            if not (entries := size(port, fmus, *kinds)):
                 yield ("spring", i, end), f"there is no {' or '.join(kinds)} {port}"
             elif port.partition(".")[0] != fmu:
                 message = f"{port} is not of {fmu}: the ends of a spring are ports of one FMU"
                 yield ("spring", i, end), message
-            elif size and entries != size:
-                message = f"{port} has {entries} entries, {s.set_position} {size}"
+            elif inputs and entries != inputs:
+                message = f"{port} has {entries} entries, {s.set_position} {inputs}"
                 yield ("spring", i, end), message
         for gain in ("stiffness", "damping"):
             values = getattr(s, gain)
-            if size and len(values) != size and (values or gain == "stiffness"):
-                message = f"{len(values)} gains for the {size} of {s.set_position}"
+            if inputs and len(values) != inputs and (values or gain == "stiffness"):
+                message = f"{len(values)} gains for the {inputs} of {s.set_position}"
                 yield ("spring", i, gain), message
 
 
 def _end(c: Connection) -> str:
     return f"{c.target}.{c.target_port}"
-
-
-def _size(end: str, fmus: Mapping[str, Fmu], *causalities: str) -> int:
-    fmu, _, name = end.partition(".")
-    return len(fmus[fmu].description.port(name, *causalities)) if fmu in fmus else 0

@@ -12,13 +12,9 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.start_values import Starts
 from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.conditions import Condition
-from hapticlink.orchestrator.scene.records import (
-    Iteration,
-    Latency,
-    PowerPort,
-    SetSpring,
-)
+from hapticlink.orchestrator.scene.records import Iteration, Latency, PowerPort, SetSpring
 
 
 @dataclass(frozen=True)
@@ -78,6 +74,11 @@ class Connection:
     @property
     def name(self) -> str:
         return f"{self.source}.{self.source_port} -> {self.target}.{self.target_port}"
+
+    @property
+    def needs(self) -> str | None:
+        """What its hold needs beside its samples: `Hold.needs`."""
+        return HOLDS[self.hold].needs if self.hold else None
 
     @property
     def to_parameter(self) -> bool:

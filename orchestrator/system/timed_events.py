@@ -4,35 +4,27 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from hapticlink.orchestrator.base.errors import shortened
-from hapticlink.orchestrator.base.ticks import Timeline, exact
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.records import TimedEvent, Value
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem, reported
-from hapticlink.orchestrator.system.assign_holds import Rules
+from hapticlink.orchestrator.system.fmu_tables import entries_of
 from hapticlink.orchestrator.system.ports import carries_power, scalars_of
-from hapticlink.orchestrator.system.springs import gains_of_held
-from hapticlink.orchestrator.system.system import Change, Connection, Fmu
+from hapticlink.orchestrator.system.springs import limited_gains
+from hapticlink.orchestrator.system.system import Change, Connection, System
 from hapticlink.orchestrator.system.timeline import GRAPHICS_RATE
 
 
-def changes(
-    scene: Scene,
-    fmus: tuple[Fmu, ...],
-    connections: tuple[Connection, ...],
-    timeline: Timeline,
-    rules: Rules,
-    problems: list[Problem],
-) -> tuple[Change, ...]:
+def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[Change, ...]:
     """The changes in the order of their times, without those after the end of the run. Findings are
     appended to `problems`."""
     if scene.at and scene.coupling == "iterated":
         problems.append((("at",), 'steps are repeated with coupling = "iterated": take another'))
-    events = _Events(scene, {u.name: u for u in fmus}, connections, timeline, rules)
+    events = _Events(scene, system)
     taken: list[Change] = []
     for i, event in enumerate(scene.at):
         for key, asked in (("set", event.set), ("override", event.override)):
@@ -46,7 +38,7 @@ def changes(
             with reported(problems, ("at", i, "noise", name)):
                 taken.append(events.brought(event, name, noise))
         problems += ((("at", i, key), why) for key, why in _times(event))
-    end = timeline.seconds(timeline.end)
+    end = system.timeline.seconds(system.timeline.end)
     return tuple(sorted((c for c in taken if c.begin < end), key=lambda change: change.begin))
 
 
@@ -61,16 +53,8 @@ class _Events:
     """Makes changes; all methods raise ValueError or InputFault, with the remedy, for what cannot
     be done."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        fmus: Mapping[str, Fmu],
-        connections: tuple[Connection, ...],
-        timeline: Timeline,
-        rules: Rules,
-    ) -> None:
-        self._scene, self._fmus, self._timeline, self._rules = scene, fmus, timeline, rules
-        self._connections = [c for c in connections if not c.initial]
+    def __init__(self, scene: Scene, system: System) -> None:
+        self._scene, self._system = scene, system
 
     def given(self, event: TimedEvent, key: str, name: str, value: Value) -> Change:
         """A value that is set once, or that overrides a connection."""
@@ -90,7 +74,7 @@ class _Events:
         for scalar in scalars:
             if scalar.causality == "parameter" and scalar.variability != "tunable":
                 raise ValueError(f"{name} is not tunable: it keeps its start value")
-        if name in gains_of_held(self._fmus.values(), self._connections):
+        if name in limited_gains(self._system):
             raise ValueError(f"{name} is a gain of a spring whose energy `pspm` limits")
         return self._change(
             event, name, text, inputs=scalars, values=_numbers(name, value, scalars)
@@ -109,7 +93,7 @@ class _Events:
 
     def _change(self, event: TimedEvent, name: str, text: str, **parts: object) -> Change:
         fmu = name.partition(".")[0]
-        begin = self._begin(self._fmus[fmu].clock, event.time)
+        begin = self._begin(self._system.fmu[fmu].clock, event.time)
         until = parts.get("end")
         text += f" until {event.until:g} s" if until is not None and event.until else ""
         return Change(begin, text, fmu, **parts)  # type: ignore[arg-type]
@@ -117,7 +101,7 @@ class _Events:
     def _begin(self, clock: str, time: float) -> float:
         """The first communication point of a clock at or after a time (s), infinity where there is
         none in the run."""
-        timeline = self._timeline
+        timeline = self._system.timeline
         if clock not in (c.name for c in timeline.clocks):
             raise ValueError(f"no FMU runs at the rate of {clock}")
         starts = timeline.clock(clock).starts
@@ -129,40 +113,32 @@ class _Events:
         return self._scene.duration + 1.0 if event.until is None else event.until
 
     def _scalars(self, name: str) -> tuple[Scalar, ...]:
-        return scalars_of(self._fmus, name, "input", "parameter")
+        return scalars_of(self._system.fmu, name, "input", "parameter")
 
     def _feeding(self, name: str) -> list[Connection]:
         named = {s.name for s in self._scalars(name)}
-        fmu = name.partition(".")[0]
-        into = (c for c in self._connections if c.target == fmu)
+        into = self._system.into(name.partition(".")[0])
         return [c for c in into if named & {s.name for s in c.inputs}]
 
     def _require_disturbable(self, name: str, feeding: list[Connection]) -> None:
         fmu = name.partition(".")[0]
         if not feeding:
             raise ValueError(f"{name} is fed by no connection: take set")
-        if carries_power(feeding[0], self._rules.power):
+        if carries_power(feeding[0], self._system.energy.power):
             raise ValueError(
                 f"{name} carries power, which is measured as its connection brings it: disturb "
                 "what its source gets, or set a parameter of the source"
             )
         if fmu in self._scene.get_after_set:
             raise ValueError(f"{fmu} is in get_after_set: its outputs are read before that is set")
-        if any(c.hold and HOLDS[c.hold].needs == "spring" for c in feeding):
+        if any(c.needs == "spring" for c in feeding):
             raise ValueError(f"{name} is held by `pspm`, which accounts for what it brings")
 
 
 def _numbers(name: str, value: Value, scalars: tuple[Scalar, ...]) -> tuple[float, ...]:
-    def flat(part: object) -> Iterator[float]:
-        if isinstance(part, tuple | list):
-            for entry in part:
-                yield from flat(entry)
-        elif isinstance(part, str):
-            raise ValueError(f"{name} = {part!r}: give numbers")
-        else:
-            yield float(part)  # type: ignore[arg-type]
-
-    numbers = tuple(flat(value))
+    numbers = tuple(entries_of(value, scalars[-1].indices, name))
+    if texts := [entry for entry in numbers if isinstance(entry, str)]:
+        raise ValueError(f"{name} = {texts[0]!r}: give numbers")
     if len(numbers) != len(scalars):
         raise ValueError(f"{len(numbers)} values for the {len(scalars)} of {name}")
-    return numbers
+    return tuple(map(float, numbers))

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from hapticlink.orchestrator.base.communication_points import Frames
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.base.ticks import (
     Clock,
+    Frames,
     Timeline,
     aligned,
     common_base,
@@ -103,10 +103,11 @@ def _on_ticks(pace: Pace, haptic: Fraction, steps: int) -> Sequence[int]:
 
 @dataclass(frozen=True)
 class Pace:
-    """When a clock steps. rate: Hz, bounds (Hz), or the times (s) at which steps end. first: end of
-    the first step (s), None where the rate varies. on_ticks: steps end on haptic ticks. path: the
-    scene's key for it."""
+    """When the clock `name` steps. rate: Hz, bounds (Hz), or the times (s) at which steps end.
+    first: end of the first step (s), None where the rate varies. on_ticks: steps end on haptic
+    ticks. path: the scene's key for it."""
 
+    name: str
     rate: Fraction | VariableRate | tuple[float, ...]
     first: Fraction | None
     on_ticks: bool
@@ -125,19 +126,20 @@ def clocks(scene: Scene, planned: Blocks | None = None) -> Clocks:
     """The clocks of `scene`: `haptics` always, others only where an FMU runs at them."""
     paths: dict[str, Path] = {fmu.name: ("fmu", i, "rate") for i, fmu in enumerate(scene.fmu)}
     rates = (planned or blocks(scene)).rates
-    named = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates.items()}
+    of = {fmu: _of(fmu, rate, paths.get(fmu, ()), scene) for fmu, rate in rates.items()}
     paces = {"haptics": _pace("haptics", (), scene)}
-    for name, pace in sorted(named.values(), key=lambda clock: clock[0] != "graphics"):
-        paces.setdefault(name, pace)
-    return Clocks({fmu: name for fmu, (name, _) in named.items()}, paces)
+    for pace in sorted(of.values(), key=lambda pace: pace.name != "graphics"):
+        paces.setdefault(pace.name, pace)
+    return Clocks({fmu: pace.name for fmu, pace in of.items()}, paces)
 
 
-def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> tuple[str, Pace]:
-    name, pace = _name(rate, scene), _pace(rate, path, scene)
+def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> Pace:
+    pace = _pace(rate, path, scene)
     if fmu not in scene.phases or exact(scene.phases[fmu]) == pace.first:
-        return name, pace
+        return pace
     first = exact(scene.phases[fmu])
-    return f"{name}_at_{_text(first)}s", replace(pace, first=first, path=("phases", fmu))
+    name = f"{pace.name}_at_{_text(first)}s"
+    return replace(pace, name=name, first=first, path=("phases", fmu))
 
 
 def _pace(rate: AnyRate, path: Path, scene: Scene) -> Pace:
@@ -148,23 +150,17 @@ def _pace(rate: AnyRate, path: Path, scene: Scene) -> Pace:
         pace = _pace(scene.graphics.rate, ("graphics", "rate"), scene)
         phase = scene.graphics.phase
         first = pace.first if phase is None else exact(phase)
-        return replace(pace, first=first, on_ticks=pace.on_ticks or scene.graphics.align == "tick")
-    if isinstance(rate, VariableRate | tuple):
-        return Pace(rate, None, True, path)
-    return Pace(exact(rate), 1 / exact(rate), False, path)
-
-
-def _name(rate: AnyRate, scene: Scene) -> str:
+        on_ticks = pace.on_ticks or scene.graphics.align == "tick"
+        return replace(pace, name="graphics", first=first, on_ticks=on_ticks)
     if isinstance(rate, VariableRate):
         low, high = _text(exact(rate.min)), _text(exact(rate.max))
-        return f"{low}to{high}hz_seed{rate.seed}"
+        return Pace(f"{low}to{high}hz_seed{rate.seed}", rate, None, True, path)
     if isinstance(rate, tuple):
-        return "times_of_" + next(fmu.name for fmu in scene.fmu if fmu.rate == rate)
-    if rate in ("haptics", "graphics"):
-        return str(rate)
-    if exact(rate) == exact(scene.haptics.rate):
-        return "haptics"
-    return f"{_text(exact(rate))}hz"
+        name = next((fmu.name for fmu in scene.fmu if fmu.rate == rate), "graphics")
+        return Pace(f"times_of_{name}", rate, None, True, path)
+    same = exact(rate) == exact(scene.haptics.rate)
+    name = "haptics" if same else f"{_text(exact(rate))}hz"
+    return Pace(name, exact(rate), 1 / exact(rate), False, path)
 
 
 def _text(number: Fraction) -> str:

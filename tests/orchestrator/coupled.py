@@ -14,8 +14,8 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.tables import Table, read_table
+from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.run.execute_plan import Outcome, run
 from hapticlink.orchestrator.scene.records import Iteration, PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
@@ -125,13 +125,14 @@ def order(rates: Sequence[int], errors: Sequence[float]) -> float:
     return -float(np.polyfit(np.log(rates), np.log(errors), 1)[0])
 
 
-def simulate(made: System, folder: Path) -> tuple[Outcome, Table]:
-    return run(Plan(made), RunFolder(folder)), read_table(folder / "haptics.csv")
+def simulate(made: System) -> tuple[Outcome, Table]:
+    results = RunResults()
+    return run(Plan(made), results), results.tables()["haptics"]
 
 
-def rows(made: System, folder: Path) -> Table:
+def rows(made: System) -> Table:
     """Of a run without a fault."""
-    outcome, table = simulate(made, folder)
+    outcome, table = simulate(made)
     assert outcome.fault is None
     return table
 

@@ -21,7 +21,7 @@ import pytest
 
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.real_time_session import LiveRun
-from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.simulation import Simulation
@@ -85,12 +85,12 @@ def under_node(text: str, changes: list[tuple[int, dict[str, Any]]]) -> np.ndarr
     return np.array(javascript("program.js", RUN, given | {"events": EVENTS}))
 
 
-def changed_run(scene: Scene, folder: Path, apply: Callable[[LiveRun, Any], None]) -> np.ndarray:
+def changed_run(scene: Scene, apply: Callable[[LiveRun, Any], None]) -> np.ndarray:
     """The same of a run in the loop of every run, whose holds, rate and gains change as those of a
     run in real time, without waiting for a clock."""
     rows, changes = list[np.ndarray](), [*CHANGES]
     with built(scene) as system, ExitStack() as stack:
-        simulation = Simulation(system, RunFolder(folder), stack)
+        simulation = Simulation(system, RunResults(), stack)
         loop = CompiledLoop(Plan(system), simulation, load())
         simulation.start()
         live = LiveRun(scene)
@@ -137,8 +137,8 @@ def apply(live: LiveRun, message: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("options", [(), ("graphics.rate=32", "coupling=jacobi")])
-def test_changes_are_those_of_a_run_in_real_time(options: tuple[str, ...], tmp_path: Path) -> None:
-    expected = changed_run(dragged(options), tmp_path, apply)
+def test_changes_are_those_of_a_run_in_real_time(options: tuple[str, ...]) -> None:
+    expected = changed_run(dragged(options), apply)
     found = under_node(page_of(options), CHANGES)
     assert found.shape == expected.shape
     assert np.ptp(found, axis=0).max() > 1

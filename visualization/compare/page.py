@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hapticlink.analysis.findings import summary
-from hapticlink.orchestrator.results.scene_file import scene_file
+from hapticlink.orchestrator.results.recorded_scene import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, settings
 from hapticlink.visualization.compare.numbers import Row

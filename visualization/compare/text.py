@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from hapticlink.orchestrator.base.text_table import aligned
+from hapticlink.orchestrator.base.terminal_output import aligned
 from hapticlink.visualization.compare.numbers import Row
 
 

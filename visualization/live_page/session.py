@@ -15,7 +15,6 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
-from hapticlink.orchestrator.results.recorded_scene import by_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.visualization.interactive_scene import scene_message
@@ -77,7 +76,7 @@ class Session:
         """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has
         ended, which raises Fault."""
         scene = self._scene
-        drawing = (scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
+        drawing = (scene.linkage, scene.all_devices, scene.contacts)
         self._link.send({"type": "opening", "title": scene.title, "picture": drawing})
         with self._before:  # it ends where the first run begins
             took = self._before.enter_context(measured(f"{scene.title}: FMUs of its page"))

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.results.recorded_scene import by_user
 from hapticlink.visualization.figure_axes import plain
 from hapticlink.visualization.mechanism import mark_places, workspace_drawing
 from hapticlink.visualization.mechanism.mark_places import MM, Frame, Points, place
@@ -100,7 +99,7 @@ def figure(scene: Scene, q: Coordinates) -> Figure:
     axes = drawn.add_subplot()
     assert scene.linkage is not None
     draw(axes, scene.linkage, q, None, scene.contacts, scene.device)
-    picture = Picture(scene.linkage, by_user(scene.device, scene.devices), None)
+    picture = Picture(scene.linkage, scene.all_devices, None)
     arms = (mark for mark in picture.marks if mark.role == "device")
     paint(axes, arms, picture.at_rest(q))
     axes.set_title(plain(fill(f"{scene.title} at the start", 70)), fontsize="medium")

@@ -22,8 +22,8 @@ from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_POSE
-from hapticlink.orchestrator.results.recorded_scene import by_user, scene_part
+from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_POSE, by_user
+from hapticlink.orchestrator.results.recorded_scene import scene_part
 from hapticlink.orchestrator.results.tables import Results, Table, Vector, load
 from hapticlink.visualization.mechanism.frame_signals import candidates
 from hapticlink.visualization.mechanism.picture import PORT, Picture
@@ -75,7 +75,7 @@ class Recorded:
         self.times, self.left_out = self.times[drawn], int((~drawn).sum())
         self.users = further_users(results)
         others = scene_part(results, "devices", Mapping[str, Device]) if self.users else {}
-        devices = by_user(device if "handle" in self.signals else None, others)
+        devices = by_user(device if "handle" in self.signals else None, others or {})
         self.picture = Picture(linkage, devices, self.contacts)
 
     @property

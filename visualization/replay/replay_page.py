@@ -8,7 +8,7 @@ from pathlib import Path
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folders
-from hapticlink.orchestrator.results.named_runs import names
+from hapticlink.orchestrator.results.folders import names
 from hapticlink.visualization.browser_code import one_file
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
 from hapticlink.visualization.replay.recorded_frames import Recorded

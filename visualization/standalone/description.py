@@ -9,7 +9,6 @@ from typing import Any
 import casadi as ca
 
 from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
-from hapticlink.orchestrator.results.recorded_scene import by_user
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
@@ -34,7 +33,7 @@ class Description:
     def __init__(self, program: Resolved, ports: Sequence[Port], name: str) -> None:
         scene, system = program.scene, program.system
         assert scene.linkage
-        picture = Picture(scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
+        picture = Picture(scene.linkage, scene.all_devices, scene.contacts)
         places, offered = _places(program), Offered(scene, system)
         parts = [p for p in picture.parts if {*p.needs} <= {*places.get(p.user, {})}]
         self.drawing = _drawing(parts, places)

@@ -9,15 +9,7 @@ from itertools import chain, islice
 
 from hapticlink.orchestrator.base.errors import COUNTED
 from hapticlink.orchestrator.scene.blocks import blocks as plan_blocks
-from hapticlink.orchestrator.scene.checks import (
-    blocks,
-    contacts,
-    coupling,
-    device,
-    fmus,
-    linkage,
-    rates,
-)
+from hapticlink.orchestrator.scene.checks import blocks, contacts, fmus, linkage, numbers, rates
 from hapticlink.orchestrator.scene.conditions import parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
@@ -25,7 +17,7 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 def check(scene: Scene) -> list[Problem]:
     """Every problem found, up to COUNTED: each may search for a similar name."""
-    shapes = list(islice(chain(_linkage(scene), contacts.check(scene)), COUNTED))
+    shapes = list(islice(chain(linkage.check(scene), contacts.check(scene)), COUNTED))
     if shapes and scene.contacts:
         # The broad phase needs a valid tree and valid polygons.
         scene = replace(scene, contacts=replace(scene.contacts, broad_phase=False))
@@ -33,19 +25,14 @@ def check(scene: Scene) -> list[Problem]:
     rest = chain(
         _condition(scene),
         rates.check(scene, planned),
-        coupling.delays(scene),
+        numbers.delays(scene),
         blocks.missing(scene),
         fmus.check(scene, planned),
         shapes,
-        device.check(scene),
-        coupling.check(scene),
+        numbers.check(scene),
         blocks.check(scene, planned),
     )
     return list(islice(rest, COUNTED))
-
-
-def _linkage(scene: Scene) -> Iterator[Problem]:
-    return linkage.check(scene.linkage) if scene.linkage else iter(())
 
 
 def _condition(scene: Scene) -> Iterator[Problem]:

@@ -11,7 +11,9 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(linkage: Linkage) -> Iterator[Problem]:
+def check(scene: Scene) -> Iterator[Problem]:
+    if (linkage := scene.linkage) is None:
+        return
     here: Path = ("linkage",)
     frames = {"ground": -1}
     for i, body in enumerate(linkage.body):

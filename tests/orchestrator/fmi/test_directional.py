@@ -31,9 +31,9 @@ def iterated(folder: Path, offered: float, between: str, flags: tuple[str, ...] 
     return system(fmus, ROWS, "iterated", period, until, between=between, iteration=NEWTON)
 
 
-def solved(made: System, folder: Path) -> tuple[Iterations | None, Table]:
+def solved(made: System) -> tuple[Iterations | None, Table]:
     """What was iterated, and the rows."""
-    outcome, table = simulate(made, folder)
+    outcome, table = simulate(made)
     assert outcome.fault is None
     return outcome.details.iterations, table
 
@@ -41,8 +41,8 @@ def solved(made: System, folder: Path) -> tuple[Iterations | None, Table]:
 @pytest.mark.parametrize("between", ["zoh", "foh"])
 def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path, between):
     """Linear plants: the Jacobian told is exact, so Newton needs no differences."""
-    counts, table = solved(iterated(tmp_path, STEP, between), tmp_path)
-    plain, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]), tmp_path)
+    counts, table = solved(iterated(tmp_path, STEP, between))
+    plain, same = solved(iterated(tmp_path, STEP, between, FLAGS[:-1]))
     assert (counts.jacobians, counts.directional_jacobians) == (0, 1)
     assert (plain.jacobians, plain.directional_jacobians) == (1, 0)
     assert counts.max_iterations <= 3
@@ -54,8 +54,8 @@ def test_a_steps_jacobian_is_taken_from_the_fmus(tmp_path, between):
 
 @pytest.mark.parametrize("offered", [WRONG, FAILING])
 def test_derivatives_that_do_not_help_give_way_to_differences(tmp_path, offered):
-    counts, table = solved(iterated(tmp_path, offered, "foh"), tmp_path)
-    _, same = solved(iterated(tmp_path, STEP, "foh"), tmp_path)
+    counts, table = solved(iterated(tmp_path, offered, "foh"))
+    _, same = solved(iterated(tmp_path, STEP, "foh"))
     assert counts.jacobians >= 1
     assert counts.unconverged == 0
     np.testing.assert_allclose(table["one.x"], same["one.x"], rtol=0, atol=1e-8)
@@ -68,7 +68,7 @@ def test_where_the_jacobian_is_not_that_of_a_step_differences_are_taken(tmp_path
         with_coupling(made, substeps={"one": 1, "two": 2}),
         with_coupling(made, get_after_set=("two",)),
     ):
-        counts, table = solved(other, tmp_path)
+        counts, table = solved(other)
         assert counts.directional_jacobians == 0
         assert counts.jacobians >= 1
         assert table["two.calls"][-1] == 0
@@ -97,7 +97,7 @@ def looped(folder: Path, offered: float, flags: tuple[str, ...] = FLAGS, **own: 
 def test_start_values_by_directional_derivatives(tmp_path, offered, flags, used, isolate):
     made = looped(tmp_path, offered, flags)
     made = replace(made, fmus=tuple(replace(u, isolate=isolate) for u in made.fmus))
-    _, table = solved(made, tmp_path)
+    _, table = solved(made)
     p, q, k, c = 100.0, 1.0, 100.0, 1.0
     force = (p * (0.5 + k * 0.3 + c * 0.2) - q * 0.1) / (1 + p)
     assert table["two.F"][0] == pytest.approx(force, rel=1e-12)

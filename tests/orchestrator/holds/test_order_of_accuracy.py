@@ -6,7 +6,6 @@ must take inputs that vary within a step it takes substeps, or it interpolates i
 
 from collections.abc import Mapping
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,11 +34,11 @@ PASSIVE, NEPCE = ({**OWN, "two.F": hold} for hold in ("passive", "nepce"))
 SLOPE = {**OWN, "one.x": "foh", "one.v": "slope"}
 
 
-def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how: object) -> float:
+def error(fmus: Fmus, rate: int, hold: Hold, substeps: int, **how: object) -> float:
     """The largest error of a position within 1 s after the start."""
     steps = round((1 + WARM) * rate)
     made = coupled.masses(fmus, Fraction(1, rate), steps, hold, substeps=substeps, **how)
-    return coupled.error(coupled.rows(made, folder))
+    return coupled.error(coupled.rows(made))
 
 
 @pytest.mark.parametrize(
@@ -66,19 +65,17 @@ def error(fmus: Fmus, folder: Path, rate: int, hold: Hold, substeps: int, **how:
         (SLOPE, "constant", 1, 1, "jacobi", 400),
     ],
 )
-def test_order_of_a_hold(fmus, tmp_path, hold, inputs, substeps, order, coupling, coarsest):
+def test_order_of_a_hold(fmus, hold, inputs, substeps, order, coupling, coarsest):
     rates = [coarsest, 2 * coarsest, 4 * coarsest]
-    errors = [
-        error(fmus[inputs], tmp_path, rate, hold, substeps, coupling=coupling) for rate in rates
-    ]
+    errors = [error(fmus[inputs], rate, hold, substeps, coupling=coupling) for rate in rates]
     within = 0.1 if coarsest == 200 else 0.15
     assert coupled.order(rates, errors) == pytest.approx(order, abs=within)
 
 
-def test_a_set_position_that_is_not_paid_for_has_no_order(fmus, tmp_path):
+def test_a_set_position_that_is_not_paid_for_has_no_order(fmus):
     """The motion that the other mass sends is refused in part, at any rate."""
     hold = {"two.F": "lead", "one.x": "pspm", "one.v": "pspm"}
-    coarse, fine = (error(fmus["constant"], tmp_path, rate, hold, 1) for rate in (800, 1600))
+    coarse, fine = (error(fmus["constant"], rate, hold, 1) for rate in (800, 1600))
     assert fine > 0.7 * coarse
 
 
@@ -92,18 +89,18 @@ def test_a_set_position_that_is_not_paid_for_has_no_order(fmus, tmp_path):
     ],
 )
 @pytest.mark.parametrize("inputs", ["constant", "interpolating"])
-def test_largest_error_at_a_hundredth(fmus, tmp_path, inputs, hold, substeps, published):
+def test_largest_error_at_a_hundredth(fmus, inputs, hold, substeps, published):
     substeps = 1 if inputs == "interpolating" else substeps
-    found = error(fmus[inputs], tmp_path, 100, hold, substeps)
+    found = error(fmus[inputs], 100, hold, substeps)
     assert found == pytest.approx(published, rel=0.02)
 
 
 def growth(
-    fmus: Fmus, folder: Path, step: Fraction, hold: str, substeps: int, steps: int, **how: object
+    fmus: Fmus, step: Fraction, hold: str, substeps: int, steps: int, **how: object
 ) -> float:
     """Of the envelope between the last quarters of a run; 1 is the limit of stability."""
     made = coupled.masses(fmus, step, steps, hold, substeps=substeps, **how)
-    size = np.abs(coupled.motion(coupled.rows(made, folder)) / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
+    size = np.abs(coupled.motion(coupled.rows(made)) / [1.0, 17.0, 1.0, 17.0]).max(axis=1)
     quarter = steps // 4
     return float(size[-quarter:].max() / size[-2 * quarter : -quarter].max())
 
@@ -131,13 +128,13 @@ def growth(
     ],
 )
 def test_limit_of_stability_to_one_percent(
-    fmus, tmp_path, inputs, hold, substeps, coupling, get_after_set, limit
+    fmus, inputs, hold, substeps, coupling, get_after_set, limit
 ):
     pair = fmus.get(inputs) or dict(reversed(fmus["constant"].items()))
     steps = 2000 if substeps == 1 and inputs == "constant" else 500
     how = {"get_after_set": get_after_set, "coupling": coupling}
     below, above = (
-        growth(pair, tmp_path, Fraction(limit) * part, hold, substeps, steps, **how)
+        growth(pair, Fraction(limit) * part, hold, substeps, steps, **how)
         for part in (Fraction(99, 100), Fraction(101, 100))
     )
     assert below < 1 < above

@@ -29,7 +29,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path):
     path, out = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED), duration=5), tmp_path / "out"
     with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.DEVNULL) as running:
         while not (table := out / "haptics.rows").exists() or (
-            len(rows.read(table)[1]) < LAST * 64 + 1
+            len(rows.Written(table)) < LAST * 64 + 1
         ):
             assert running.poll() is None
         with pytest.raises(InputFault, match=f"its run goes on, in process {running.pid}"):
@@ -49,7 +49,7 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
     """The process is killed while it writes a block: rows that the table has already are left out,
     one that it has in part is whole in the block, or is counted as lost."""
     values = np.zeros(2)
-    recorder = FileRecorder(tmp_path / "haptics.csv", ["a", "b"], values, [0, 1], lambda: None)
+    recorder = FileRecorder(tmp_path / "haptics.csv", {"a": 0, "b": 1}, values, lambda: None)
     recorder.publish()
     for k in range(5):
         values[:] = k, -k
@@ -58,9 +58,9 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
     with recorder.target.open("ab") as file:
         file.write(block.tobytes()[: 2 * 24 + 7])
     expected = [[k / 8, k, -k] for k in range(5)]
-    assert rows.read(recorder.target)[1].tolist() == expected
+    assert rows.Written(recorder.target)[:].tolist() == expected
     recorder.block.filled.value = 0
-    assert rows.read(recorder.target)[1].tolist() == expected[:2]
+    assert rows.Written(recorder.target)[:].tolist() == expected[:2]
     run = run_json(rates=["haptics"], files=["haptics.csv"])
     (tmp_path / "run.json").write_text(json.dumps(run))
     assert recover(tmp_path) == {"haptics": Recovered(2, 1 / 8, 1)}

@@ -15,7 +15,9 @@ from hapticlink.orchestrator.results.tables import read_table
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> FileRecorder:
     """One whose file is in its place from the first row on."""
-    made = FileRecorder(path, columns, view, range(len(view)), lambda: made.publish())
+    made = FileRecorder(
+        path, {name: i for i, name in enumerate(columns)}, view, lambda: made.publish()
+    )
     return made
 
 

@@ -187,7 +187,7 @@ def test_steps_that_are_taken_back(tmp_path, monkeypatch, settings):
         made = coupled.iterated(
             fmus, Fraction(1, 2), rate=50, rows=coupled.HERMITE, power=coupled.POWER, **settings
         )
-        outcome, table = coupled.simulate(made, tmp_path)
+        outcome, table = coupled.simulate(made)
         assert outcome.fault is None
         details = replace(outcome.details, timings=Timings(), in_python={})
         found.append((details, outcome.end_time, table.rows.tobytes()))

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.plan.stamps import uses
-from hapticlink.orchestrator.results.run_folder import RunFolder
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged
 from hapticlink.orchestrator.scene.records import Iteration
@@ -54,21 +54,19 @@ def interpolating(tmp_path_factory):
     return {name: native(folder, name) for name in ("one", "two")}
 
 
-def largest(fmus: Fmus, folder: Path, rate: int, between: str, substeps: int) -> float:
+def largest(fmus: Fmus, rate: int, between: str, substeps: int) -> float:
     """The largest error of a position within 1 s."""
     made = iterated(fmus, UNTIL, between, rate=rate, rows=HERMITE, substeps=substeps)
-    return error(rows(made, folder))
+    return error(rows(made))
 
 
 @pytest.mark.parametrize(
     ("between", "substeps", "published"), [("foh", 2, 1.73e-3), ("hermite", 8, 7.8e-7)]
 )
-def test_error_of_the_two_mass_oscillator(
-    fmus, interpolating, tmp_path, between, substeps, published
-):
+def test_error_of_the_two_mass_oscillator(fmus, interpolating, between, substeps, published):
     """Inputs that vary within a step need no substeps."""
     for pair, parts in ((fmus, substeps), (interpolating, 1)):
-        found = largest(pair, tmp_path, 100, between, parts)
+        found = largest(pair, 100, between, parts)
         assert found == pytest.approx(published, rel=0.02)
 
 
@@ -76,23 +74,21 @@ def test_error_of_the_two_mass_oscillator(
     ("between", "substeps", "order"),
     [("zoh", 1, 1), ("foh", 1, 2), ("second-order", 4, 3), ("hermite", 4, 4)],
 )
-def test_order_is_that_of_the_interpolation(fmus, tmp_path, between, substeps, order):
+def test_order_is_that_of_the_interpolation(fmus, between, substeps, order):
     rates = [50, 100, 200]
-    errors = [largest(fmus, tmp_path, rate, between, substeps) for rate in rates]
+    errors = [largest(fmus, rate, between, substeps) for rate in rates]
     assert observed_order(rates, errors) == pytest.approx(order, abs=0.1)
 
 
-def test_both_methods_find_the_same(fmus, tmp_path):
+def test_both_methods_find_the_same(fmus):
     both = (Iteration(method=method, tolerance=1e-11) for method in ("aitken", "newton"))
-    aitken, newton = (
-        rows(iterated(fmus, Fraction(1, 2), "foh", iteration=how), tmp_path) for how in both
-    )
+    aitken, newton = (rows(iterated(fmus, Fraction(1, 2), "foh", iteration=how)) for how in both)
     np.testing.assert_allclose(aitken.rows, newton.rows, atol=1e-7)
 
 
-def test_what_was_iterated_is_counted(fmus, tmp_path):
+def test_what_was_iterated_is_counted(fmus):
     made = iterated(fmus, Fraction(1, 2), "foh", substeps=3, iteration=Iteration())
-    outcome, _ = simulate(made, tmp_path)
+    outcome, _ = simulate(made)
     found, calls = outcome.details.iterations, outcome.details.calls["two"]
     assert found is not None
     assert found.steps == 50
@@ -106,11 +102,11 @@ def test_it_reads_the_future_and_says_so(fmus):
     assert all(use.stamp == use.tick + 1 for use in uses(plan))
 
 
-def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus, interpolating, tmp_path):
+def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus, interpolating):
     """Linear interpolation holds the mean of the source's samples, so it generates no energy: the
     work of both books is the same."""
     for pair in (fmus, interpolating):
-        outcome, _ = simulate(iterated(pair, UNTIL, "foh", power=POWER), tmp_path)
+        outcome, _ = simulate(iterated(pair, UNTIL, "foh", power=POWER))
         booked = outcome.details.meters["two.F -> one.F"]
         assert abs(booked.held) > 1.0
         assert abs(booked.generated) < 1e-8
@@ -123,7 +119,7 @@ def test_newton_converges_where_the_fixed_point_does_not(tmp_path):
         how = {"substeps": 2, "get_after_set": ("two",), "iteration": Iteration(method=method)}
         how["between"] = "foh" if coupling == "iterated" else None
         made = system(fmus, ROWS, coupling, Fraction(1, rate), Fraction(1), **how)
-        outcome, table = simulate(made, tmp_path)
+        outcome, table = simulate(made)
         found = np.stack([table["one.x"], table["two.x"]], axis=1)
         return outcome.fault, float(np.abs(found - stiff_exact(table["time"], *STIFF)).max())
 
@@ -144,11 +140,11 @@ def test_an_fmu_that_cannot_roll_back_is_named(fmus):
         list(delays(Plan(made)))
 
 
-def test_fmus_in_processes_of_their_own_roll_back_too(fmus, tmp_path):
+def test_fmus_in_processes_of_their_own_roll_back_too(fmus):
     made = iterated(fmus, Fraction(1, 10), "foh", substeps=2)
-    here = rows(made, tmp_path)
+    here = rows(made)
     units = tuple(replace(u, isolate=True) for u in made.fmus)
-    np.testing.assert_array_equal(rows(replace(made, fmus=units), tmp_path).rows, here.rows)
+    np.testing.assert_array_equal(rows(replace(made, fmus=units)).rows, here.rows)
 
 
 def test_a_hold_that_does_not_interpolate_is_refused(fmus):
@@ -171,13 +167,13 @@ def gains(folder: Path, b: float, offset: float, a: float = 2.0, **timing: str) 
 def test_start_values_go_through_a_feed_through_loop_of_any_gain(tmp_path, a, b):
     """y_a = a y_b + 1, y_b = b y_a - 3."""
     made = system(gains(tmp_path, b, -3.0, a), RING, "jacobi", Fraction(1), Fraction(1))
-    found = rows(made, tmp_path)["a.y"][0]
+    found = rows(made)["a.y"][0]
     assert found == pytest.approx((1 - 3 * a) / (1 - a * b), rel=1e-12)
 
 
 def test_a_loop_without_start_values_is_an_error_that_names_it(tmp_path):
     made = system(gains(tmp_path, 0.5, -3.0), RING, "jacobi", Fraction(1), Fraction(1))
-    fault = run(Plan(made), RunFolder(tmp_path)).fault
+    fault = run(Plan(made), RunResults()).fault
     assert isinstance(fault, FmuFault)
     assert "output y does not converge in initialisation, nor by Newton" in str(fault)
 
@@ -196,7 +192,7 @@ def test_an_input_that_no_output_follows_makes_no_order(tmp_path):
     ages = delays(Plan(made))
     assert ages["a.y -> b.u"].max == 0.0
     assert ages["b.y -> a.w"].min == 1.0
-    np.testing.assert_array_equal(rows(made, tmp_path)["b.y"], 3.0)
+    np.testing.assert_array_equal(rows(made)["b.y"], 3.0)
 
 
 def test_a_ring_of_direct_dependencies_is_named(tmp_path):
@@ -207,7 +203,7 @@ def test_a_ring_of_direct_dependencies_is_named(tmp_path):
 def test_a_ring_opens_where_only_unread_outputs_are_direct(tmp_path):
     """b.y follows b.u at once, but only b.z is read: z_{k+1} = y_{k-1}, y_k = 2 z_k + 1."""
     wires = [("a.y", "b.u"), ("a.y", "b.w"), ("b.z", "a.u")]
-    table = rows(sampled(tmp_path, wires, 8), tmp_path)
+    table = rows(sampled(tmp_path, wires, 8))
     z = [0.0, 1.0]
     for k in range(2, 9):
         z.append(2 * z[k - 2] + 1)

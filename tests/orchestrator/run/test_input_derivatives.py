@@ -72,18 +72,18 @@ def test_what_an_fmu_is_told_is_the_hold(name, data):
 
 
 @pytest.mark.parametrize("hold", ["foh", "second-order", "delayed", "smooth"])
-def test_substeps_change_nothing(fmus, tmp_path, hold):
+def test_substeps_change_nothing(fmus, hold):
     """Each substep goes on along the same polynomial."""
     found = []
     for substeps in (1, 3):
         made = coupled.masses(fmus, Fraction(1, 100), 60, hold, substeps=substeps)
-        found.append(coupled.motion(coupled.rows(made, tmp_path)))
+        found.append(coupled.motion(coupled.rows(made)))
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-11)
 
 
-def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, constant, tmp_path):
+def test_an_fmu_that_cannot_interpolate_takes_the_middle(fmus, constant):
     """`foh` on it is the lead; where only one of the two can, each gets what it can take."""
-    assert error(constant, tmp_path, 100, "foh", 1) == pytest.approx(7.08e-3, rel=0.02)
+    assert error(constant, 100, "foh", 1) == pytest.approx(7.08e-3, rel=0.02)
     mixed = {"one": fmus["one"], "two": constant["two"]}
     made = coupled.masses(mixed, Fraction(1, 100), 10, "foh")
     assert {c.name: held_polynomials.order(made, c) for c in made.connections} == {

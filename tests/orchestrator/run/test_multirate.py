@@ -10,7 +10,6 @@ computed independently.
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -23,12 +22,10 @@ from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.varying_rate import edges_of
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus.build import build
-from hapticlink.orchestrator.base.communication_points import Frames
-from hapticlink.orchestrator.base.ticks import Clock, Timeline
+from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
@@ -123,10 +120,11 @@ def fmus(tmp_path_factory):
     return {c.name: describe(build(c, folder)) for c in parts}
 
 
-def forces(made: System, folder: Path) -> NDArray[np.float64]:
+def forces(made: System) -> NDArray[np.float64]:
     """|F| of the sampled spring at every tick."""
-    assert run(Plan(made), RunFolder(folder)).fault is None
-    return np.abs(read_table(folder / "haptics.csv")["spring.F"])
+    results = RunResults()
+    assert run(Plan(made), results).fault is None
+    return np.abs(results.tables()["haptics"]["spring.F"])
 
 
 def system(
@@ -154,9 +152,7 @@ def radius(made: System) -> float:
 
 
 @pytest.mark.parametrize(("linkage", "rate", "align", "limit"), LIMITS)
-def test_limit_of_the_coupling_in_a_run_and_in_the_lifted_map(
-    fmus, tmp_path, linkage, rate, align, limit
-):
+def test_limit_of_the_coupling_in_a_run_and_in_the_lifted_map(fmus, linkage, rate, align, limit):
     """To one percent, and to half a percent."""
     timeline = fixed(Fraction(512), Fraction(rate), 512 * 16, align)
 
@@ -165,7 +161,7 @@ def test_limit_of_the_coupling_in_a_run_and_in_the_lifted_map(
 
     def growth(share):
         """Between the last quarters of a run."""
-        _, _, third, last = np.split(forces(made(share), tmp_path)[1:], 4)
+        _, _, third, last = np.split(forces(made(share))[1:], 4)
         return float(last.max() / third.max())
 
     assert growth(0.99) < 1 < growth(1.01)
@@ -187,10 +183,10 @@ GROWN = 1.86
 
 
 @pytest.mark.parametrize("frames", [(17, 17), (51, 51), (17, 51)], ids=str)
-def test_alternating_frames_grow_where_each_alone_is_stable(fmus, tmp_path, frames):
+def test_alternating_frames_grow_where_each_alone_is_stable(fmus, frames):
     """In the lifted map and in a run: spectral radii at most .986 alone."""
     made, starts = alternating(fmus, frames)
-    force = forces(made, tmp_path)
+    force = forces(made)
     peaks = [force[a:b].max() for a, b in pairwise(starts[:33])]
     grown = (max(peaks[-10:]) / max(peaks[-30:-20])) ** (1 / 20)
     if frames == (17, 51):

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.stamps import uses
-from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
@@ -55,13 +54,14 @@ def test_no_input_is_stamped_later_than_its_step_less_the_latency(
 
 
 @pytest.mark.parametrize("coupling", CAUSAL)
-def test_what_the_plan_says_is_what_the_fmus_see(stamped, tmp_path, coupling):
+def test_what_the_plan_says_is_what_the_fmus_see(stamped, coupling):
     timeline = fixed(Fraction(512), Fraction(60), 256)
     drawn = Latency(min=0.01, max=0.05, loss=0.3, seed=4)
     delays = {LATE: drawn, "device.stamp": Latency(min=0.003)}
     system = late(stamped(timeline, coupling), delays)
-    outcome = run(Plan(system), RunFolder(tmp_path))
-    table = read_table(tmp_path / "haptics.csv")
+    results = RunResults()
+    outcome = run(Plan(system), results)
+    table = results.tables()["haptics"]
     for name, column in ((LATE, "controller.seen_g"), ("device.stamp -> hand.d", "hand.seen_d")):
         said = [timeline.seconds(u.stamp) for u in uses(Plan(system)) if u.connection == name]
         np.testing.assert_allclose(table[column], said, rtol=0, atol=1e-12)
@@ -73,13 +73,14 @@ def test_what_the_plan_says_is_what_the_fmus_see(stamped, tmp_path, coupling):
 
 
 @pytest.mark.parametrize("rate", [60, 30, 24, 10])
-def test_extrapolated_stamps_are_the_time_itself(stamped, tmp_path, rate):
+def test_extrapolated_stamps_are_the_time_itself(stamped, rate):
     """A stamp is a straight line: from exact ticks, first order gives it back at any rate, and
     with any latency."""
     timeline = fixed(Fraction(512), Fraction(rate), 256)
     for delays in ({}, {LATE: Latency(min=0.001, max=0.04, loss=0.2, seed=1)}):
-        run(Plan(late(stamped(timeline, "gauss-seidel"), delays, "foh")), RunFolder(tmp_path))
-        table = read_table(tmp_path / "haptics.csv")
+        results = RunResults()
+        run(Plan(late(stamped(timeline, "gauss-seidel"), delays, "foh")), results)
+        table = results.tables()["haptics"]
         time, seen = table["time"], table["controller.seen_g"]
         started = int(np.argmax(seen > 0))
         assert started <= 512 // rate + 1 + (512 * 5 // rate if delays else 0)

@@ -15,8 +15,7 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.stamps import uses
-from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.system.timeline import clocks, timeline
@@ -66,12 +65,13 @@ TIMELINES = {
 
 @pytest.mark.parametrize("coupling", CAUSAL)
 @pytest.mark.parametrize("name", TIMELINES)
-def test_what_the_plan_says_is_what_the_fmus_see(stamped, tmp_path, name, coupling):
+def test_what_the_plan_says_is_what_the_fmus_see(stamped, name, coupling):
     """What it may say is in plan/test_plan.py."""
     time = TIMELINES[name]
     system = stamped(time, coupling)
-    assert run(Plan(system), RunFolder(tmp_path)).fault is None
-    tables = {c.name: read_table(tmp_path / f"{c.name}.csv") for c in time.clocks}
+    results = RunResults()
+    assert run(Plan(system), results).fault is None
+    tables = results.tables()
     assert len(tables) == (5 if name == "five clocks" else 2)
     said = list(uses(Plan(system)))
     for c in system.connections:

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.results.named_runs import named
-from hapticlink.orchestrator.results.scene_file import scene_file
+from hapticlink.orchestrator.results.folders import named
+from hapticlink.orchestrator.results.recorded_scene import scene_file
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, page, settings
 from tests.shared_fixtures import status

@@ -23,7 +23,8 @@ from pyarrow import parquet
 import hapticlink as hl
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.fmus.versions import install_command
-from hapticlink.orchestrator.results import json_file, windows
+from hapticlink.orchestrator.base import text_files
+from hapticlink.orchestrator.results import windows
 from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.visualization.mechanism import drawing
 from hapticlink.visualization.replay.recorded_frames import Recorded
@@ -188,7 +189,7 @@ def test_windows_give_the_same_and_memory_stays_flat(
     hl.export_results(folders[16], to=to, out=tmp_path / "whole")
     monkeypatch.setattr(windows, "WINDOW_BYTES", 10_000)
     monkeypatch.setattr(mcap.writer, "Writer", partial(mcap.writer.Writer, chunk_size=2**16))
-    monkeypatch.setattr(json_file, "MAX_BYTES", 1 << 16)  # reading run.json takes as much memory
+    monkeypatch.setattr(text_files, "LARGEST_JSON", 1 << 16)  # as much memory as that
 
     def peak(times: int) -> int:
         tracemalloc.start()

@@ -1,15 +1,17 @@
-"""Checks numbers of [device] and [directions] that limit each other."""
+"""Checks numbers of [directions], [device], [delays] and [[power]] that limit each other."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
 def check(scene: Scene) -> Iterator[Problem]:
+    """Problems of [directions], of devices, and of the signs of [[power]]."""
     factor = scene.directions.rank_tolerance * scene.directions.hysteresis
     if not factor < 1:
         yield (
@@ -22,6 +24,16 @@ def check(scene: Scene) -> Iterator[Problem]:
         yield from _device(scene.device, ("device",))
     for name, device in scene.devices.items():
         yield from _device(device, ("devices", name))
+    for i, port in enumerate(scene.power):
+        if abs(port.sign) != 1.0:
+            yield ("power", i, "sign"), f"{port.sign:g} is no sign: write 1 or -1"
+
+
+def delays(scene: Scene) -> Iterator[Problem]:
+    for name, late in scene.delays.items():
+        if isinstance(late, Latency) and late.max is not None and late.max < late.min:
+            message = f"max = {late.max} s is below min = {late.min} s: swap them"
+            yield ("delays", name), message
 
 
 def _device(device: Device, here: Path) -> Iterator[Problem]:
