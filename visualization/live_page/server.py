@@ -185,11 +185,11 @@ class Pages:
 
     def _tell(self, message: messages.Message) -> None:
         """Tell the run that a change is of, or both of a hand and a button."""
-        of_second = isinstance(message, messages.Change) and message.b and self._second
+        of_second = isinstance(message, messages.Set) and message.b and self._second
         if not of_second:
             pickle.dump(message, self._out)
             self._out.flush()
-        if self._second and (of_second or not isinstance(message, messages.Change)):
+        if self._second and (of_second or not isinstance(message, messages.Set)):
             self._second.send(message)
 
 

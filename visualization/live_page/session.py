@@ -66,7 +66,7 @@ class Session:
     ) -> None:
         self._scene, self._link, self._root, self._real_time = scene, link, root, real_time
         self._controls: Controls | None = None
-        self._settings = settings or Settings()
+        self._settings = settings or {}
         self._shown = 0.0
         self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
         self.recordings: list[Path] = []
@@ -121,6 +121,7 @@ class Session:
             if isinstance(message, messages.Time):
                 self._time(message.do)
                 continue
+            assert isinstance(message, messages.Hand | messages.Set)
             try:
                 self._controls.apply(message)
             except InputFault as fault:
@@ -137,12 +138,11 @@ class Session:
         """Say why; a hold that only a run that begins with it can have begins anew with it."""
         self._link.send({"type": "refused", "why": str(fault)})
         assert self._controls
-        if isinstance(message, messages.Hold) and self._controls.fits(message):
-            option = {f'holds."{message.connection}"': message.hold}
-            self._scene = open_scene.load(self._scene, option)
-            self._link.send(
-                {"type": "refused", "why": f"{message.hold} begins at t = 0: it runs in Python"}
-            )
+        if isinstance(message, messages.Set) and self._controls.begins_with(message):
+            connection, hold = message.key.removeprefix("holds."), message.value
+            self._scene = open_scene.load(self._scene, {f'holds."{connection}"': hold})
+            why = f"{hold} begins at t = 0: it runs in Python"
+            self._link.send({"type": "refused", "why": why})
             self._anew(self._state["recording"] and "again")
 
     def _start(self, live: LiveRun) -> None:
@@ -201,7 +201,7 @@ class Session:
 
     def _tell_controls(self) -> None:
         assert self._controls
-        self._link.send({"type": "controls"} | self._controls.described())
+        self._link.send({"type": "controls", "controls": self._controls.described()})
         parameters = self._controls.parameters() | self._held
         settings = {"settings": self._settings, "parameters": parameters}
         self._link.send({"type": "settings", "scene": self._packed} | settings)
