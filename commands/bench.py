@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from hapticlink.commands import checkout
 from hapticlink.commands.options import Out
-from hapticlink.commands.progress import timed
+from hapticlink.commands.progress import bar, timed
 from hapticlink.orchestrator.base import interrupt
 
 Benchmark = Literal[
@@ -62,9 +62,6 @@ def bench(
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     results = checkout.folder("bench") / "results"
     if what is None:
         status = checkout.function("bench", "benchmarks.code_version:status")
@@ -72,14 +69,13 @@ def bench(
         return 0
     make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
     folder = out or results / FOLDERS.get(what, what)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     command = f"hapticlink bench {what}{' --quick' * quick}"
-    with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(what)
+    with timed(command), bar(what) as show:
 
         def report(text: str, done: int, total: int) -> None:
             interrupt.check()
-            bar.update(task, description=text, completed=done, total=total)
+            if show:
+                show(done, total, text)
 
         page = make(folder, quick, report, command) or folder / "README.md"
     if out is None and not quick:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -21,9 +21,9 @@ HEADERS = {
 
 
 @contextmanager
-def served(html: str, host: str, port: int, token: str) -> Iterator[int]:
-    """Serves `html` at /<token>/ within the context, which gets the port; 0 is a free one. Raises
-    OSError where it cannot be had."""
+def served(html: str, host: str, ports: Sequence[int], token: str) -> Iterator[int]:
+    """Serves `html` at /<token>/ within the context, which gets the first of the ports that is
+    free; 0 is any. Raises OSError where none is."""
     body, path = html.encode(), f"/{token}/"
 
     class Handler(BaseHTTPRequestHandler):
@@ -52,7 +52,15 @@ def served(html: str, host: str, port: int, token: str) -> Iterator[int]:
         def handle_error(self, *of: object) -> None:
             pass  # a window that was closed while it loaded
 
-    with Server((host, port), Handler) as server:
+    def bound(port: int, *others: int) -> Server:
+        try:
+            return Server((host, port), Handler)
+        except OSError:
+            if not others:
+                raise
+            return bound(*others)
+
+    with bound(*ports) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         try:
             yield server.server_address[1]
