@@ -1,5 +1,3 @@
-"""`hapticlink advise`."""
-
 from __future__ import annotations
 
 import os

@@ -1,5 +1,3 @@
-"""`hapticlink run`."""
-
 from __future__ import annotations
 
 import sys

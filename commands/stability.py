@@ -1,5 +1,3 @@
-"""`hapticlink stability`."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence

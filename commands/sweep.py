@@ -1,5 +1,3 @@
-"""`hapticlink sweep`."""
-
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,3 @@
-"""`hapticlink transparency`."""
-
 from __future__ import annotations
 
 from typing import Annotated

@@ -1,5 +1,3 @@
-"""`hapticlink view`."""
-
 from __future__ import annotations
 
 import os

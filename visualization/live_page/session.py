@@ -78,7 +78,7 @@ class Session:
         ended, which raises Fault."""
         scene = self._scene
         drawing = (scene.linkage, by_user(scene.device, scene.devices), scene.contacts)
-        self._link.send({"type": "opening", "title": scene.title, "picture": drawing})
+        self._say("opening", title=scene.title, picture=drawing)
         with self._before:  # it ends where the first run begins
             took = self._before.enter_context(measured(f"{scene.title}: FMUs of its page"))
             Building(self._link, took)
@@ -136,13 +136,12 @@ class Session:
 
     def _refuse(self, message: messages.Message, fault: InputFault) -> None:
         """Say why; a hold that only a run that begins with it can have begins anew with it."""
-        self._link.send({"type": "refused", "why": str(fault)})
+        self._say("refused", why=str(fault))
         assert self._controls
         if isinstance(message, messages.Set) and self._controls.begins_with(message):
             connection, hold = message.key.removeprefix("holds."), message.value
             self._scene = open_scene.load(self._scene, {f'holds."{connection}"': hold})
-            why = f"{hold} begins at t = 0: it runs in Python"
-            self._link.send({"type": "refused", "why": why})
+            self._say("refused", why=f"{hold} begins at t = 0: it runs in Python")
             self._anew(self._state["recording"] and "again")
 
     def _start(self, live: LiveRun) -> None:
@@ -201,11 +200,13 @@ class Session:
 
     def _tell_controls(self) -> None:
         assert self._controls
-        self._link.send({"type": "controls", "controls": self._controls.described()})
+        self._say("controls", controls=self._controls.described())
         parameters = self._controls.parameters() | self._held
-        settings = {"settings": self._settings, "parameters": parameters}
-        self._link.send({"type": "settings", "scene": self._packed} | settings)
+        self._say("settings", scene=self._packed, settings=self._settings, parameters=parameters)
 
     def _tell(self, **state: Any) -> None:
         self._state |= state
-        self._link.send({"type": "state"} | self._state)
+        self._say("state", **self._state)
+
+    def _say(self, kind: str, **content: Any) -> None:
+        self._link.send({"type": kind} | content)

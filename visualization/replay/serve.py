@@ -9,15 +9,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socket import AF_INET, AF_INET6
 
-from hapticlink.visualization.browser_code.one_file import POLICY
-
-HEADERS = {
-    "Content-Type": "text/html; charset=utf-8",
-    "Content-Security-Policy": f"{POLICY}; frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-store",
-}
+from hapticlink.visualization.browser_code.one_file import POLICY, headers
 
 
 @contextmanager
@@ -34,7 +26,8 @@ def served(html: str, host: str, ports: Sequence[int], token: str) -> Iterator[i
                 self.send_error(HTTPStatus.NOT_FOUND)
                 return
             self.send_response(HTTPStatus.OK)
-            for name, value in {**HEADERS, "Content-Length": str(len(body))}.items():
+            content = {"Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(body))}
+            for name, value in {**headers(POLICY), **content}.items():
                 self.send_header(name, value)
             self.end_headers()
             self.wfile.write(body)
