@@ -11,7 +11,7 @@ from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results.folders import names
 from hapticlink.orchestrator.results.tables import Results, load
-from hapticlink.visualization.compare import numbers, overlay, page, settings, text
+from hapticlink.visualization.compare import numbers, overlay, page, settings
 from hapticlink.visualization.compare.numbers import Row
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Comparison:
 
     def __str__(self) -> str:
         note = [self.note] if self.note else []
-        return "\n".join([*note, *text.lines(list(self.runs), self.tables)])
+        return "\n".join([*note, *numbers.as_text(list(self.runs), self.tables)])
 
     def __repr__(self) -> str:
         return f"comparison of {', '.join(self.runs)}"

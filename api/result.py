@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import Tracking, pose_error, table_of
-from hapticlink.api.frame import frame
-from hapticlink.orchestrator.base.errors import unknown
+from hapticlink.fmus.versions import install_command
+from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 if TYPE_CHECKING:
@@ -109,3 +109,14 @@ class Run(Results):
         lines += [self.fault] if self.fault else []
         lines += [f"{rate}: {shorten(repr(t), 88)}" for rate, t in self.tables.items()]
         return "\n  ".join([*lines, f"folder: {self.folder or 'none, in memory'}"])
+
+
+def frame(columns: Mapping[str, Any], index: str | None = None) -> pd.DataFrame:
+    """A frame of `columns` whose index is the column `index`. Raises InputFault if pandas is not
+    installed."""
+    try:
+        import pandas as pd
+    except ImportError:
+        raise InputFault(f"frame() needs pandas: {install_command('pandas')}") from None
+    made = pd.DataFrame(dict(columns))
+    return made.set_index(index) if index else made

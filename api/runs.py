@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -89,25 +90,20 @@ def run_paced(
     remote: Servers = NOWHERE,
 ) -> Run:
     """As `run`; without `out` and `tables` the results have no tables."""
+    simulated = partial(simulate, scene, progress=progress, real_time=real_time, remote=remote)
     if out is None:
-        ended = _in_memory(scene, progress, real_time, tables, remote)
+        ended = _in_memory(simulated, tables)
     else:
         with folder_lock.held(Path(out)):
-            ended = _in_folder(scene, Path(out), progress, figures, real_time, remote)
+            ended = _in_folder(simulated, Path(out), figures)
     if interrupt.came() or ended.record.end.reason == "interrupted":
         raise RunInterrupted(ended)
     return ended
 
 
-def _in_memory(
-    scene: Scene,
-    progress: Callable[[float], None] | None,
-    real_time: RealTimeRun | None,
-    tables: bool,
-    remote: Servers,
-) -> Run:
+def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
     with temporary_folders.room() as folder:
-        ended = simulate(scene, folder, (), progress, csv=False, real_time=real_time, remote=remote)
+        ended = simulated(folder, csv=False)
         if not tables:
             return Run(None, ended.run, {})
         results = read_tables(folder, binary=True) if ended.outcome.published else ended.results
@@ -126,17 +122,8 @@ def _run(folder: Path | None, run: dict[str, Any], results: Results, measures: M
     return Run(folder, run, results.tables, numbers=numbers)
 
 
-def _in_folder(
-    scene: Scene,
-    folder: Path,
-    progress: Callable[[float], None] | None,
-    figures: bool,
-    real_time: RealTimeRun | None,
-    remote: Servers,
-) -> Run:
-    ended = simulate(
-        scene, folder, (), progress, real_time=real_time, keep_rows=True, remote=remote
-    )
+def _in_folder(simulated: Callable[..., Experiment], folder: Path, figures: bool) -> Run:
+    ended = simulated(folder, keep_rows=True)
     try:
         return _found(folder, ended, figures)
     finally:
@@ -156,7 +143,11 @@ def _found(folder: Path, ended: Experiment, figures: bool) -> Run:
         if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
             run = folders.add(folder, _explained(ended))
             if figures:
-                run = folders.add(folder, _drawn(ended, results))
+                from hapticlink.visualization.figures import (
+                    run_figures,  # with casadi, slow to load
+                )
+
+                run = folders.add(folder, figure_axes.write(run_figures.pngs(results), folder))
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None
@@ -174,13 +165,6 @@ def _explained(ended: Experiment) -> list[str]:
             interrupt.check()
             file.write(f"{line}\n")
     return ["plan.txt"]
-
-
-def _drawn(ended: Experiment, results: Results) -> list[str]:
-    """Writes the figures; returns their names. Raises Interrupted and OSError."""
-    from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
-
-    return figure_axes.write(run_figures.pngs(results), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

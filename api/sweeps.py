@@ -15,7 +15,7 @@ from hapticlink.analysis.sweep import grid, job, row, table
 from hapticlink.analysis.sweep.grid import Runs, Vary, points
 from hapticlink.analysis.sweep.run_sweep import Unfinished
 from hapticlink.analysis.sweep.run_sweep import sweep as make
-from hapticlink.api.frame import frame
+from hapticlink.api.result import frame
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault, unknown
 from hapticlink.orchestrator.results import folders

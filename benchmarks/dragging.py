@@ -43,9 +43,9 @@ NOTE = """() => {
 """Notes the times, and returns the operational point on the screen (px) and px to a metre."""
 
 CHANGES = {
-    "rate": ("[data-control=rate]", 12),
+    "rate": ("[data-control='graphics.rate']", 12),
     "hold": ("select[data-control]", "foh"),
-    "gain": ("[data-control='controller.K_pc']", 0.1),
+    "gain": ("[data-control='gains.controller.K_pc']", 0.1),
 }
 """By name, the control and its new value."""
 JUDGED = """([selector, value]) => new Promise((resolve) => {

@@ -1,5 +1,3 @@
-"""`hapticlink advise`."""
-
 from __future__ import annotations
 
 import os
@@ -8,16 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands import progress
-from hapticlink.commands.options import (
-    UNCHANGED,
-    Changes,
-    Json,
-    Out,
-    Quiet,
-    Scene,
-    default_folder,
-    print_result,
-)
+from hapticlink.commands.options import PRINTED, UNCHANGED, Changes, Output, Scene, title
 from hapticlink.commands.sweep import Jobs
 
 Draws = Annotated[int, Parameter(help="Hands and rates around the scene's own.")]
@@ -28,13 +17,11 @@ def advise(
     scene: Scene,
     /,
     *,
-    out: Out = None,
     changes: Changes = UNCHANGED,
     draws: Draws = 8,
     seed: Seed = 0,
     jobs: Jobs = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    output: Output = PRINTED,
 ) -> int:
     """Find the hold and the gains that suit a scene: all are run on it, and the best few in draws
     around it.
@@ -51,19 +38,12 @@ def advise(
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
 
-    folder = folders.ensure(out or changes.folder("advice", scene))
-    name, processes = default_folder("advice", scene).name, jobs or os.cpu_count() or 1
-    with progress.runs(f"{name}: methods on it and around it", quiet) as show:
+    folder = folders.ensure(output.out or changes.folder("advice", scene))
+    processes = jobs or os.cpu_count() or 1
+    with progress.runs(f"{title(scene)}: methods on it and around it", output.quiet) as tell:
         advice = find(
-            scene,
-            changes.options,
-            folder,
-            processes=processes,
-            count=draws,
-            seed=seed,
-            tell=show,
+            scene, changes.options, folder, processes=processes, count=draws, seed=seed, tell=tell
         )
     write_json(folder / "advice.json", advice.record())
-    lines = (f"{name}:", *(f"  {line}" for line in advice.lines()), f"  {folder}/")
-    print_result(lines, advice.record(), quiet, json)
+    output.show(f"{title(scene)}:", (*advice.lines(), f"{folder}/"), advice.record())
     return 0

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from hapticlink.commands import checkout
 from hapticlink.commands.options import Out
-from hapticlink.commands.progress import timed
+from hapticlink.commands.progress import bar, timed
 from hapticlink.orchestrator.base import interrupt
 
 Benchmark = Literal[
@@ -63,9 +63,6 @@ def bench(
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     results = checkout.folder("bench") / "results"
     if what is None:
         status = checkout.function("bench", "benchmarks.code_version:status")
@@ -75,14 +72,13 @@ def bench(
     page = results / PAGES.get(what, f"{what}/README.md")
     page = (out or page.parent) / page.name
     page.parent.mkdir(parents=True, exist_ok=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     command = f"hapticlink bench {what}{' --quick' * quick}"
-    with timed(command), Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(what)
+    with timed(command), bar(what) as show:
 
         def report(text: str, done: int, total: int) -> None:
             interrupt.check()
-            bar.update(task, description=text, completed=done, total=total)
+            if show:
+                show(done, total, text)
 
         page.write_text(make(page.parent, quick, report, command), encoding="utf-8")
     if out is None and not quick:

@@ -1,5 +1,3 @@
-"""`hapticlink build`."""
-
 from __future__ import annotations
 
 from typing import Annotated

@@ -1,5 +1,3 @@
-"""`hapticlink compare`."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -7,7 +7,9 @@ these functions; they import what they need when they are called.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import is_dataclass
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,22 +27,19 @@ def scenes(context: CompletionContext | None = None) -> dict[str, str]:
 
 def keys(context: CompletionContext | None = None) -> list[str]:
     """Dotted keys of a scene, each followed by `=`."""
-    from hapticlink.commands.json_schema import json_schema
     from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # a scene names them too
+    from hapticlink.orchestrator.scene.scene import Scene
 
-    schema = json_schema()
-    return [f"{key}=" for key in dict.fromkeys(_leaves(schema, schema["$defs"], ""))]
+    return [f"{key}=" for key in dict.fromkeys(_leaves(Scene, ""))]
 
 
-def _leaves(node: dict[str, Any], defined: dict[str, Any], prefix: str) -> Iterator[str]:
-    """Dotted keys of an object of a JSON schema; arrays and tables of free keys are leaves."""
-    if "$ref" in node:
-        node = defined[node["$ref"].rsplit("/", 1)[1]]
-    if inner := node.get("properties"):
-        for name, each in inner.items():
-            yield from _leaves(each, defined, f"{prefix}.{name}" if prefix else name)
-    elif choices := node.get("anyOf") or node.get("oneOf"):
-        for choice in choices:
-            yield from _leaves(choice, defined, prefix)
-    else:
-        yield prefix
+def _leaves(record: Any, prefix: str) -> Iterator[str]:
+    """Dotted keys of a record; arrays and tables of free keys are leaves."""
+    from hapticlink.orchestrator.scene import schema
+
+    for key, hint in schema.hints(record).items():
+        for kind in schema.branches(hint):
+            if is_dataclass(kind):
+                yield from _leaves(kind, f"{prefix}{key}.")
+            elif kind is not NoneType:
+                yield f"{prefix}{key}"

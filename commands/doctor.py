@@ -1,5 +1,3 @@
-"""`hapticlink doctor`."""
-
 from __future__ import annotations
 
 import os

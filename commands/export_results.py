@@ -1,5 +1,3 @@
-"""`hapticlink export-results`."""
-
 from __future__ import annotations
 
 from pathlib import Path

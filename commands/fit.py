@@ -1,5 +1,3 @@
-"""`hapticlink fit`."""
-
 from __future__ import annotations
 
 from pathlib import Path
@@ -7,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import Json, Out, Quiet, Set, default_folder, print_result
+from hapticlink.commands.options import PRINTED, Output, Set, default_folder
 from hapticlink.commands.progress import waiting
 
 Log = Annotated[Path, Parameter(help="CSV or HDF5 file, or the folder of a run.")]
@@ -24,10 +22,8 @@ def fit(
     *,
     scene: OfScene = "closed-loop",
     device: Fitted = None,
-    out: Out = None,
     set: Set = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    output: Output = PRINTED,
 ) -> int:
     """Fit a device, and the arm that holds it, to a log of its encoders and forces.
 
@@ -45,11 +41,11 @@ def fit(
     from hapticlink.orchestrator.results.files import write_json
 
     names = tuple(device.split(",")) if device else FITTED
-    with waiting(f"{log.name}: fitting, which takes seconds for each second of it", quiet):
+    with waiting(f"{log.name}: fitting, which takes seconds for each second of it", output.quiet):
         result = fitted(log, scene, tuple(set or ()), device=names)
-    folder = folders.ensure(out or default_folder("fits", log.stem))
+    folder = folders.ensure(output.out or default_folder("fits", log.stem))
     write_json(folder / "fit.json", result.record())
     (folder / "fitted.toml").write_text(result.scene(), encoding="utf-8")
     lines = (*result.lines(), f"{folder}/: fitted.toml, fit.json")
-    print_result((f"{log.name}:", *(f"  {line}" for line in lines)), result.record(), quiet, json)
+    output.show(f"{log.name}:", lines, result.record())
     return 0

@@ -1,5 +1,3 @@
-"""`hapticlink info`."""
-
 from __future__ import annotations
 
 from dataclasses import asdict

@@ -1,5 +1,3 @@
-"""`hapticlink new`."""
-
 from __future__ import annotations
 
 from importlib.resources import files

@@ -23,34 +23,26 @@ Scene = Annotated[
         completer=completion.scenes,
     ),
 ]
+
+
+def repeatable(help: str, **more: Any) -> Parameter:
+    """An option that is given once for each of its values."""
+    return Parameter(consume_multiple=False, negative="", help=f"{help}; repeatable.", **more)
+
+
 Set = Annotated[
     list[str] | None,
-    Parameter(
-        name="--set",
-        consume_multiple=False,
-        negative="",
-        help="key=value, a dotted key of the scene file; repeatable.",
-        completer=completion.keys,
-    ),
+    repeatable("key=value, a dotted key of the scene file", completer=completion.keys),
 ]
 Swap = Annotated[
     list[str] | None,
-    Parameter(
-        name="--swap",
-        consume_multiple=False,
-        negative="",
-        help="block=file.fmu, an FMU that replaces a block of the haptic loop, or block=mujoco; "
-        "repeatable.",
-    ),
+    repeatable("block=file.fmu, an FMU that replaces a block of the haptic loop, or block=mujoco"),
 ]
 Map = Annotated[
     list[str] | None,
-    Parameter(
-        name="--map",
-        consume_multiple=False,
-        negative="",
-        help="port=variable,... of an FMU of --swap whose variables have other names; with several "
-        "FMUs block.port=...; repeatable.",
+    repeatable(
+        "port=variable,... of an FMU of --swap whose variables have other names; with several "
+        "FMUs block.port=..."
     ),
 ]
 Out = Annotated[Path | None, Parameter(help="Folder to write to.")]
@@ -58,10 +50,7 @@ Quiet = Annotated[
     bool, Parameter(negative="", help="Print warnings and errors only, on standard error.")
 ]
 Json = Annotated[
-    bool,
-    Parameter(
-        name="--json", negative="", help="Print the result as one JSON document and nothing else."
-    ),
+    bool, Parameter(negative="", help="Print the result as one JSON document and nothing else.")
 ]
 
 
@@ -90,6 +79,23 @@ class Changes:
 
 
 UNCHANGED = Changes()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Output:
+    """Where a command writes, and what it prints."""
+
+    out: Out = None
+    quiet: Quiet = False
+    json: Json = False
+
+    def show(self, head: str, lines: Iterable[str], record: Mapping[str, Any]) -> None:
+        """Print a result: its first line, then the others, indented; as `print_result`."""
+        print_result((head, *(f"  {line}" for line in lines)), record, self.quiet, self.json)
+
+
+PRINTED = Output()
 
 
 def _swap(given: str) -> str:
@@ -123,6 +129,12 @@ LONGEST = 100
 """Characters of options in the name of a folder."""
 
 
+def title(scene: str) -> str:
+    """What messages and folders call a scene, by its name or path."""
+    known = scene.endswith((".toml", ".ssp"))
+    return Path(scene).stem if known else Path(scene).name
+
+
 def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
     """The default output folder for a scene's name or path: `<root>/<scene>`, and with options
     `<root>/<scene>,key=value,...`, so that a run does not replace one of other options.
@@ -130,8 +142,7 @@ def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:
     Quotes, brackets and spaces behind commas are left out; where options hold other characters that
     are not for file names, or many, the name ends with the start of their sha256.
     """
-    known = scene.endswith((".toml", ".ssp"))
-    name = Path(scene).stem if known else Path(scene).name
+    name = title(scene)
     given = re.sub(r"['\"\[\]]|(?<=,) +", "", ",".join(options))
     if given:
         plain = re.sub(r"[^\w.=,+-]", "_", given)[:LONGEST]

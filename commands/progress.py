@@ -17,7 +17,7 @@ SHORT = 2.0
 @contextmanager
 def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
     """Gives a function to be called with the numbers of finished and of all runs."""
-    with _bar(title, hidden) as show:
+    with bar(title, hidden) as show:
         yield lambda done, of: show(done, of, f"{done} of {of} runs") if show else None
 
 
@@ -32,7 +32,7 @@ def runs(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None
 def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int], None]]:
     """Gives a function to be called with what is done, and the numbers of finished and of all
     steps. Where stderr is no terminal, a line tells at the start how long it took before."""
-    with measured(title) as took, _bar(title, hidden) as show:
+    with measured(title) as took, bar(title, hidden) as show:
         if not (hidden or show):
             _tell(title, took)
         yield lambda what, done, of: show(done, of, what) if show else None
@@ -43,7 +43,7 @@ def progress(
     title: str, duration: float, hidden: bool = False
 ) -> Iterator[Callable[[float], None] | None]:
     """Gives a function to be called with the simulated time (s); None if stderr is no terminal."""
-    with _bar(title, hidden) as show:
+    with bar(title, hidden) as show:
         yield (
             (lambda time: show(time, duration, f"{time:.2f} of {duration:g} s")) if show else None
         )
@@ -92,7 +92,9 @@ def _tell(what: str, took: float | None) -> None:
 
 
 @contextmanager
-def _bar(title: str, hidden: bool) -> Iterator[Callable[[float, float, str], None] | None]:
+def bar(title: str, hidden: bool = False) -> Iterator[Callable[[float, float, str], None] | None]:
+    """Gives a function to be called with what is finished, with all, and with a text; None where
+    nothing is shown."""
     if hidden or not sys.stderr.isatty():
         yield None
         return
@@ -101,10 +103,10 @@ def _bar(title: str, hidden: bool) -> Iterator[Callable[[float, float, str], Non
 
     said = TextColumn("{task.description}", markup=False)
     columns = (said, BarColumn(), TextColumn("{task.fields[at]}"))
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task(printable(title), total=None, at="building")
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as shown:
+        task = shown.add_task(printable(title), total=None, at="building")
 
         def show(completed: float, total: float, at: str) -> None:
-            bar.update(task, completed=completed, total=total, at=at)
+            shown.update(task, completed=completed, total=total, at=at)
 
         yield show

@@ -1,5 +1,3 @@
-"""`hapticlink recover`."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""`hapticlink reproduce`."""
-
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,3 @@
-"""`hapticlink run`."""
-
 from __future__ import annotations
 
 import sys
@@ -10,14 +8,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands.options import (
+    PRINTED,
     UNCHANGED,
     Changes,
-    Json,
-    Out,
-    Quiet,
+    Output,
     Scene,
-    default_folder,
     print_result,
+    repeatable,
+    title,
 )
 from hapticlink.commands.progress import progress
 from hapticlink.orchestrator.base.errors import Fault, InputFault
@@ -26,12 +24,9 @@ from hapticlink.orchestrator.base.terminal_output import say
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 SetFile = Annotated[
     list[Path] | None,
-    Parameter(
-        name="--set-file",
-        consume_multiple=False,
-        negative="",
-        help="Parameter set (.ssv) for the FMUs of an SSP, or the [[fmu]] of a scene, by name; "
-        "repeatable. --set takes precedence.",
+    repeatable(
+        "Parameter set (.ssv) for the FMUs of an SSP, or the [[fmu]] of a scene, by name, over "
+        "which --set takes precedence"
     ),
 ]
 Explain = Annotated[
@@ -47,12 +42,9 @@ RealTime = Annotated[
 
 Remote = Annotated[
     list[str] | None,
-    Parameter(
-        name="--remote",
-        consume_multiple=False,
-        negative="",
-        help="part=HOST:PORT, an FMU, or all FMUs at a rate such as graphics, that `hapticlink "
-        "serve` serves there; repeatable.",
+    repeatable(
+        "part=HOST:PORT, an FMU, or all FMUs at a rate such as graphics, that `hapticlink serve` "
+        "serves there"
     ),
 ]
 Key = Annotated[Path | None, Parameter(help="File of the key of --remote, as of `serve`.")]
@@ -66,7 +58,6 @@ def run(
     scene: Scene,
     /,
     *,
-    out: Out = None,
     changes: Changes = UNCHANGED,
     set_file: SetFile = None,
     figures: Figures = True,
@@ -75,8 +66,7 @@ def run(
     remote: Remote = None,
     key: Key = None,
     arrivals: Arrivals = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    output: Output = PRINTED,
 ) -> int:
     """Run a scene; write CSV files, run.json, plan.txt and figures to OUT (default
     `runs/SCENE`, with options `runs/SCENE,key=value,...`).
@@ -102,10 +92,10 @@ def run(
     if explain:
         say(*hl.explain(scene, changes.options), sep="\n")
         return 0
-    folder = out or changes.folder("runs", scene)
+    folder = output.out or changes.folder("runs", scene)
     try:
         read = hl.scene(scene, changes.options)
-        with progress(read.title, read.duration, hidden=quiet) as report:
+        with progress(read.title, read.duration, hidden=output.quiet) as report:
             result = hl.run(
                 read,
                 out=folder,
@@ -120,13 +110,13 @@ def run(
         result = ended.run
     if result.fault:
         say(f"hapticlink: {result.fault}", file=sys.stderr)
-    lines = [*summary.printed(result, default_folder("runs", scene).name, result.numbers)]
-    if quiet or json:
+    lines = [*summary.printed(result, title(scene), result.numbers)]
+    if output.quiet or output.json:
         for line in summary.warnings(result):
             say(f"hapticlink: {line}", file=sys.stderr)
     if not result.folder:
         lines.append(f"  {folder}/: nothing written, the run failed before the first sample")
-    print_result(lines, result.run, quiet, json)
+    print_result(lines, result.run, output.quiet, output.json)
     return Fault.exit_status if result.fault else 0
 
 

@@ -1,5 +1,3 @@
-"""`hapticlink schema`."""
-
 from __future__ import annotations
 
 from typing import Annotated

@@ -1,5 +1,3 @@
-"""`hapticlink serve`."""
-
 from __future__ import annotations
 
 import sys

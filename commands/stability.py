@@ -1,24 +1,16 @@
-"""`hapticlink stability`."""
-
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from hapticlink.commands import stability_map
-from hapticlink.commands.options import (
-    UNCHANGED,
-    Changes,
-    Json,
-    Out,
-    Quiet,
-    Scene,
-    default_folder,
-    print_result,
-)
-from hapticlink.commands.progress import steps, waiting
+from hapticlink.commands.options import PRINTED, UNCHANGED, Changes, Output, Scene, title
+from hapticlink.commands.progress import counted, steps, timed, waiting
 from hapticlink.commands.sweep import Jobs, Vary
+
+if TYPE_CHECKING:
+    from hapticlink.analysis.maps.stability_map import Map
 
 Equilibrium = Annotated[
     bool,
@@ -51,7 +43,6 @@ def stability(
     scene: Scene,
     /,
     *,
-    out: Out = None,
     changes: Changes = UNCHANGED,
     poses: Poses = 3,
     grid: Grid = 0,
@@ -63,8 +54,7 @@ def stability(
     check: Check = 0,
     seed: Seed = 0,
     jobs: Jobs = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    output: Output = PRINTED,
 ) -> int:
     """Analyse whether a scene shakes: in poses that it visits, in hands from soft to firm.
 
@@ -83,15 +73,23 @@ def stability(
         hapticlink stability virtual-wall --port
         hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
     """
-    given = changes.options
-    name = default_folder("runs", scene).name
-    if vary:
-        folder = out or changes.folder("maps", scene)
-        lines, record = stability_map.made(scene, folder, given, vary, check, seed, jobs, quiet)
-        first, *rest = lines
-        print_result((f"{name}: {first}", *rest), record, quiet, json)
-        return 0
     import hapticlink as hl
+
+    given, name, quiet = changes.options, title(scene), output.quiet
+    if vary:
+        folder = output.out or changes.folder("maps", scene)
+        command = f"hapticlink stability {scene} --vary {' --vary '.join(vary)}"
+        with timed(command, hidden=quiet), counted(scene, hidden=quiet) as count:
+            points = hl.stability_map(
+                scene, vary, given, out=folder, check=check, seed=seed, jobs=jobs, progress=count
+            )
+        verdicts = [row["verdict"] for row in points.of("grid")]
+        counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+        keys = [text.partition("=")[0] for text in vary]
+        lines = [*_of_map(points, keys), f"{folder}/: map.csv, map.png"]
+        found: dict[str, Any] = {"folder": str(folder), "rows": points.rows}
+        output.show(f"{name}: {len(verdicts)} points, {counts}", lines, found)
+        return 0
     from hapticlink.analysis.stability.modes import Bounds
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.files import write_json
@@ -100,7 +98,7 @@ def stability(
     if port:  # first, as what it refuses is known within seconds
         with waiting(f"{name}: the user's port", quiet):
             passivity = hl.passivity(scene, given)
-    folder, bounds = out or changes.folder("runs", scene), Bounds(*drift)
+    folder, bounds = output.out or changes.folder("runs", scene), Bounds(*drift)
     with steps(f"{name}: stability", hidden=quiet) as progress:
         judged: hl.Stability | hl.VaryingStability
         if equilibrium:
@@ -119,7 +117,20 @@ def stability(
 
         figure_axes.save({"stability": stability_figure.draw(judged)}, folders.ensure(folder))
     write_json(folders.ensure(folder) / "stability.json", record)
-    report = (*lines, f"{folder}/stability.json")
-    first = f"{name}: {judged.finding}"
-    print_result((first, *(f"  {line}" for line in report)), record, quiet, json)
+    output.show(f"{name}: {judged.finding}", (*lines, f"{folder}/stability.json"), record)
     return 0
+
+
+def _of_map(points: Map, keys: Sequence[str]) -> Iterator[str]:
+    """Lines on the boundary, on what was refused, and on the runs that have checked a map."""
+    yield f"{len(points.of('boundary'))} points of the boundary"
+    reasons = [row["message"] for row in points.of("grid") if row["verdict"] == "refused"]
+    yield from (f"refused, the first one: {reason}" for reason in reasons[:1])
+    runs = points.of("check")
+    differing = [row for row in runs if not row.get("agree")]
+    if runs:
+        yield f"{len(runs) - len(differing)} of {len(runs)} runs agree with the map"
+    for row in differing:
+        point = ", ".join(f"{key}={row[key]}" for key in keys)
+        run = row.get("run_verdict", "without a verdict")
+        yield f"they differ at {point}: map {row['verdict']}, run {run}"

@@ -1,5 +1,3 @@
-"""`hapticlink study`."""
-
 from __future__ import annotations
 
 import os

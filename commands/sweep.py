@@ -1,5 +1,3 @@
-"""`hapticlink sweep`."""
-
 from __future__ import annotations
 
 import sys
@@ -9,13 +7,12 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands import progress
-from hapticlink.commands.options import Json, Out, Quiet, Scene, Set, default_folder, print_result
+from hapticlink.commands.options import PRINTED, Output, Scene, Set, default_folder, title
 from hapticlink.orchestrator.base.terminal_output import say
 
 Vary = Annotated[
     list[str] | None,
     Parameter(
-        name="--vary",
         consume_multiple=False,
         negative="",
         help="key=values, repeatable: every combination is run. Values are separated by commas; "
@@ -42,13 +39,11 @@ def sweep(
     *,
     vary: Vary = None,
     runs: Runs = None,
-    out: Out = None,
     set: Set = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     metric: Metric = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    output: Output = PRINTED,
 ) -> int:
     """Run many variants of a scene in parallel; write table.csv and sweep.png to OUT (default
     sweeps/SCENE).
@@ -66,9 +61,8 @@ def sweep(
     from hapticlink.analysis.sweep.row import REFUSED
     from hapticlink.orchestrator.base.errors import InputFault
 
-    name = default_folder("sweeps", scene).name
-    folder = out or default_folder("sweeps", scene)
-    with progress.runs(f"{name}: sweep", quiet) as count:
+    folder = output.out or default_folder("sweeps", scene)
+    with progress.runs(f"{title(scene)}: sweep", output.quiet) as count:
         result = hl.sweep(
             scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
             scheduler=scheduler, metric=metric, progress=count,
@@ -77,8 +71,8 @@ def sweep(
         what = ", ".join(f"{k}={v}" for k, v in row.items() if k in result.keys)
         say(f"hapticlink: {what}: {row['end']}: {row['message']}", file=sys.stderr)
     runs_done, failed = len(result.rows), len(result.failed)
-    lines = (f"{name}: {result}", f"  {folder}/: {', '.join(result.files)}")
-    print_result(lines, {"folder": str(folder), "rows": result.rows}, quiet, json)
+    record = {"folder": str(folder), "rows": result.rows}
+    output.show(f"{title(scene)}: {result}", [f"{folder}/: {', '.join(result.files)}"], record)
     if failed < runs_done:
         return 0
     return InputFault.exit_status if all(r["end"] == REFUSED for r in result.rows) else 1

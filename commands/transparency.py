@@ -1,21 +1,10 @@
-"""`hapticlink transparency`."""
-
 from __future__ import annotations
 
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import (
-    UNCHANGED,
-    Changes,
-    Json,
-    Out,
-    Quiet,
-    Scene,
-    default_folder,
-    print_result,
-)
+from hapticlink.commands.options import PRINTED, UNCHANGED, Changes, Output, Scene, title
 from hapticlink.commands.progress import waiting
 from hapticlink.orchestrator.base.terminal_output import say
 
@@ -29,12 +18,10 @@ def transparency(
     scene: Scene,
     /,
     *,
-    out: Out = None,
     changes: Changes = UNCHANGED,
     poses: Poses = 2,
     costs: Costs = False,
-    quiet: Quiet = False,
-    json: Json = False,
+    output: Output = PRINTED,
 ) -> int:
     """Compare what the hand meets at the handle with the mechanism that it should meet.
 
@@ -53,11 +40,11 @@ def transparency(
     from hapticlink.visualization import figure_axes
     from hapticlink.visualization.figures import transparency_figure
 
-    given, name = changes.options, default_folder("runs", scene).name
-    with waiting(f"{name}: equilibria and linearisations, which can take a minute", quiet):
+    given, what = changes.options, "equilibria and linearisations, which can take a minute"
+    with waiting(f"{title(scene)}: {what}", output.quiet):
         in_poses = analysis.transparency(scene, given, count=poses)
         beside = analysis.costs(scene, given, say) if costs else []
-    folder = folders.ensure(out or changes.folder("runs", scene))
+    folder = folders.ensure(output.out or changes.folder("runs", scene))
     record = {
         "title": in_poses[0].title,
         "poses": [pose.record() for pose in in_poses],
@@ -67,7 +54,5 @@ def transparency(
     figure_axes.save({"transparency": transparency_figure.draw(in_poses)}, folder)
     lines = [line for pose in in_poses for line in pose.lines()]
     lines += analysis.cost_lines(beside) if beside else []
-    print_result(
-        (f"{name}:", *(f"  {line}" for line in lines), f"  {folder}/"), record, quiet, json
-    )
+    output.show(f"{title(scene)}:", (*lines, f"{folder}/"), record)
     return 0

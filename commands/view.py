@@ -1,25 +1,34 @@
-"""`hapticlink view`."""
-
 from __future__ import annotations
 
+import os
 import secrets
-from contextlib import suppress
+import sys
+import time
+import webbrowser
+from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
-from hapticlink.commands import completion, page_address
+from hapticlink.commands import completion
 from hapticlink.commands.options import UNCHANGED, Changes, Out, default_folder
 from hapticlink.commands.progress import waiting
 from hapticlink.fmus.versions import install_command
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 
 if TYPE_CHECKING:
     from hapticlink.visualization.live_page.server_pipe import Link
 
+PORT = 8512
+"""Of a page, where no other is asked for."""
+SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
+"""Variables of the environment that a screen sets, where it is neither Windows nor macOS."""
+WAIT = 0.1
+"""Time (s) between two looks for Ctrl-C."""
 Host = Annotated[
     str,
     Parameter(help="Address to serve on; any other than this one admits whoever knows the URL."),
@@ -86,11 +95,7 @@ def view(
             )
         if standalone:
             raise InputFault(f"--standalone: {scene} is the folder of a run; give a scene")
-        from hapticlink.commands import replay_command
-
-        return replay_command.replay(
-            [scene, *([second] if second else [])], host, port, browser, export
-        )
+        return _replay([scene, *([second] if second else [])], host, port, browser, export)
     if second or export:
         given = second or f"--export {export}"
         raise InputFault(
@@ -108,7 +113,7 @@ def view(
 
         read = viewed(scene, changes.options)  # while the server starts
         served_port = _port(link, host, port)
-        page_address.show(read.title, host, served_port, token, browser)
+        _show(read.title, host, served_port, token, browser)
         say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
         import hapticlink as hl
         from hapticlink.visualization.live_page.session import Session
@@ -136,6 +141,34 @@ def _written(name: str, changes: Changes, path: Path) -> int:
     return 0
 
 
+def _replay(
+    folders: list[str], host: str, port: int | None, browser: bool, export: Path | None
+) -> int:
+    """Replay recorded runs on a page until Ctrl-C, or write them to a file."""
+    from hapticlink.visualization.replay import replay_page, serve
+    from hapticlink.visualization.replay.recorded_frames import Recorded
+
+    if export:
+        replay_page.require_written(export)
+    runs = [Recorded(folder) for folder in folders]
+    if export:
+        replay_page.write(runs, export)
+        say(f"{export}: {export.stat().st_size / 1e3:.0f} kB")
+        return 0
+    html, token = replay_page.html(runs), secrets.token_urlsafe(16)
+    with ExitStack() as pages, suppress(Interrupted):
+        try:
+            at = pages.enter_context(serve.served(html, host, _ports(port), token))
+        except OSError as error:
+            raise InputFault(_refused(host, port, error)) from None
+        _show(" beside ".join(folders), host, at, token, browser)
+        say("  a replay, with a time slider; Ctrl-C ends it")
+        while True:
+            interrupt.check()
+            time.sleep(WAIT)
+    return 0
+
+
 def _is_scene(name: str) -> bool:
     """Whether a folder's name is that of a shipped scene, and the folder has no run."""
     import hapticlink as hl
@@ -149,8 +182,7 @@ def _server(host: str, port: int | None, *arguments: str) -> Link:
         raise InputFault(f"the page needs the package websockets: {install_command('view')}")
     from hapticlink.visualization.live_page.server_pipe import Link
 
-    ports = (page_address.PORT, 0) if port is None else (port,)
-    return Link("hapticlink.visualization.live_page.server", host, ports, *arguments)
+    return Link("hapticlink.visualization.live_page.server", host, _ports(port), *arguments)
 
 
 def _port(link: Link, host: str, port: int | None) -> int:
@@ -158,5 +190,27 @@ def _port(link: Link, host: str, port: int | None) -> int:
     if (first := link.first()) is None:
         raise Fault("the page's server does not start")
     if "error" in first:
-        raise InputFault(page_address.refused(host, port, first["error"]))
+        raise InputFault(_refused(host, port, first["error"]))
     return int(first["port"])
+
+
+def _ports(port: int | None) -> tuple[int, ...]:
+    """Those of which the first free one is taken; 0 is any."""
+    return (PORT, 0) if port is None else (port,)
+
+
+def _show(title: str, host: str, port: int, token: str, browser: bool) -> None:
+    """Say the page's address, and open it in a browser that would open a window of its own, and not
+    take over the terminal."""
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}/{token}/"
+    say(f"{title}: {url}")
+    sys.stdout.flush()
+    screen = sys.platform in ("win32", "darwin") or any(map(os.environ.get, SCREENS))
+    if browser and screen:
+        webbrowser.open(url)
+
+
+def _refused(host: str, port: int | None, why: object) -> str:
+    """That the address cannot be served on."""
+    asked = f"--host {host}" if port is None else f"--host {host} --port {port}"
+    return f"{asked}: {why}: choose another"

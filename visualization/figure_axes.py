@@ -60,6 +60,12 @@ def _letters() -> frozenset[int]:
     return frozenset(code for file in files for code in font_manager.get_font(file).get_charmap())
 
 
+def headline(on: Any, text: str, width: int, **where: float) -> None:
+    """Writes the finding of a figure or of its axes above it, in lines of `width` letters."""
+    write = getattr(on, "suptitle", None) or on.set_title
+    write(plain(fill(text, width)), fontsize="medium", **where)
+
+
 def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     """A figure whose title tells where a run ended early, and its axes: one, or one below the other
     for several labels y."""
@@ -78,8 +84,7 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     for axes, label in zip(every, y, strict=True):
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
-    # At a fixed height.
-    every[0].set_title(plain(fill(title, 70)), fontsize="medium", y=1.0, pad=12)
+    headline(every[0], title, 70, y=1.0, pad=12)  # at a fixed height
     every[-1].set_xlabel(x)
     if x == "time (s)":
         for axes in every:

@@ -39,12 +39,12 @@ class Page:
         self._kind, self._draw = kind, draw
         self.left, self.wrong, self.alive = ASKED[kind], "", True
         self._awaited: tuple[str, ...] = ("controls",)
-        self._controls: dict[str, Any] = {}
+        self._controls: list[dict[str, Any]] = []
         self._since = time.monotonic()
 
     def send(self, message: dict[str, Any], frame: bool = False) -> None:
         if message["type"] == "controls":
-            self._controls = message
+            self._controls = message["controls"]
         if message["type"] in self._awaited:
             self._awaited, self._since = (), time.monotonic()
 
@@ -62,24 +62,24 @@ class Page:
         return [asked]
 
     def _asked(self) -> messages.Message:
-        draw, holds = self._draw, self._controls["holds"]
-        held = draw.choice(holds)
-        hold = messages.Hold("hold", held["connection"], draw.choice(held["choices"]))
+        draw = self._draw
+        held = draw.choice([control for control in self._controls if "choices" in control])
+        hold = messages.Set("set", held["key"], draw.choice(held["choices"]))
         reset = messages.Time("time", "reset")
         if self._kind != "anything":
             return reset if self._kind == "resets" else hold
-        gain = draw.choice(self._controls["gains"])["name"]
-        return draw.choice(
-            (
-                reset,
-                hold,
-                messages.Delay("delay", held["connection"], draw.choice((0.0, 0.001, 0.01))),
-                messages.Rate("rate", draw.uniform(10.0, 60.0)),
-                messages.Jitter("jitter", draw.uniform(0.0, 0.5)),
-                messages.Gain("gain", gain, draw.uniform(0.5, 2.0)),
-                messages.Topology("topology", draw.random() < 0.5),
-            )
-        )
+        keys = [control["key"] for control in self._controls]
+        values = {
+            draw.choice([k for k in keys if k.startswith("delays.")]): draw.choice(
+                (0.0, 1e-3, 1e-2)
+            ),
+            "graphics.rate": draw.uniform(10.0, 60.0),
+            "jitter": draw.uniform(0.0, 0.5),
+            draw.choice([k for k in keys if k.startswith("gains.")]): draw.uniform(0.5, 2.0),
+            "controller.topology": draw.random() < 0.5,
+        }
+        sets = [messages.Set("set", key, value) for key, value in values.items()]
+        return draw.choice((reset, hold, *sets))
 
 
 def _left_behind() -> tuple[int, int, int]:

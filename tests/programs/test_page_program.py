@@ -40,17 +40,17 @@ from tests.visualization.browser_code.javascript import javascript
 P_C = "virtual_environment.P_c -> controller.P_c"
 CHANGES: list[tuple[int, dict[str, Any]]] = [
     (10, {"type": "hand", "at": [0.06, -0.01]}),
-    (40, {"type": "rate", "value": 10.0}),
-    (90, {"type": "hold", "connection": P_C, "hold": "foh"}),
-    (150, {"type": "rate", "value": 77.0}),
-    (170, {"type": "delay", "connection": P_C, "value": 0.0205}),
-    (260, {"type": "hold", "connection": P_C, "hold": "smooth"}),
-    (300, {"type": "gain", "name": "controller.k_j", "factor": 3.0}),
-    (330, {"type": "delay", "connection": P_C, "value": 0.0}),
-    (350, {"type": "topology", "on": False}),
-    (400, {"type": "rate", "value": 200.0}),
+    (40, {"type": "set", "key": "graphics.rate", "value": 10.0}),
+    (90, {"type": "set", "key": f"holds.{P_C}", "value": "foh"}),
+    (150, {"type": "set", "key": "graphics.rate", "value": 77.0}),
+    (170, {"type": "set", "key": f"delays.{P_C}", "value": 0.0205}),
+    (260, {"type": "set", "key": f"holds.{P_C}", "value": "smooth"}),
+    (300, {"type": "set", "key": "gains.controller.k_j", "value": 3.0}),
+    (330, {"type": "set", "key": f"delays.{P_C}", "value": 0.0}),
+    (350, {"type": "set", "key": "controller.topology", "value": False}),
+    (400, {"type": "set", "key": "graphics.rate", "value": 200.0}),
     (420, {"type": "hand", "at": None}),
-    (430, {"type": "rate", "value": 30.0}),
+    (430, {"type": "set", "key": "graphics.rate", "value": 30.0}),
 ]
 """After so many haptic events."""
 EVENTS = 512
@@ -122,18 +122,16 @@ def apply(live: LiveRun, message: dict[str, Any]) -> None:
         case {"type": "hand", "at": at}:
             live.set("hand.target", (*at, 0.0))
             live.set("hand.stiffness", STIFFNESS)
-        case {"type": "rate", "value": rate}:
+        case {"key": "graphics.rate", "value": rate}:
             own = live.scene.graphics and live.scene.graphics.rate
             live.rate("graphics", None if rate == own else rate)
-        case {"type": "hold", "hold": hold}:
-            live.hold(P_C, hold)
-        case {"type": "delay", "value": delay}:
-            live.hold(P_C, None, delay)
-        case {"type": "gain"}:
+        case {"key": "gains.controller.k_j"}:
             live.set("controller.k_j", 600.0)
-        case {"type": "topology"}:
+        case {"key": "controller.topology"}:
             live.set("controller.k_j", 0.0)
             live.set("controller.b_j", 0.0)
+        case {"key": key, "value": value}:
+            live.hold(P_C, *((value,) if key.startswith("holds.") else (None, value)))
 
 
 @pytest.mark.parametrize("options", [(), ("graphics.rate=32", "coupling=jacobi")])

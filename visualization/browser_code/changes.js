@@ -1,15 +1,8 @@
-// Every setting of the controls: its key in an address, its value, and the message that sets it.
-const settings = ({ rate, topology, holds, gains }) => [
-  ...(rate?.value ? [{ key: "graphics.rate", value: rate.value, message: { type: "rate", value: rate.value } }] : []),
-  ...(rate ? [{ key: "jitter", value: rate.jitter, message: { type: "jitter", value: rate.jitter } }] : []),
-  ...(topology === null ? [] : [{ key: "controller.topology", value: topology, message: { type: "topology", on: topology } }]),
-  ...holds.map(({ connection, hold }) => ({ key: `holds.${connection}`, value: hold, message: { type: "hold", connection, hold } })),
-  ...holds.map(({ connection, delay }) => ({ key: `delays.${connection}`, value: delay, message: { type: "delay", connection, value: delay } })),
-  ...gains.map(({ name, factor }) => ({ key: `gains.${name}`, value: factor, message: { type: "gain", name, factor } })),
-];
-
-// The settings of controls that differ from those of others.
+// The controls with other values than `others`, of those that both have; what a scene varies by itself has the value null.
 export function changes(controls, others) {
-  const values = Object.fromEntries(settings(others).map(({ key, value }) => [key, value]));
-  return settings(controls).filter(({ key, value }) => value !== values[key]);
+  const values = new Map(others.map(({ key, value }) => [key, value]));
+  return controls.filter(({ key, value }) => value !== null && values.has(key) && value !== values.get(key));
 }
+
+// The message that gives a control a value.
+export const set = (key, value) => ({ type: "set", key, value });

@@ -37,6 +37,16 @@ def page(name: str, texts: Mapping[str, str], policy: str = POLICY) -> str:
     )
 
 
+def headers(policy: str) -> dict[str, str]:
+    """The headers with which a page is served that nobody may frame, keep or be sent on from."""
+    return {
+        "Content-Security-Policy": f"{policy}; frame-ancestors 'none'",
+        "Referrer-Policy": "no-referrer",
+        "X-Content-Type-Options": "nosniff",
+        "Cache-Control": "no-store",
+    }
+
+
 def as_json(data: Any) -> str:
     """Text that an element can have: "<" could end it, or begin a comment in it."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)

@@ -57,14 +57,14 @@ const HANDLERS = {
   },
   controls(message) {
     const begins = !start;
-    start ??= message;
+    start ??= message.controls;
     if (begins) offer();
     shown = message;
     acts_on_b &&= Boolean(message.b);
     $("acts").textContent = `Controls act on ${acts_on_b ? "B" : "A"}`;
     $("acts").hidden = !message.b;
     $("compare").ariaPressed = Boolean(message.b);
-    controls.show(acts_on_b ? message.b : message);
+    controls.show(acting());
     if (begins) follow();
     else note_address();
   },
@@ -159,7 +159,10 @@ function offer() {
 // Marks the preset that was pressed, until something else is changed.
 function choose(preset) { for (const button of $("presets").children) button.ariaPressed = button === preset; }
 
-function restore() { choose(null); restored(acts_on_b ? shown.b : shown, start).forEach(change); }
+// The controls of the run on which they act.
+const acting = () => (acts_on_b ? shown.b : shown).controls;
+
+function restore() { choose(null); restored(acting(), start).forEach(change); }
 
 // Does what the page's address asks for, of run A and, where it has settings of B, of both.
 function follow() {
@@ -177,8 +180,8 @@ function follow() {
 function note_address() {
   clearTimeout(later);
   later = setTimeout(() => {
-    const b = shown.b ? differing(shown.b, start).map(([key, value]) => [`b.${key}`, value]) : [];
-    address = written([...differing(shown, start), ...b]);
+    const b = shown.b ? differing(shown.b.controls, start).map(([key, value]) => [`b.${key}`, value]) : [];
+    address = written([...differing(shown.controls, start), ...b]);
     if (address !== location.hash.slice(1)) location.replace(`#${address}`);
   }, 300);
 }
@@ -212,7 +215,7 @@ function label(state) {
 
 // Run B, which is drawn over A, and how its controls differ.
 function second() {
-  const other = shown.b ? differing(shown.b, shown).map((pair) => pair.join(" ")) : [];
+  const other = shown.b ? differing(shown.b.controls, shown.controls).map((pair) => pair.join(" ")) : [];
   return `B, in orange: ${other.join(", ") || "as A; let the controls act on B and change something"}`;
 }
 

@@ -2,24 +2,25 @@
 
 import { loudness } from "./loudness.js";
 
-// What a page has changed, as a run that begins anew gets it again.
-export const settings = () => ({ rate: null, jitter: 0, holds: {}, delays: {}, gains: {}, topology: true });
+const RATE = "graphics.rate", RENDERED = "controller.topology";
+// The key of what is set at once: a rate with its jitter, a hold with its delay.
+const together = (key) => (key === "jitter" ? RATE : key.replace(/^delays\./, "holds."));
 
 // There are no files for what the C library would write to.
 const WASI = new Proxy({}, { get: () => () => 8 });
 
 export class Program {
-  // `data` describes the scene (visualization/standalone/description.py).
-  constructor(module, data, changed = settings()) {
+  // `data` describes the scene (visualization/standalone/description.py); `changed` is what a page has set, by key of the
+  // control, as a run that begins anew gets it again.
+  constructor(module, data, changed = {}) {
     this.c = new WebAssembly.Instance(module, { wasi_snapshot_preview1: WASI }).exports;
     this.c._initialize();
     this.data = data;
     this.changed = changed;
+    this.start = Object.fromEntries(data.controls.map((control) => [control.key, control]));
     this.m = this.c.create();
     this.pulling = new Map();
-    if (changed.rate || changed.jitter) this.rate();
-    for (const name of new Set([...Object.keys(changed.holds), ...Object.keys(changed.delays)])) this.hold(name);
-    for (const { name } of data.controls.gains) this.gain(name);
+    for (const key of new Set(Object.keys(changed).map(together))) this.act(key);
     this.require(this.c.begin_run(this.m));
   }
 
@@ -43,19 +44,20 @@ export class Program {
   // --- what is changed: as visualization/live_page/controls.py does it --------------------------------
 
   apply(message) {
-    const { changed } = this;
-    switch (message.type) {
-      case "hand": return this.pull(message.user ?? "", message.at);
-      case "rate": changed.rate = message.value === this.data.controls.rate.value ? null : message.value; return this.rate();
-      case "jitter": changed.jitter = message.value; return this.rate();
-      case "hold": changed.holds[message.connection] = message.hold; return this.hold(message.connection);
-      case "delay": changed.delays[message.connection] = message.value; return this.hold(message.connection);
-      case "gain": changed.gains[message.name] = message.factor; return this.gain(message.name);
-      case "topology":
-        changed.topology = message.on;
-        return this.data.topology.forEach((name) => this.gain(name));
-    }
-    throw new Error(`there is no message ${message.type}`);
+    const { type, key, value } = message;
+    if (type === "hand") return this.pull(message.user ?? "", message.at);
+    if (type !== "set") throw new Error(`there is no message ${type}`);
+    if (!(key in this.start)) throw new Error(`there is no control ${key}`);
+    this.changed[key] = value;
+    this.act(together(key));
+  }
+
+  // Carries out what is set of a control.
+  act(key) {
+    const [kind] = key.split("."), name = key.slice(kind.length + 1);
+    if (key === RATE) this.rate();
+    else if (kind === "holds") this.hold(name);
+    else for (const gain of key === RENDERED ? this.data.topology : [name]) this.gain(gain);
   }
 
   set(name, values) {
@@ -63,26 +65,26 @@ export class Program {
   }
 
   gain(name) {
-    const { value } = this.data.controls.gains.find((gain) => gain.name === name);
-    const off = this.data.topology.includes(name) && !this.changed.topology;
+    const off = this.data.topology.includes(name) && !(this.changed[RENDERED] ?? true);
     const user = Object.keys(this.data.hands).find((each) => this.data.hands[each].stiffness === name);
     if (user !== undefined && !this.pulling.get(user)) return; // it acts while the hand pulls
-    const factor = off ? 0 : this.changed.gains[name] ?? 1;
-    this.set(name, value.map((v) => v * factor));
+    const factor = off ? 0 : this.changed[`gains.${name}`] ?? 1;
+    this.set(name, this.start[`gains.${name}`].start.map((v) => v * factor));
   }
 
   rate() {
-    const { rate, jitter } = this.changed, own = this.data.controls.rate.value;
+    const { changed } = this, own = this.start[RATE].value;
+    if (changed[RATE] === own) delete changed[RATE];
+    const { [RATE]: rate, jitter = 0 } = changed;
     if (!rate && !own) throw new Error("the rate varies in this scene: set the rate first");
     this.c.rate(this.m, rate ?? (jitter ? own : 0), jitter);
   }
 
   hold(name) {
-    const { choices, controls } = this.data;
-    const wanted = this.changed.holds[name] ?? controls.holds.find((hold) => hold.connection === name).hold;
-    const choice = choices.findIndex((each) => each.connection === name && each.hold === wanted);
+    const wanted = this.changed[`holds.${name}`] ?? this.start[`holds.${name}`].value;
+    const choice = this.data.choices.findIndex((each) => each.connection === name && each.hold === wanted);
     if (choice < 0) throw new Error(`there is no hold ${wanted} of ${name} in this file`);
-    const delay = this.changed.delays[name];
+    const delay = this.changed[`delays.${name}`];
     this.require(this.c.hold(this.m, choice, delay === undefined ? -1 : Math.round(1e6 * delay)));
   }
 
@@ -98,13 +100,7 @@ export class Program {
 
   // The controls with their values, as messages have them.
   get controls() {
-    const { controls } = this.data, { rate, jitter, holds, delays, gains, topology } = this.changed;
-    return {
-      rate: controls.rate && { ...controls.rate, value: rate ?? controls.rate.value, jitter },
-      holds: controls.holds.map((h) => ({ ...h, hold: holds[h.connection] ?? h.hold, delay: delays[h.connection] ?? 0 })),
-      gains: controls.gains.map((gain) => ({ ...gain, factor: gains[gain.name] ?? 1 })),
-      topology: controls.topology === null ? null : topology,
-    };
+    return this.data.controls.map((control) => ({ ...control, value: this.changed[control.key] ?? control.value }));
   }
 
   // --- what is shown ------------------------------------------------------------------------------

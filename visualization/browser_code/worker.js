@@ -1,11 +1,11 @@
 // The worker of a page that needs nothing else: runs the scene beside the clock, once or with two settings beside each
 // other, and answers the page's messages as the server does.
-import { Program, settings } from "./program.js";
+import { Program } from "./program.js";
 
 const BEHIND = 0.1; // s, by which a run may be late before time is moved
 const LONGEST = 600; // s, of a recording
 let module, data, runs = [], origin = 0, missed = 0, rows = null, heard = null;
-const changed = [settings()]; // of run A, and of B where there are two
+const changed = [{}]; // of run A, and of B where there are two
 const state = { type: "state", paused: false, recording: null, ended: null };
 const seconds = () => performance.now() / 1e3;
 
@@ -21,7 +21,7 @@ function begin() {
 
 function tell() {
   const [a, b] = runs.map((run) => run.controls);
-  postMessage({ type: "controls", ...a, b });
+  postMessage({ type: "controls", controls: a, b: b && { controls: b } });
   postMessage(state);
   const is_changed = JSON.stringify(a) !== JSON.stringify(data.controls);
   postMessage(is_changed ? { ...data.map, verdict: "", said: "computed for the settings of the start alone" } : data.map);

@@ -3,7 +3,7 @@ performance, energies, stability, timing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.orchestrator.base.signal_names import POINT_POSE
+from hapticlink.orchestrator.base.terminal_output import aligned
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare.settings import one_mechanism
@@ -52,6 +53,18 @@ def _rows(runs: Iterable[Numbers]) -> list[Row]:
     by_run = [dict(numbers) for numbers in runs]
     labels = dict.fromkeys(label for numbers in by_run for label in numbers)
     return [Row(label, tuple(run.get(label, NONE) for run in by_run)) for label in labels]
+
+
+def as_text(names: Sequence[str], tables: Mapping[str, Sequence[Row]]) -> Iterator[str]:
+    """The rows in which the runs differ, and how many there are in which they do not."""
+    for title, rows in tables.items():
+        if differing := [row for row in rows if len({*row.values}) > 1]:
+            yield title
+            table = [("", *names), *((row.label, *row.values) for row in differing)]
+            yield from (f"  {line}" for line in aligned(table))
+            yield ""
+    same = sum(len({*row.values}) == 1 for rows in tables.values() for row in rows)
+    yield f"{same} rows are the same for all: `hapticlink report` has them"
 
 
 def _ran(run: Results) -> Numbers:

@@ -21,26 +21,24 @@ Curve = tuple[NDArray[Any], ...]
 
 def curve(results: Results, of: Callable[[Results], Curve]) -> Curve:
     """What a function gives of each window, one after the other."""
-    parts = [_thinned(of(window), results.number) for window in results.windows()]
-    return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
+    return _joined([_thinned(of(window), results.number) for window in results.windows()])
 
 
 def port_curve(results: Results) -> UserPort | None:
     """The energy at the user's port, as a curve."""
-    parts = [_thinned_port(port, results.number) for port in ports(results) if port]
-    if not parts:
+    parts, last = list[Curve](), None
+    for port in filter(None, ports(results)):
+        parts.append(_thinned((*port[:3], *port.blocks_J.values()), results.number))
+        last = port
+    if last is None:
         return None
-    *_, last = parts
-    blocks = {name: np.concatenate([p.blocks_J[name] for p in parts]) for name in last.blocks_J}
-    time, hands, generated = (np.concatenate([port[i] for port in parts]) for i in range(3))
-    return UserPort(time, hands, generated, blocks, last.works, last.hand_work_J)
+    time, hands, generated, *blocks = _joined(parts)
+    by_name = dict(zip(last.blocks_J, blocks, strict=True))
+    return UserPort(time, hands, generated, by_name, last.works, last.hand_work_J)
 
 
-def _thinned_port(port: UserPort, windows: int) -> UserPort:
-    curves = *port[:3], *port.blocks_J.values()
-    time, hands, generated, *blocks = _thinned(curves, windows)
-    by_name = dict(zip(port.blocks_J, blocks, strict=True))
-    return UserPort(time, hands, generated, by_name, port.works, port.hand_work_J)
+def _joined(parts: Sequence[Curve]) -> Curve:
+    return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
 
 
 def _thinned(curve: Curve, windows: int) -> Curve:

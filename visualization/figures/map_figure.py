@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from hapticlink.analysis.maps import wall_closed_form
 from hapticlink.analysis.sweep.row import Row
-from hapticlink.visualization.figure_axes import plain
-from hapticlink.visualization.figures.sweep_labels import axis
+from hapticlink.visualization.figure_axes import headline, plain
+from hapticlink.visualization.figures.sweep_figure import axis
 
 if TYPE_CHECKING:
     from hapticlink.analysis.maps.stability_map import Map
@@ -61,7 +61,7 @@ def draw(made: Map) -> Figure:
         found_handles, labels = axes.get_legend_handles_labels()
         handles.update(zip(labels, found_handles, strict=True))
     shown = list(handles.values()), list(handles)
-    figure.suptitle(fill(_finding(made), int(11 * figure.get_figwidth())), fontsize="medium")
+    headline(figure, _finding(made), int(11 * figure.get_figwidth()))
     figure.legend(*shown, loc="outside lower center", ncols=4, fontsize="small")
     return figure
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hapticlink.analysis.stability.stability_verdict import Stability
-from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.figure_axes import headline, plain
 
 COLOURS = {"stable": "tab:green", "marginal": "0.6", "unstable": "tab:red", "drift": "tab:orange"}
 
@@ -33,6 +33,5 @@ def draw(found: Stability) -> Figure:
     axes.tick_params(length=0)
     axes.set_xlabel("pose, by the time of the scene's run")
     axes.set_ylabel("hand")
-    title = f"{found.title}: {found.finding}"
-    figure.suptitle(plain(fill(title, 24 + 20 * len(poses))), fontsize="medium")
+    headline(figure, f"{found.title}: {found.finding}", 24 + 20 * len(poses))
     return figure

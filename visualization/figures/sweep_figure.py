@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,10 +17,10 @@ from hapticlink.analysis.sweep.table import columns
 from hapticlink.fmus.cache import sha, sources
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base.errors import InputFault, unknown
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.visualization.figure_axes import plain
-from hapticlink.visualization.figures.sweep_labels import axis, title
+from hapticlink.visualization.figure_axes import headline, plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,6 +38,8 @@ NAMES = {
     "end_time_s": "end of the run (s)",
     "run_time_s": "run time (s)",
 }
+UNITS = {"rate": "Hz", "duration": "s", "phase": "s", "mass": "kg", "inertia": "kg m2"}
+"""Units of the keys that are varied most often, by the last part of the key."""
 FEW = 8
 """Number of lines that differ in colour; further ones also differ in dash pattern."""
 GOOD = ("duration",)
@@ -86,8 +87,8 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
     best = min((r for r in rows if _shown(r, metric)), key=lambda r: r[metric], default=None)
     if best:
         lost = sum(not _shown(r, metric) for r in rows)
-        text = title(best, best[metric], _named(metric), keys, lost, len(rows))
-        axes.set_title(plain(fill(text, 80)), fontsize="medium")
+        text = finding(best, best[metric], _named(metric), keys, lost, len(rows))
+        headline(axes, text, 80)
     return figure
 
 
@@ -124,6 +125,28 @@ def _named(metric: str) -> str:
     """Its label: energies are drawn in mJ."""
     name, unit, rest = metric.partition("_J")
     return NAMES.get(metric, f"{name}{rest} (mJ)" if unit else metric)
+
+
+def unit(key: str) -> str:
+    """The unit of a scene's key; "" if it has none or is not in `UNITS`."""
+    return UNITS.get(key.rpartition(".")[2], "")
+
+
+def axis(key: str) -> str:
+    """A key with its unit, `graphics.rate (Hz)`."""
+    return f"{key} ({unit(key)})" if unit(key) else key
+
+
+def finding(
+    best: Row, value: float, quantity: str, keys: Sequence[str], ended: int, of: int
+) -> str:
+    """A title with the smallest value of a quantity such as `RMS tracking error (mm)`, the point of
+    the row `best` that has it, and how many of the `of` runs ended early or failed."""
+    name, _, measured = quantity.partition(" (")
+    where = ", ".join(f"{k} = {best.get(k, 'as in the scene')} {unit(k)}".rstrip() for k in keys)
+    text = f"{name[:1].upper()}{name[1:]} down to {short(value)} {measured.rstrip(')')}".rstrip()
+    few = f"; {ended} of {of} runs ended early or failed" if ended else ""
+    return f"{text} at {where}{few}"
 
 
 def _label(row: Row, keys: Iterable[str]) -> str:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import fill
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from hapticlink.analysis.transparency.mobility_at_hand import FORCE, HERTZ, Transparency
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.figure_axes import headline
 
 
 def draw(found: Sequence[Transparency]) -> Figure:
@@ -38,7 +37,7 @@ def draw(found: Sequence[Transparency]) -> Figure:
         axes.set_ylabel("felt stiffness of the constraint (N/m)")
     for axes in (felt, error, *third):
         axes.set_xlabel("frequency (Hz)")
-    figure.suptitle(plain(fill(f"{found[0].title}: {_finding(found)}", 90)), fontsize="medium")
+    headline(figure, f"{found[0].title}: {_finding(found)}", 90)
     return figure
 
 

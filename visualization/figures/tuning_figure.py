@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from hapticlink.analysis.tune.felt_stiffness import HERTZ
 from hapticlink.analysis.tune.tuning_result import Tuned
-from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.figure_axes import headline
 
 COLOURS = {"constraint": "tab:blue", "contact": "tab:orange"}
 NAMES = {"scene": "the scene's gains", "tuned": "tuned"}
@@ -22,8 +22,7 @@ def draw(tuned: Tuned) -> Figure:
     left, right = figure.subplots(1, 2)
     _felt(left, tuned)
     _margins(right, tuned)
-    title = plain(fill(f"{tuned.title}: {tuned.finding}", 100))
-    figure.suptitle(title, fontsize="medium")
+    headline(figure, f"{tuned.title}: {tuned.finding}", 100)
     return figure
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,16 +26,12 @@ CLOCK = "graphics"
 """The clock whose rate the page changes."""
 
 
-@dataclass
-class Settings:
-    """What was changed on the page, which a run that begins anew gets again."""
-
-    rate: float | None = None
-    jitter: float = 0.0
-    holds: dict[str, str] = field(default_factory=dict)
-    delays: dict[str, float] = field(default_factory=dict)
-    gains: dict[str, float] = field(default_factory=dict)
-    topology: bool = True
+RATE, JITTER, RENDERED = "graphics.rate", "jitter", "controller.topology"
+"""Keys of the controls of the rate (Hz), of the share of its period by which each may be shorter or
+longer, and of whether constrained directions are rendered. Further ones, by connection and
+parameter: `holds.NAME`, `delays.NAME` (s) and `gains.NAME`, a factor on the scene's value."""
+Settings = dict[str, Any]
+"""What was changed on the page, by key, which a run that begins anew gets again."""
 
 
 class Offered:
@@ -55,27 +50,29 @@ class Offered:
         haptics = system.timeline
         self._most = float(1 / (haptics.clocks[0].longest * haptics.base))
 
-    def described(self, s: Settings) -> dict[str, Any]:
-        """The controls with their ranges and values, as JSON has it."""
-        fixed = float(self.rate) if isinstance(self.rate, int | float) else None
-        return {
-            "rate": None
-            if self.rate is None
-            else {"value": s.rate or fixed, "max": self._most, "jitter": s.jitter}
-            | {"of": _titled(self._of)},
-            "holds": [
-                {"connection": name, "words": _titled(labels.connection(name))}
-                | {"hold": s.holds.get(name, choices[0]), "choices": choices}
-                | {"delay": s.delays.get(name, 0.0)}
-                for name, choices in self.holds.items()
-            ],
-            "gains": [
-                {"name": name, "value": value.tolist(), "units": units}
-                | {"factor": s.gains.get(name, 1.0)}
-                for name, (value, units) in self.gains.items()
-            ],
-            "topology": s.topology if self.topology else None,
-        }
+    @property
+    def own_rate(self) -> float | None:
+        """The rate (Hz) of the scene, None where it varies."""
+        return float(self.rate) if isinstance(self.rate, int | float) else None
+
+    def described(self, settings: Settings) -> list[dict[str, Any]]:
+        """The controls by `key`, each with its value and what bounds it, as JSON has it."""
+        controls: list[dict[str, Any]] = []
+        if self.rate is not None:
+            rate = {"key": RATE, "value": self.own_rate, "max": self._most}
+            controls += [rate | {"words": _titled(self._of)}, {"key": JITTER, "value": 0.0}]
+        if self.topology:
+            controls.append({"key": RENDERED, "value": True})
+        for name, choices in self.holds.items():
+            words = _titled(labels.connection(name))
+            controls += [
+                {"key": f"holds.{name}", "value": choices[0], "words": words, "choices": choices},
+                {"key": f"delays.{name}", "value": 0.0, "words": words},
+            ]
+        for name, (value, units) in self.gains.items():
+            start = {"start": value.tolist(), "units": units}
+            controls.append({"key": f"gains.{name}", "value": 1.0} | start)
+        return [c | {"value": settings.get(c["key"], c["value"])} for c in controls]
 
     @property
     def topology(self) -> list[str]:

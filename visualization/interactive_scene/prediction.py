@@ -25,7 +25,7 @@ from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.live_changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
-from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.offered_controls import JITTER, RATE, Settings
 from hapticlink.visualization.interactive_scene.viewed_scene import DAMPING, STIFFNESS
 
 MAX_COST = {"native": 2e8, "python": 1e7}
@@ -80,24 +80,24 @@ def _verdict(cases: Sequence[Case], beside: str, so_far: bool = False) -> dict[s
 def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[tuple[Case, str]]:
     """The cases of the run, a hand each, and which friction of holds is taken out of them, in
     words. Raises InputFault where its computation would take long, and as `stability` does."""
-    if settings.jitter:
+    if settings.get(JITTER):
         raise InputFault("with jitter the system never repeats; set the jitter to 0")
     if scene.hand is None:
         raise InputFault("nobody holds the mechanism")
-    changed = _at_rate(scene, settings.rate)
+    changed = _at_rate(scene, settings.get(RATE))
     with (
         interrupt.held(),
         np.errstate(invalid="ignore", over="ignore"),
         built(scene) as whole,
     ):
         _require_quick(changed, whole)
-        s = settings
         system = replace(
             whole,
             timeline=timeline(changed),
             fmus=tuple(_with_parameters(fmu, parameters) for fmu in whole.fmus),
             connections=tuple(
-                held_by(c, s.holds.get(c.name), s.delays.get(c.name)) for c in whole.connections
+                held_by(c, settings.get(f"holds.{c.name}"), settings.get(f"delays.{c.name}"))
+                for c in whole.connections
             ),
         )
         hands = {MOUSE: SpringHand(stiffness=STIFFNESS, damping=DAMPING), **HANDS}

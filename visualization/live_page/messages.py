@@ -8,10 +8,14 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError
 
+from hapticlink.visualization.interactive_scene.offered_controls import RENDERED
+
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Coordinate = Annotated[Number, Field(ge=-1e3, le=1e3)]
 Name = Annotated[str, Field(max_length=200)]
+RANGES = {"graphics": (0.01, 1e4), "jitter": (0.0, 0.9), "delays": (0.0, 1.0), "gains": (0.0, 1e2)}
+"""Of the values of controls that are numbers, by the first part of their key."""
 MAX_CHARACTERS = 4096
 """Of a message."""
 
@@ -28,63 +32,25 @@ class Hand:
     """The point whose handle it is, "" for that of the first user."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Change:
-    """A change of the run, or of the second of two (`b`)."""
+@dataclass(frozen=True)
+class Set:
+    """A control of the run, or of the second of two (`b`), is given a value."""
 
     __pydantic_config__ = STRICT
+    type: Literal["set"]
+    key: Name
+    """As in `offered_controls`."""
+    value: Number | bool | Name
     b: bool = False
 
-
-@dataclass(frozen=True)
-class Rate(Change):
-    """The graphics rate (Hz)."""
-
-    type: Literal["rate"]
-    value: Annotated[Number, Field(ge=0.01, le=1e4)]
-
-
-@dataclass(frozen=True)
-class Jitter(Change):
-    """Share of the graphics period by which each may be shorter or longer."""
-
-    type: Literal["jitter"]
-    value: Annotated[Number, Field(ge=0, le=0.9)]
-
-
-@dataclass(frozen=True)
-class Hold(Change):
-    """Another hold of a connection."""
-
-    type: Literal["hold"]
-    connection: Name
-    hold: Name
-
-
-@dataclass(frozen=True)
-class Delay(Change):
-    """The latency (s) of a connection."""
-
-    type: Literal["delay"]
-    connection: Name
-    value: Annotated[Number, Field(ge=0, le=1)]
-
-
-@dataclass(frozen=True)
-class Gain(Change):
-    """A parameter as a multiple of its value in the scene."""
-
-    type: Literal["gain"]
-    name: Name
-    factor: Annotated[Number, Field(ge=0, le=100)]
-
-
-@dataclass(frozen=True)
-class Topology(Change):
-    """The topology controller, on or off."""
-
-    type: Literal["topology"]
-    on: bool
+    def __post_init__(self) -> None:
+        kind, value = self.key.partition(".")[0], self.value
+        if kind in RANGES:
+            low, high = RANGES[kind]
+            if not (isinstance(value, float) and low <= value <= high):
+                raise ValueError(f"{self.key} = {value!r}: give a number from {low:g} to {high:g}")
+        elif not isinstance(value, bool if self.key == RENDERED else str):
+            raise ValueError(f"{self.key} = {value!r}: is of another type")
 
 
 @dataclass(frozen=True)
@@ -107,9 +73,7 @@ class Compare:
     on: bool
 
 
-Message = Hand | Rate | Jitter | Hold | Delay | Gain | Topology | Time | Compare
-ADDRESSES = ("user", "connection", "name")
-"""Fields that name what a message of its type is about."""
+Message = Hand | Set | Time | Compare
 _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Discriminator("type")])
 
 
@@ -117,7 +81,7 @@ def newest(received: Sequence[Message]) -> list[Message]:
     """The messages without those that a later one replaces: the newest of each control and user."""
     by_control: dict[object, Message] = {}
     for i, message in enumerate(received):
-        of = next((v for k in ADDRESSES if (v := getattr(message, k, None)) is not None), "")
+        of = getattr(message, "key", getattr(message, "user", ""))
         key: object = i if isinstance(message, Time) else (message.type, of)
         by_control.pop(key, None)
         by_control[key] = message

@@ -15,7 +15,6 @@ import asyncio
 import json
 import logging
 import os
-import pickle
 import sys
 import threading
 from collections.abc import Sequence
@@ -28,9 +27,9 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from hapticlink.visualization.browser_code.one_file import PAGE
+from hapticlink.visualization.browser_code.one_file import PAGE, headers
 from hapticlink.visualization.live_page import messages
-from hapticlink.visualization.live_page.server_pipe import Link, read, to_caller
+from hapticlink.visualization.live_page.server_pipe import Link, read, to_caller, write
 from hapticlink.visualization.live_page.stability_process import StabilityProcess
 
 if TYPE_CHECKING:
@@ -46,12 +45,7 @@ WINDOWS = 16
 """Windows that are served at a time."""
 BEHIND = 1 << 18
 """Bytes that may wait for a window; while more do, it gets no frames."""
-HEADERS = {
-    "Content-Security-Policy": "default-src 'self'; connect-src 'self'; frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-store",
-}
+POLICY = "default-src 'self'; connect-src 'self'"
 
 
 class Pages:
@@ -185,11 +179,10 @@ class Pages:
 
     def _tell(self, message: messages.Message) -> None:
         """Tell the run that a change is of, or both of a hand and a button."""
-        of_second = isinstance(message, messages.Change) and message.b and self._second
+        of_second = isinstance(message, messages.Set) and message.b and self._second
         if not of_second:
-            pickle.dump(message, self._out)
-            self._out.flush()
-        if self._second and (of_second or not isinstance(message, messages.Change)):
+            write(self._out, message)
+        if self._second and (of_second or not isinstance(message, messages.Set)):
             self._second.send(message)
 
 
@@ -197,8 +190,8 @@ def _response(status: HTTPStatus, file: Path | None = None) -> Response:
     body = file.read_bytes() if file else f"{status.phrase}\n".encode()
     kind = TYPES[file.suffix] if file else "text/plain"
     content = {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body))}
-    headers = Headers({**HEADERS, **content, "Connection": "close"})
-    return Response(status.value, status.phrase, headers, body)
+    sent = Headers({**headers(POLICY), **content, "Connection": "close"})
+    return Response(status.value, status.phrase, sent, body)
 
 
 async def _bound(pages: Pages, host: str, ports: Sequence[int]) -> Server:
@@ -222,11 +215,8 @@ async def _served(
     try:
         server = await _bound(pages, host, ports)
     except OSError as error:
-        pickle.dump({"error": error.strerror or str(error)}, out)
-        out.flush()
-        return
-    pickle.dump({"port": server.sockets[0].getsockname()[1]}, out)
-    out.flush()
+        return write(out, {"error": error.strerror or str(error)})
+    write(out, {"port": server.sockets[0].getsockname()[1]})
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
 
     def failed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

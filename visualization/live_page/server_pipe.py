@@ -46,11 +46,9 @@ class Pipe:
 
     def close(self) -> None:
         """Send nothing more, which ends the other process."""
-        while True:
-            with suppress(queue.Empty):
+        with suppress(queue.Empty):
+            while True:
                 self._sent.get_nowait()
-                continue
-            break
         self._sent.put(None)
 
     def _receive(self) -> None:
@@ -112,6 +110,12 @@ def to_caller() -> IO[bytes]:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     return out
+
+
+def write(stream: IO[bytes], message: Any) -> None:
+    """Write a message to a stream, for `read`."""
+    pickle.dump(message, stream)
+    stream.flush()
 
 
 def read(stream: IO[bytes]) -> Any:

@@ -65,7 +65,7 @@ class Session:
     ) -> None:
         self._scene, self._link, self._root, self._real_time = scene, link, root, real_time
         self._controls: Controls | None = None
-        self._settings = settings or Settings()
+        self._settings = settings or {}
         self._shown = 0.0
         self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
         self.recordings: list[Path] = []
@@ -77,7 +77,7 @@ class Session:
         ended, which raises Fault."""
         scene = self._scene
         drawing = (scene.linkage, scene.all_devices, scene.contacts)
-        self._link.send({"type": "opening", "title": scene.title, "picture": drawing})
+        self._say("opening", title=scene.title, picture=drawing)
         with self._before:  # it ends where the first run begins
             took = self._before.enter_context(measured(f"{scene.title}: FMUs of its page"))
             Building(self._link, took)
@@ -120,6 +120,7 @@ class Session:
             if isinstance(message, messages.Time):
                 self._time(message.do)
                 continue
+            assert isinstance(message, messages.Hand | messages.Set)
             try:
                 self._controls.apply(message)
             except InputFault as fault:
@@ -134,14 +135,12 @@ class Session:
 
     def _refuse(self, message: messages.Message, fault: InputFault) -> None:
         """Say why; a hold that only a run that begins with it can have begins anew with it."""
-        self._link.send({"type": "refused", "why": str(fault)})
+        self._say("refused", why=str(fault))
         assert self._controls
-        if isinstance(message, messages.Hold) and self._controls.fits(message):
-            option = {f'holds."{message.connection}"': message.hold}
-            self._scene = open_scene.load(self._scene, option)
-            self._link.send(
-                {"type": "refused", "why": f"{message.hold} begins at t = 0: it runs in Python"}
-            )
+        if isinstance(message, messages.Set) and self._controls.begins_with(message):
+            connection, hold = message.key.removeprefix("holds."), message.value
+            self._scene = open_scene.load(self._scene, {f'holds."{connection}"': hold})
+            self._say("refused", why=f"{hold} begins at t = 0: it runs in Python")
             self._anew(self._state["recording"] and "again")
 
     def _start(self, live: LiveRun) -> None:
@@ -200,11 +199,13 @@ class Session:
 
     def _tell_controls(self) -> None:
         assert self._controls
-        self._link.send({"type": "controls"} | self._controls.described())
+        self._say("controls", controls=self._controls.described())
         parameters = self._controls.parameters() | self._held
-        settings = {"settings": self._settings, "parameters": parameters}
-        self._link.send({"type": "settings", "scene": self._packed} | settings)
+        self._say("settings", scene=self._packed, settings=self._settings, parameters=parameters)
 
     def _tell(self, **state: Any) -> None:
         self._state |= state
-        self._link.send({"type": "state"} | self._state)
+        self._say("state", **self._state)
+
+    def _say(self, kind: str, **content: Any) -> None:
+        self._link.send({"type": kind} | content)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import pickle
 import queue
 import signal
 import sys
@@ -20,7 +19,7 @@ from typing import Any
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Interrupted
-from hapticlink.visualization.live_page.server_pipe import Link, read, to_caller
+from hapticlink.visualization.live_page.server_pipe import Link, read, to_caller, write
 
 REST, LOOK = 0.3, 0.02
 """Times (s) for which nothing was changed before the verdict is computed, and between two looks for
@@ -95,13 +94,8 @@ def main() -> None:
         number, scene, *changes = questions.get()
         with suppress(Interrupted):
             for answer in verdicts(unpacked(scene), *changes):
-                _send(out, (number, answer))
-            _send(out, (number, None))
-
-
-def _send(out: Any, message: Any) -> None:
-    pickle.dump(message, out)
-    out.flush()
+                write(out, (number, answer))
+            write(out, (number, None))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ writes the names of bodies and joints beside them."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.figure_axes import headline, plain
 from hapticlink.visualization.mechanism import mark_places, workspace_drawing
 from hapticlink.visualization.mechanism.mark_places import MM, Frame, Points, place
 from hapticlink.visualization.mechanism.marks import (
@@ -102,7 +101,7 @@ def figure(scene: Scene, q: Coordinates) -> Figure:
     picture = Picture(scene.linkage, scene.all_devices, None)
     arms = (mark for mark in picture.marks if mark.role == "device")
     paint(axes, arms, picture.at_rest(q))
-    axes.set_title(plain(fill(f"{scene.title} at the start", 70)), fontsize="medium")
+    headline(axes, f"{scene.title} at the start", 70)
     axes.grid(alpha=0.3)
     drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")
     return drawn

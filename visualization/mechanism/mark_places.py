@@ -4,7 +4,7 @@ the tip of its arrow, for whatever paints them."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,15 @@ def points(mark: Mark, frame: Frame) -> Points | None:
     at = [found for each in mark.at if (found := place(frame, each)) is not None]
     if not at or (mark.when and mark.when not in frame.get("states", ())):
         return None
-    return LINES.get(mark.kind, _straight)(mark, np.array(at), frame)
+    found = np.array(at)
+    match mark.kind:
+        case "area":
+            return np.vstack([found, found[:1]])
+        case "rail":
+            return _rail(mark, found, frame)
+        case "spring":
+            return _spring(*found)
+    return found
 
 
 def shape(mark: Mark, frame: Frame) -> Points:
@@ -64,14 +72,6 @@ def _angle(pose: Sequence[float]) -> float:
     return pose[2] if len(pose) > 2 else 0.0
 
 
-def _straight(mark: Mark, at: Points, frame: Frame) -> Points:
-    return at
-
-
-def _closed(mark: Mark, at: Points, frame: Frame) -> Points:
-    return np.vstack([at, at[:1]])
-
-
 def _rail(mark: Mark, at: Points, frame: Frame) -> Points:
     pose = reach(frame, mark.at[-1].path)
     along = _turned(pose, (mark.size * MM, 0.0), mark.angle or 0.0)
@@ -79,18 +79,9 @@ def _rail(mark: Mark, at: Points, frame: Frame) -> Points:
     return at + np.array([-along, along])
 
 
-def _spring(mark: Mark, at: Points, frame: Frame) -> Points:
-    a, b = at
+def _spring(a: Points, b: Points) -> Points:
     along = b - a
     length = float(np.linalg.norm(along)) or 1.0
     across = np.array([-along[1], along[0]]) / length * min(0.04 * length, 6.0)
     waves = np.where(np.arange(13) % 2, 1.0, -1.0)[:, None] * across
     return np.vstack([a, a + np.linspace(0.2, 0.8, 13)[:, None] * along + waves, b])
-
-
-LINES: dict[str, Callable[[Mark, Points, Frame], Points]] = {
-    "area": _closed,
-    "rail": _rail,
-    "spring": _spring,
-}
-"""By kind of mark, where its line goes; that of all others is straight from place to place."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hapticlink.components.device.workspace import Field, links, margin, workspace
 from hapticlink.components.specs.device import Device
-from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.figure_axes import headline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +49,7 @@ def draw(device: Device, start: Pose, title: str) -> Figure:
     figure.legend(handles, labels, fontsize="small", ncols=3, loc="outside lower center")
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.set_aspect("equal", adjustable="datalim")  # a box would cut the title of a tall one
-    axes.set_title(plain(fill(title, 70)), fontsize="medium")
+    headline(axes, title, 70)
     axes.grid(alpha=0.3)
     return figure
 

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socket import AF_INET, AF_INET6
 
-from hapticlink.visualization.browser_code.one_file import POLICY
-
-HEADERS = {
-    "Content-Type": "text/html; charset=utf-8",
-    "Content-Security-Policy": f"{POLICY}; frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-store",
-}
+from hapticlink.visualization.browser_code.one_file import POLICY, headers
 
 
 @contextmanager
-def served(html: str, host: str, port: int, token: str) -> Iterator[int]:
-    """Serves `html` at /<token>/ within the context, which gets the port; 0 is a free one. Raises
-    OSError where it cannot be had."""
+def served(html: str, host: str, ports: Sequence[int], token: str) -> Iterator[int]:
+    """Serves `html` at /<token>/ within the context, which gets the first of the ports that is
+    free; 0 is any. Raises OSError where none is."""
     body, path = html.encode(), f"/{token}/"
 
     class Handler(BaseHTTPRequestHandler):
@@ -34,7 +26,8 @@ def served(html: str, host: str, port: int, token: str) -> Iterator[int]:
                 self.send_error(HTTPStatus.NOT_FOUND)
                 return
             self.send_response(HTTPStatus.OK)
-            for name, value in {**HEADERS, "Content-Length": str(len(body))}.items():
+            content = {"Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(body))}
+            for name, value in {**headers(POLICY), **content}.items():
                 self.send_header(name, value)
             self.end_headers()
             self.wfile.write(body)
@@ -52,7 +45,15 @@ def served(html: str, host: str, port: int, token: str) -> Iterator[int]:
         def handle_error(self, *of: object) -> None:
             pass  # a window that was closed while it loaded
 
-    with Server((host, port), Handler) as server:
+    def bound(port: int, *others: int) -> Server:
+        try:
+            return Server((host, port), Handler)
+        except OSError:
+            if not others:
+                raise
+            return bound(*others)
+
+    with bound(*ports) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         try:
             yield server.server_address[1]

@@ -15,7 +15,6 @@ from hapticlink.programs.resolve_scene import Resolved
 from hapticlink.visualization.interactive_scene import opening_message, scene_message
 from hapticlink.visualization.interactive_scene.offered_controls import (
     Offered,
-    Settings,
     stiffness,
     target,
     users,
@@ -53,7 +52,7 @@ class Description:
             "name": name,
             "scene": scene_message.running(scene, system, program.meters)
             | opening_message.drawn(picture),
-            "controls": offered.described(Settings()),
+            "controls": offered.described({}),
             "topology": offered.topology,
             "hands": hands,
             "parameters": {name: references[name] for name in chosen},

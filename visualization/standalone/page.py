@@ -19,7 +19,6 @@ from hapticlink.programs.page_program import webassembly, webassembly_files
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolve_scene import resolved
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.interactive_scene.offered_controls import Settings
 from hapticlink.visualization.interactive_scene.prediction import predicted
 from hapticlink.visualization.standalone.description import Description
 
@@ -49,7 +48,7 @@ def html(scene: Scene, name: str) -> str:
             description = Description(program, variables, name)
             files = webassembly_files(program, blocks, variables, description.drawing)
         module = _compiled(files, room)
-    verdict = predicted(scene, Settings(), description.parameters)
+    verdict = predicted(scene, {}, description.parameters)
     description.data["map"] = {"type": "map"} | verdict
     contents = {
         "data": one_file.as_json(description.data).encode(),

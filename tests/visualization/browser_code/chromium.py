@@ -86,7 +86,7 @@ def differ_without_topology(page: Page) -> None:
     """Of two runs under one mouse: without its topology controller B follows the mouse further, and
     has energies of its own. The mouse stays down."""
     page.page.click("#acts")
-    page.page.uncheck("[data-control=topology]")
+    page.page.uncheck("[data-control='controller.topology']")
     page.until("location.hash === '#b.controller.topology=false'")
     page.pull(0.03, 0.03)
     page.run_for(1.0)

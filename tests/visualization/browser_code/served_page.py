@@ -90,6 +90,10 @@ class Window:
     def send(self, **message: Any) -> None:
         self.socket.send(json.dumps(message))
 
+    def set(self, key: str, value: Any, **of: Any) -> None:
+        """Give a control a value."""
+        self.send(type="set", key=key, value=value, **of)
+
     def until(self, holds: Condition, seconds: float = 120) -> dict[str, Any]:
         """The newest messages by type, once they are as asked for."""
         end = time.monotonic() + seconds
@@ -99,3 +103,8 @@ class Window:
             if "frame" in self.newest and holds(self.newest):
                 return dict(self.newest)
         raise AssertionError(f"not within {seconds} s: {self.newest}")
+
+
+def values(controls: dict[str, Any]) -> dict[str, Any]:
+    """The values in a message of controls, by key."""
+    return {each["key"]: each["value"] for each in controls.get("controls", ())}

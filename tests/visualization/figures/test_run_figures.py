@@ -9,7 +9,7 @@ import hapticlink as hl
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization import figure_axes
-from hapticlink.visualization.figures import run_figures, sweep_labels
+from hapticlink.visualization.figures import run_figures, sweep_figure
 from hapticlink.visualization.figures.force_figure import forces
 from tests.shared_fixtures import run_once
 
@@ -136,10 +136,10 @@ def test_a_sampled_spring_shows_its_energy() -> None:
 
 def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
     best = {"graphics.rate": "60", "hold": "foh"}
-    told = sweep_labels.title(best, 0.4361, "RMS tracking error (mm)", list(best), 3, 12)
+    told = sweep_figure.finding(best, 0.4361, "RMS tracking error (mm)", list(best), 3, 12)
     assert told == (
         "RMS tracking error down to 0.436 mm at graphics.rate = 60 Hz, hold = foh; "
         "3 of 12 runs ended early or failed"
     )
-    assert sweep_labels.axis("graphics.rate") == "graphics.rate (Hz)"
-    assert sweep_labels.axis("hold") == "hold"
+    assert sweep_figure.axis("graphics.rate") == "graphics.rate (Hz)"
+    assert sweep_figure.axis("hold") == "hold"

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.offered_controls import JITTER, RATE, Settings
 from hapticlink.visualization.interactive_scene.prediction import predicted
 from hapticlink.visualization.interactive_scene.viewed_scene import STIFFNESS, viewed
 from tests.analysis.stability.own_hand import own_hand
 from tests.visualization.browser_code.chromium import Page, chromium
-from tests.visualization.browser_code.served_page import Served
+from tests.visualization.browser_code.served_page import Served, values
 
 SCENE, OPTIONS = "closed-loop-direct", ("graphics.rate=12.8",)
 HELD = {"x": "x_S", "v": "v_S", "Lambda_inv": "Lambda_inv", "P_c": "P_c"}
@@ -40,7 +40,7 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
         window.page.wait_for_function("view.map?.verdict", timeout=1e3 * QUICK)
         before = window.get("view.map.why")
         for port, target in HELD.items():
-            name = f"virtual_mechanism.{port} -> controller.{target}"
+            name = f"holds.virtual_mechanism.{port} -> controller.{target}"
             window.page.select_option(f'[data-control="{name}"]', "foh")
         window.until("view.map.said === 'computing'")
         window.page.wait_for_function("view.map.verdict === 'unstable'", timeout=1e3 * QUICK)
@@ -61,8 +61,8 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
 
 @pytest.mark.parametrize(
     ("settings", "said"),
-    [(Settings(rate=30.1), "30.1 Hz repeats only after 5120 ticks, 30 Hz would be fast"),
-     (Settings(jitter=0.1), "with jitter the system never repeats")],
+    [({RATE: 30.1}, "30.1 Hz repeats only after 5120 ticks, 30 Hz would be fast"),
+     ({JITTER: 0.1}, "with jitter the system never repeats")],
 )  # fmt: skip
 def test_what_would_take_long_is_refused(settings: Settings, said: str) -> None:
     found = predicted(viewed(SCENE, OPTIONS), settings, {})
@@ -70,9 +70,10 @@ def test_what_would_take_long_is_refused(settings: Settings, said: str) -> None:
 
 
 def test_a_verdict_says_that_it_is_without_the_friction_of_a_hold() -> None:
-    settings, beside = Settings(rate=64.0), ", without the friction of hold passive"
+    settings: Settings = {RATE: 64.0}
+    beside = ", without the friction of hold passive"
     assert beside not in predicted(viewed(SCENE), settings, {})["said"]
-    settings.holds["controller.F_drift -> virtual_mechanism.F_drift"] = "passive"
+    settings["holds.controller.F_drift -> virtual_mechanism.F_drift"] = "passive"
     assert predicted(viewed(SCENE), settings, {})["said"].endswith(beside)
 
 
@@ -81,18 +82,18 @@ def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
     """Once the new rate is shown, every verdict is on it, and one process computes all."""
     with page.window() as window:
         window.until(lambda new: "controls" in new)
-        window.send(type="rate", value=31)
+        window.set("graphics.rate", 31)
         server = _children(page.process.pid, "live_page.server")[0]
         (computing,) = _until(lambda: _children(server, "live_page.stability_process"))
-        window.until(lambda new: new["controls"]["rate"]["value"] == 31)
-        window.send(type="rate", value=12.8)
-        window.until(lambda new: new["controls"]["rate"]["value"] == 12.8)
+        window.until(lambda new: values(new["controls"])["graphics.rate"] == 31)
+        window.set("graphics.rate", 12.8)
+        window.until(lambda new: values(new["controls"])["graphics.rate"] == 12.8)
         window.newest.pop("map", None)
         found = window.until(lambda new: new.get("map", {}).get("verdict"), QUICK)["map"]
         assert _children(server, "live_page.stability_process") == [computing]
         handle = window.until(lambda new: True)["frame"]["handle"]
     parameters = {"hand.stiffness": [*STIFFNESS], "hand.target": handle}
-    mouse = predicted(viewed(SCENE, OPTIONS), Settings(), parameters)["why"].partition("\n")[0]
+    mouse = predicted(viewed(SCENE, OPTIONS), {}, parameters)["why"].partition("\n")[0]
     assert found["why"].startswith(mouse)
 
 
@@ -101,7 +102,7 @@ def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
 def test_nothing_is_left_of_a_map_that_nobody_waits_for(page: Served, end: str) -> None:
     with page.window() as window:
         window.until(lambda new: "controls" in new)
-        window.send(type="rate", value=31)  # takes long
+        window.set("graphics.rate", 31)  # takes long
         server = _children(page.process.pid, "live_page.server")[0]
         computing = _until(lambda: _children(server, "live_page.stability_process"))
         match end:

@@ -7,9 +7,9 @@ import json
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.interactive_scene.offered_controls import Settings
+from hapticlink.visualization.interactive_scene.offered_controls import RATE, Settings
 from hapticlink.visualization.live_page.controls import Controls
-from hapticlink.visualization.live_page.messages import Gain, Hand, Rate, Time, newest, parse
+from hapticlink.visualization.live_page.messages import Hand, Set, Time, newest, parse
 from tests.api.test_real_time import ENERGY, ran
 
 
@@ -18,37 +18,56 @@ def test_gains_of_a_spring_whose_energy_is_limited_are_no_controls() -> None:
     offered: list[set[str]] = []
 
     def turn(live: hl.RealTime) -> None:
-        controls = Controls(live, Settings(gains={"controller.K_pc": 10.0, "controller.k_j": 2.0}))
+        kept = {"gains.controller.K_pc": 10.0, "gains.controller.k_j": 2.0}
+        controls = Controls(live, kept)
         controls.restore()
-        offered.append({gain["name"] for gain in controls.described()["gains"]})
+        offered.append({control["key"] for control in controls.described()})
         live.stop()
 
     ran("closed-loop-direct", turn)
     ran("closed-loop-direct", turn, *ENERGY)
-    assert offered[0] - offered[1] == {"controller.K_pc", "controller.B_pc"}
+    assert offered[0] - offered[1] == {"gains.controller.K_pc", "gains.controller.B_pc"}
 
 
 def test_the_rate_of_the_scene_without_jitter_is_no_change() -> None:
     """So a run that begins anew has the scene's own steps, and the verdict is on them."""
-    settings = Settings()
+    settings: Settings = {}
     rates: list[float | None] = []
 
     def turn(live: hl.RealTime) -> None:
         controls = Controls(live, settings)
         for value in (64.0, 30.0):
-            controls.apply(Rate("rate", value))
-            rates.append(settings.rate)
+            controls.apply(Set("set", RATE, value))
+            rates.append(settings.get(RATE))
         live.stop()
 
     ran("closed-loop-direct", turn)
     assert rates == [64.0, None]
 
 
+def test_a_change_that_is_refused_is_not_kept() -> None:
+    """A hold that there is not, and a delay beyond what a scene may have."""
+    settings: Settings = {}
+
+    def turn(live: hl.RealTime) -> None:
+        controls = Controls(live, settings)
+        key = next(c["key"] for c in controls.described() if "choices" in c)
+        for message in (Set("set", key, "none"), Set("set", "holds.x", "zoh")):
+            with pytest.raises(hl.InputFault, match=r"^no hold 'none'|^no control"):
+                controls.apply(message)
+        live.stop()
+
+    ran("closed-loop-direct", turn)
+    assert settings == {}
+
+
 def test_a_pull_is_read() -> None:
     assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
     other = '{"type": "hand", "at": null, "user": "left"}'
     assert parse(other) == Hand("hand", None, "left")
-    assert parse('{"type": "rate", "value": 10, "b": true}') == Rate("rate", 10.0, b=True)
+    rate = '{"type": "set", "key": "graphics.rate", "value": 10, "b": true}'
+    assert parse(rate) == Set("set", "graphics.rate", 10.0, b=True)
+    assert parse('{"type": "set", "key": "controller.topology", "value": true}').value is True
 
 
 @pytest.mark.parametrize(
@@ -69,20 +88,24 @@ def test_a_pull_is_read() -> None:
         '{"type": "hand", "at": [0.1, 1e999]}',
         '{"type": "hand", "at": [0.1, 0.2], "more": 1}',
         '{"type": "hand", "at": null, "user": 1}',
-        '{"type": "jitter", "value": 1.0}',
-        '{"type": "rate", "value": 0}',
-        '{"type": "rate", "value": 1e-320}',
-        '{"type": "rate", "value": -3}',
-        '{"type": "rate", "value": true}',
-        '{"type": "delay", "connection": "a", "value": 2}',
-        '{"type": "gain", "name": "controller.K_pc", "factor": -1}',
-        '{"type": "topology", "on": 1}',
+        '{"type": "set", "key": "jitter", "value": 1.0}',
+        '{"type": "set", "key": "graphics.rate", "value": 0}',
+        '{"type": "set", "key": "graphics.rate", "value": 1e-320}',
+        '{"type": "set", "key": "graphics.rate", "value": -3}',
+        '{"type": "set", "key": "graphics.rate", "value": true}',
+        '{"type": "set", "key": "graphics.rate", "value": NaN}',
+        '{"type": "set", "key": "graphics.rate", "value": "10"}',
+        '{"type": "set", "key": "delays.a", "value": 2}',
+        '{"type": "set", "key": "gains.controller.K_pc", "value": -1}',
+        '{"type": "set", "key": "controller.topology", "value": 1}',
+        '{"type": "set", "key": "holds.a", "value": 1}',
+        '{"type": "set", "key": "holds.a", "value": null}',
         '{"type": "time", "do": "stop"}',
         '{"type": "time", "do": "pause", "b": true}',
-        '{"type": "rate", "value": 10, "b": 1}',
+        '{"type": "set", "key": "graphics.rate", "value": 10, "b": 1}',
         '{"type": "compare", "on": 1}',
-        json.dumps({"type": "hold", "connection": "x" * 201, "hold": "zoh"}),
-        json.dumps({"type": "hold", "connection": "x", "hold": "z" * 5000}),
+        json.dumps({"type": "set", "key": "holds." + "x" * 201, "value": "zoh"}),
+        json.dumps({"type": "set", "key": "holds.x", "value": "z" * 201}),
         b'{"type": "hand", "at": null}',
     ],
 )
@@ -92,7 +115,7 @@ def test_what_is_no_message_is_refused(text: str | bytes) -> None:
 
 
 def test_of_many_messages_the_newest_of_each_control_is_kept() -> None:
-    gain = [Gain("gain", name, float(i)) for i in range(5) for name in "ab"]
+    gain = [Set("set", f"gains.{name}", float(i)) for i in range(5) for name in "ab"]
     step = [Time("time", "step")] * 2
     pulls = [Hand("hand", at, user) for user in ("", "left") for at in ((0.0, 0.0), None)]
     found = newest([*gain, *step, *pulls])

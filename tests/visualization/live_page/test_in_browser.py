@@ -116,8 +116,10 @@ def test_every_button_and_control_of_a_phone_can_be_reached(served: Served, wind
 
 def test_restore_sets_back_what_was_changed(served: Served, window: Window) -> None:
     page = window(served.url)
-    page.page.fill("[data-control='controller.K_pc']", "0.5")
-    said = "document.querySelector('[data-control=\"controller.K_pc\"]').parentNode.textContent"
+    page.page.fill("[data-control='gains.controller.K_pc']", "0.5")
+    said = (
+        "document.querySelector('[data-control=\"gains.controller.K_pc\"]').parentNode.textContent"
+    )
     page.until(f"!{said}.includes(' 100 N/m') && {said}.includes('316')")
     page.page.click("#restore")
     page.until(f"{said}.includes('100 N/m')")
@@ -170,13 +172,13 @@ def test_a_control_changes_the_run_and_is_seen_in_a_second_window(
     served: Served, window: Window
 ) -> None:
     first, second = window(served.url), window(served.url)
-    first.page.fill("[data-control=rate]", "9")
-    said = "document.querySelector('[data-control=rate]').parentNode.textContent"
+    first.page.fill("[data-control='graphics.rate']", "9")
+    said = "document.querySelector('[data-control=\"graphics.rate\"]').parentNode.textContent"
     second.until(f"{said}.includes('10.0 Hz')")
-    first.page.uncheck("[data-control=topology]")
-    second.until("!document.querySelector('[data-control=topology]').checked")
-    second.page.check("[data-control=topology]")
-    first.until("document.querySelector('[data-control=topology]').checked")
+    first.page.uncheck("[data-control='controller.topology']")
+    second.until("!document.querySelector('[data-control=\"controller.topology\"]').checked")
+    second.page.check("[data-control='controller.topology']")
+    first.until("document.querySelector('[data-control=\"controller.topology\"]').checked")
     first.page.close()
     second.run_for(0.3)
 

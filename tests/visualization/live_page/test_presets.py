@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.interactive_scene.offered_controls import Settings, target
+from hapticlink.visualization.interactive_scene.offered_controls import RATE, Settings, target
 from hapticlink.visualization.interactive_scene.prediction import judged
 from hapticlink.visualization.interactive_scene.viewed_scene import viewed
 from hapticlink.visualization.live_page.controls import Controls
@@ -20,12 +20,12 @@ from tests.visualization.browser_code.served_page import Served
 SERVED = "closed-loop-direct"
 
 
-def begun(name: str) -> tuple[dict[str, Any], dict[str, list[float]]]:
+def begun(name: str) -> tuple[list[dict[str, Any]], dict[str, list[float]]]:
     """The controls of a scene at its start, and the parameters with which its mice hold there."""
     found: list[Any] = []
 
     def turn(live: hl.RealTime) -> None:
-        its = Controls(live, Settings())
+        its = Controls(live, {})
         handles = Frames(live).handles(live)
         held = {target(user): [*place] for user, place in handles.items()}
         found.extend((its.described(), its.parameters() | held))
@@ -36,25 +36,27 @@ def begun(name: str) -> tuple[dict[str, Any], dict[str, list[float]]]:
 
 
 @pytest.fixture(scope="module")
-def controls() -> dict[str, Any]:
+def controls() -> list[dict[str, Any]]:
     """Those of the scene whose mechanism runs at the graphics rate."""
     return begun("closed-loop-direct")[0]
 
 
-def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(controls: dict[str, Any]) -> None:
+def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(
+    controls: list[dict[str, Any]],
+) -> None:
     """Measured of the same spring hand, 25 mm to the right: the second generates at least ten times
     what the third does."""
     calm, buzz, mend = javascript("presets.js", "answer = presets(given);", controls)
-    assert calm["messages"] == [{"type": "rate", "value": 64}]
+    assert calm["messages"] == [{"type": "set", "key": RATE, "value": 64}]
     options = []
     for preset in (buzz, mend):
         rate, gain, *holds = preset["messages"]
-        assert (rate["type"], gain["name"]) == ("rate", "controller.B_pc")
-        found = {f'holds."{each["connection"]}"': each["hold"] for each in holds}
+        assert (rate["key"], gain["key"]) == (RATE, "gains.controller.B_pc")
+        found = {f'holds."{each["key"].removeprefix("holds.")}"': each["value"] for each in holds}
         assert {*found.values()} == {"foh" if preset is buzz else "passive"}
-        damping = [20.0 * gain["factor"]] * 2 + [0.02 * gain["factor"]]
+        damping = [20.0 * gain["value"]] * 2 + [0.02 * gain["value"]]
         found |= {"controller.teleoperation.damping": damping}
-        options.append({"graphics.rate": rate["value"], **found})
+        options.append({RATE: rate["value"], **found})
     hand = {"stiffness": [100.0, 100.0, 0.0], "target": [[0.0, 0.0245, 0.0148, -0.785]]}
     peaks = []
     for chosen in options:
@@ -74,31 +76,26 @@ def test_buzz_is_a_vibration_that_is_seen(name: str) -> None:
     found, parameters = begun(name)
     chosen = javascript("presets.js", "answer = presets(given);", found)[1]
     assert chosen["name"] == "Buzz"
-    settings = Settings(rate=32.0)
-    for message in chosen["messages"]:
-        match message:
-            case {"type": "gain", "name": gain, "factor": factor}:
-                parameters[gain] = [factor * value for value in parameters[gain]]
-            case {"type": "hold", "connection": connection, "hold": hold}:
-                settings.holds[connection] = hold
-            case {"type": "rate", "value": rate}:
-                settings.rate = rate
+    settings: Settings = {RATE: 32.0} | {m["key"]: m["value"] for m in chosen["messages"]}
+    for gain, values in parameters.items():
+        factor = settings.get(f"gains.{gain}", 1.0)
+        parameters[gain] = [factor * value for value in values]
     scene = viewed(name, {"packaging": "python"})
     case, _ = next(judged(scene, settings, parameters))
     assert case.growth > 1.0
     assert 5.0 < case.hertz < 30.0
 
 
-def test_restored_is_what_differs_from_the_start(controls: dict[str, Any]) -> None:
+def test_restored_is_what_differs_from_the_start(controls: list[dict[str, Any]]) -> None:
     statements = """
       const now = structuredClone(given);
-      now.rate.value = 12; now.holds[0].hold = "foh"; now.gains[1].factor = 3;
+      now[0].value = 12; now.at(-1).value = 3; now.find((each) => each.choices).value = "foh";
       answer = restored(now, given);
     """
+    held = next(control["key"] for control in controls if "choices" in control)
     assert javascript("presets.js", statements, controls) == [
-        {"type": "rate", "value": 30},
-        {"type": "hold", "connection": controls["holds"][0]["connection"], "hold": "zoh"},
-        {"type": "gain", "name": controls["gains"][1]["name"], "factor": 1},
+        {"type": "set", "key": key, "value": value}
+        for key, value in ((RATE, 30), (held, "zoh"), (controls[-1]["key"], 1))
     ]
 
 
@@ -138,9 +135,9 @@ def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(
 ) -> None:
     page = window(served.url)
     page.until("document.querySelectorAll('#presets button').length === 3")
-    page.page.fill("[data-control=rate]", "9")  # 10 Hz
+    page.page.fill("[data-control='graphics.rate']", "9")  # 10 Hz
     for port in ("x", "v"):
-        name = f"virtual_mechanism.{port} -> controller.{port}_S"
+        name = f"holds.virtual_mechanism.{port} -> controller.{port}_S"
         page.page.select_option(f"select[data-control='{name}']", "foh")
     page.pull(0.02, -0.015)
     page.until("view.state.ended")
@@ -156,7 +153,9 @@ def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(
     assert page.page.inner_text("#ended").startswith("Diverged at ")  # or of the next run
     page.page.mouse.up()
     page.page.click("#restore")
-    page.until("document.querySelector('[data-control=rate]').parentNode.innerText.includes('30')")
+    page.until(
+        "document.querySelector('[data-control=\"graphics.rate\"]').parentNode.innerText.includes('30')"
+    )
     page.until("!view.state.ended")
     page.page.mouse.click(400, 400)  # the next run may have diverged before it was restored
     page.until("!document.getElementById('ended').textContent")

@@ -14,7 +14,7 @@ from websockets.exceptions import InvalidStatus
 
 import hapticlink as hl
 from tests.shared_fixtures import status
-from tests.visualization.browser_code.served_page import CONSTRAINED, FREE, Served
+from tests.visualization.browser_code.served_page import CONSTRAINED, FREE, Served, values
 
 HELD = "virtual_environment.Lambda_inv -> controller.Lambda_inv"
 
@@ -70,12 +70,13 @@ def test_the_server_listens_on_this_machine_alone(served: Served) -> None:
 def test_a_malformed_message_changes_nothing(served: Served) -> None:
     with served.window() as window:
         before = dict(window.until(lambda new: "controls" in new))
-        for text in ("{", '{"type": "rate", "value": -1}', '{"type": "gain", "name": "x"}', b"\0"):
+        rate = '{"type": "set", "key": "graphics.rate", "value": -1}'
+        for text in ("{", rate, '{"type": "set", "key": "gains.x"}', b"\0"):
             window.newest.pop("refused", None)
             window.socket.send(text)
             window.until(lambda new: "refused" in new)
         window.newest.pop("refused")
-        window.send(type="hold", connection="no.such", hold="zoh")
+        window.set("holds.no.such", "zoh")
         window.until(lambda new: "no.such" in new.get("refused", {}).get("why", ""))
         after = window.until(lambda new: new["frame"]["t"] > before["frame"]["t"] + 0.1)
         assert (after["controls"], after["state"]) == (before["controls"], before["state"])
@@ -115,15 +116,10 @@ def test_a_window_that_is_closed_lets_go_and_ends_nothing(served: Served) -> Non
 def test_every_window_sees_a_control_that_changes_the_run(served: Served) -> None:
     with served.window() as first, served.window() as second:
         first.until(lambda new: "controls" in new)
-        first.send(type="gain", name="hand.damping", factor=2.0)
-        first.send(type="hold", connection=HELD, hold="foh")
-        found = second.until(
-            lambda new: (
-                [h["hold"] for h in new["controls"]["holds"] if h["connection"] == HELD] == ["foh"]
-            )
-        )
-        factor = {g["name"]: g["factor"] for g in found["controls"]["gains"]}
-        assert factor["hand.damping"] == 2.0
+        first.set("gains.hand.damping", 2.0)
+        first.set(f"holds.{HELD}", "foh")
+        found = second.until(lambda new: values(new["controls"])[f"holds.{HELD}"] == "foh")
+        assert values(found["controls"])["gains.hand.damping"] == 2.0
 
 
 def test_time_stands_still_steps_and_goes_on(served: Served) -> None:
@@ -145,8 +141,8 @@ def test_a_recording_is_a_result_folder_with_the_changes(served: Served) -> None
         window.send(type="time", do="record")
         found = window.until(lambda new: new.get("state", {}).get("recording"))
         folder = served.folder / found["state"]["recording"]
-        window.send(type="rate", value=12.5)
-        window.until(lambda new: new["controls"]["rate"]["value"] == 12.5)
+        window.set("graphics.rate", 12.5)
+        window.until(lambda new: values(new["controls"])["graphics.rate"] == 12.5)
         window.until(lambda new: new["frame"]["t"] > 0.5)
         window.send(type="time", do="record")
         window.until(lambda new: not new["state"]["recording"])

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.visualization.browser_code.chromium import Page, differ_without_topology
-from tests.visualization.browser_code.served_page import Served
+from tests.visualization.browser_code.served_page import Served, values
 
 SERVED = "closed-loop"
 NAME = "hapticlink.commands.compared_run"
@@ -38,7 +38,7 @@ def test_two_settings_run_under_one_mouse(served: Served, window: Callable[..., 
     differ_without_topology(page)
     page.page.mouse.up()
     page.page.click("#acts")
-    page.until("document.querySelector('[data-control=topology]').checked")
+    page.until("document.querySelector('[data-control=\"controller.topology\"]').checked")
     page.page.click("#compare")
     page.until("!view.frame?.b && view.frame?.t < 1")
 
@@ -49,11 +49,11 @@ def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(served: Serve
         window.send(type="time", do="pause")
         window.send(type="compare", on=True)
         window.send(type="compare", on=True)
-        window.send(type="rate", value=10, b=True)
+        window.set("graphics.rate", 10, b=True)
         found = window.until(
-            lambda new: new["controls"].get("b", {}).get("rate", {}).get("value") == 10
+            lambda new: values(new["controls"].get("b", {})).get("graphics.rate") == 10
         )
-        assert found["controls"]["rate"]["value"] == 30
+        assert values(found["controls"])["graphics.rate"] == 30
         assert len(second_runs(served)) == 1
         window.until(lambda new: "b" in new["frame"] and new["scene"].get("runs") == 2)
         times = set[tuple[float, float]]()
@@ -74,7 +74,7 @@ def test_a_second_run_that_dies_ends_the_comparison(served: Served) -> None:
         window.send(type="compare", on=True)
         window.until(lambda new: new.get("scene", {}).get("runs") == 2)
         connection = "virtual_environment.Lambda_inv -> controller.Lambda_inv"
-        window.send(type="hold", connection=connection, hold="no such", b=True)
+        window.set(f"holds.{connection}", "no such", b=True)
         window.until(lambda new: "no such" in new.get("refused", {}).get("why", ""))
         os.kill(second_runs(served)[0], signal.SIGKILL)
         window.until(

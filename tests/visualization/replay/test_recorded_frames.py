@@ -159,7 +159,7 @@ def test_an_animation_moves_begins_anew_and_has_the_same_bytes_each_time(
 
 
 def test_the_page_is_served_to_who_knows_its_path_alone() -> None:
-    with served("<p>here</p>", "127.0.0.1", 0, "secret") as port:
+    with served("<p>here</p>", "127.0.0.1", (0,), "secret") as port:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/secret/") as answer:
             assert answer.read() == b"<p>here</p>"
             assert "default-src 'none'" in answer.headers["Content-Security-Policy"]

@@ -93,18 +93,18 @@ def test_nothing_is_cut_off_in_wide_and_narrow_windows(file: Path, window: Windo
 
 def test_a_link_carries_the_settings(file: Path, window: Window) -> None:
     page = window(f"file://{file}#graphics.rate=10&hold=foh&delay=0.02&weather=fine")
-    rate = "document.querySelector('[data-control=rate]').parentNode.textContent"
+    rate = "document.querySelector('[data-control=\"graphics.rate\"]').parentNode.textContent"
     page.until(f"{rate}.includes('10.0 Hz')")
     holds = page.get("[...document.querySelectorAll('#controls select')].map((each) => each.value)")
     assert len(holds) > 1
     assert {*holds} == {"foh"}
     assert "weather=fine: this scene has no such control" in page.get("view.refused")
-    page.page.uncheck("[data-control=topology]")
+    page.page.uncheck("[data-control='controller.topology']")
     page.until("location.hash.includes('controller.topology=false')")
     link = page.get("location.href")
     assert "weather" not in link
     again = window(link)
-    again.until("!document.querySelector('[data-control=topology]').checked")
+    again.until("!document.querySelector('[data-control=\"controller.topology\"]').checked")
     again.until("document.querySelector('#controls select').value === 'foh'")
 
 
