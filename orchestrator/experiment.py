@@ -71,7 +71,7 @@ class Experiment:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
                 return opened(self.folder, record)
-            return Results(None, self.run, self.memory.tables(), known=record)
+            return Results(None, self.run, self.memory.tables()).described_by(record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:

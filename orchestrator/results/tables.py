@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import chain, islice
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -113,8 +113,11 @@ class Results:
     tables: Mapping[str, Table]
     begin: float = -math.inf
     end: float = math.inf
-    known: RunRecord | None = field(default=None, repr=False)
-    """`record`, where it is known without reading it from `run`."""
+
+    def described_by(self, record: RunRecord) -> Self:
+        """These results, whose `record` is known without reading it from `run`."""
+        vars(self)["record"] = record
+        return self
 
     @property
     def number(self) -> int:
@@ -145,7 +148,7 @@ class Results:
     def record(self) -> RunRecord:
         """The content of run.json as a record. Raises InputFault where it is of another version, or
         was changed."""
-        return self.known or run_record.read(self.run, self.folder)
+        return run_record.read(self.run, self.folder)
 
     @property
     def haptics(self) -> Table:
@@ -205,7 +208,7 @@ def load(folder: Path | str, binary: bool = False, record: RunRecord | None = No
     run = run_json(folder)
     record = record or run_record.read(run, folder)
     tables = FolderTables(folder, record.rates, record.files, binary)
-    return Results(folder, run, dict(tables), known=record)
+    return Results(folder, run, dict(tables)).described_by(record)
 
 
 def run_json(folder: Path) -> dict[str, Any]:

@@ -41,7 +41,8 @@ def opened(folder: Path, record: RunRecord | None = None) -> Results:
     run = text_files.read_json(folder / "run.json")
     if size(folder, run, binary=True) <= WINDOW_BYTES:
         return load(folder, binary=True, record=record)
-    return Streamed(folder, run, FolderTables(folder, run["rates"], run["files"]), known=record)
+    streamed = Streamed(folder, run, FolderTables(folder, run["rates"], run["files"]))
+    return streamed.described_by(record) if record else streamed
 
 
 @contextmanager
@@ -99,14 +100,14 @@ class Streamed(Results):
                 name: _part(files[name], *span) if name in files else empty({})
                 for name in record.rates
             }
-            yield Results(self.folder, self.run, tables, begin, until, record)
+            yield Results(self.folder, self.run, tables, begin, until).described_by(record)
 
 
 def until(results: Results, time: float) -> Iterator[Results]:
     """The windows of results until a time (s)."""
     for window in results.windows():
         if window.begin < time:
-            yield replace(window, end=min(window.end, time), known=results.record)
+            yield replace(window, end=min(window.end, time)).described_by(results.record)
 
 
 def last(results: Results) -> Results:
