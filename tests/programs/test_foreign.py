@@ -138,7 +138,7 @@ def test_it_runs_in_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     opened = viewed("pendulum", (beside, wired))
     rows = test_page_program.under_node(page.html(opened, "page"), [])
     monkeypatch.setattr(test_page_program, "CHANGES", [])
-    changed = test_page_program.changed_run(opened, tmp_path, lambda *_: None)
+    changed = test_page_program.changed_run(opened, lambda *_: None)
     assert np.abs(rows - changed).max() < 1e-9
     with pytest.raises(InputFault, match="table has resources, files that a page lacks"):
         page.html(

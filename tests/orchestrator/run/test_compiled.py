@@ -224,6 +224,7 @@ def test_kinds_of_events_are_bound_before_the_loop(tmp_path, monkeypatch, option
     monkeypatch.setattr(Events, "_new_kind", new_kind)
     ended = simulate("closed-loop-direct", tmp_path, options)
     assert ended.outcome.fault is None
-    (prepared,) = bound
+    prepared, *later = bound
+    assert later == [[kind] for kind in late]
     assert [*prepared, *late] == [*dict.fromkeys(m.event for m in Plan(ended.system))]
     assert len(late) <= (1 if ended.outcome.end_time > 8 else 0)
