@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results.folders import names
-from hapticlink.orchestrator.results.tables import Results, load
+from hapticlink.orchestrator.results.read_results import Results, load
 from hapticlink.visualization.compare import numbers, overlay, page, settings
 from hapticlink.visualization.compare.numbers import Row
 

@@ -10,7 +10,7 @@ from typing import Literal
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folders, windows
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.export import mcap, parquet
 
 

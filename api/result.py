@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import Tracking, pose_error, table_of
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base.errors import InputFault, unknown
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -20,9 +20,9 @@ from hapticlink.orchestrator.network.served_part import NOWHERE, Servers
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders
+from hapticlink.orchestrator.results.read_results import Results
+from hapticlink.orchestrator.results.read_results import load as read_tables
 from hapticlink.orchestrator.results.run_record import content
-from hapticlink.orchestrator.results.tables import Results
-from hapticlink.orchestrator.results.tables import load as read_tables
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.scene.overrides import Options

@@ -19,7 +19,7 @@ from benchmarks.page import Progress, table
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.tables import load
+from hapticlink.orchestrator.results.read_results import load
 from studies import draw
 
 SCENE, SECONDS, QUICK, SEED = "closed-loop", 8, 3, 1

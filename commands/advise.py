@@ -36,7 +36,7 @@ def advise(
     """
     from hapticlink.analysis.advise.advise_method import advise as find
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.orchestrator.results.write_files import write_json
 
     folder = folders.ensure(output.out or changes.folder("advice", scene))
     processes = jobs or os.cpu_count() or 1

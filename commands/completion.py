@@ -35,10 +35,10 @@ def keys(context: CompletionContext | None = None) -> list[str]:
 
 def _leaves(record: Any, prefix: str) -> Iterator[str]:
     """Dotted keys of a record; arrays and tables of free keys are leaves."""
-    from hapticlink.orchestrator.scene import schema
+    from hapticlink.orchestrator.scene import types_of_keys
 
-    for key, hint in schema.hints(record).items():
-        for kind in schema.branches(hint):
+    for key, hint in types_of_keys.hints(record).items():
+        for kind in types_of_keys.branches(hint):
             if is_dataclass(kind):
                 yield from _leaves(kind, f"{prefix}{key}.")
             elif kind is not NoneType:

@@ -38,7 +38,7 @@ def fit(
     from hapticlink.analysis.fit.device_fit import FITTED
     from hapticlink.analysis.fit.fit import fit as fitted
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.orchestrator.results.write_files import write_json
 
     names = tuple(device.split(",")) if device else FITTED
     with waiting(f"{log.name}: fitting, which takes seconds for each second of it", output.quiet):

@@ -13,12 +13,12 @@ from types import NoneType
 from typing import Any
 
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.scene import key_descriptions, schema
+from hapticlink.orchestrator.scene import key_descriptions, types_of_keys
 from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import NAMED
 
-DRAFT = "https://json-schema.org/draft/2020-12/schema"
+DRAFT = "https://json-types_of_keys.org/draft/2020-12/schema"
 _TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}
 _KEYWORDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 _FRACTION = r"^[0-9]+/[0-9]+$|^[0-9]*\.?[0-9]+([eE][+-]?[0-9]{1,3})?$"
@@ -59,8 +59,8 @@ class _Definitions:
     def table(self, record: Any, entry: bool) -> Json:
         """The schema of a record; required keys are stated for an `entry` of an array only."""
         properties, required = {}, []
-        for key, hint in schema.hints(record).items():
-            default = schema.default(record, key)
+        for key, hint in types_of_keys.hints(record).items():
+            default = types_of_keys.default(record, key)
             found = self._any_of(hint, entry)
             if isinstance(default, str | bool | int | float | tuple) and default != ():
                 found["default"] = default
@@ -82,7 +82,7 @@ class _Definitions:
 
     def _any_of(self, kind: Any, entry: bool) -> Json:
         found: list[Json] = []
-        for branch, beside in schema.measured(kind):
+        for branch, beside in types_of_keys.measured(kind):
             if branch is not NoneType and (one := self._one(branch, beside, entry)) not in found:
                 found.append(one)
         return dict(found[0]) if len(found) == 1 else {"anyOf": found}

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, is_dataclass
 from typing import Any
 
-from hapticlink.orchestrator.scene import key_descriptions, schema
+from hapticlink.orchestrator.scene import key_descriptions, types_of_keys
 from hapticlink.orchestrator.scene.scene import Scene
 
 _INTRODUCTION = """# Scene reference
@@ -30,7 +30,7 @@ def page() -> str:
 
 def _tables(record: Any, path: str, found: dict[Any, list[str]]) -> None:
     """Collects the table headers under which each record may be written, depth first."""
-    for key, hint in schema.hints(record).items():
+    for key, hint in types_of_keys.hints(record).items():
         for table, header in _headers(hint, f"{path}{key}"):
             found.setdefault(table, []).append(header)
             if len(found[table]) == 1:
@@ -38,7 +38,7 @@ def _tables(record: Any, path: str, found: dict[Any, list[str]]) -> None:
 
 
 def _headers(hint: Any, path: str) -> Iterator[tuple[Any, str]]:
-    for kind in schema.branches(hint):
+    for kind in types_of_keys.branches(hint):
         if is_dataclass(kind):
             yield kind, f"[{path}]"
         elif typing.get_origin(kind) is tuple and is_dataclass(typing.get_args(kind)[0]):
@@ -49,9 +49,9 @@ def _headers(hint: Any, path: str) -> Iterator[tuple[Any, str]]:
 
 def _section(record: Any, headers: list[str]) -> str:
     title = ", ".join(h if h == "Top level" else f"`{h}`" for h in dict.fromkeys(headers))
-    if len(types := schema.types(record)) == 1:
+    if len(types := types_of_keys.types(record)) == 1:
         title += f' with `type = "{types[0]}"`'
-    rows = (_row(record, key, hint) for key, hint in schema.hints(record).items())
+    rows = (_row(record, key, hint) for key, hint in types_of_keys.hints(record).items())
     return "\n".join([f"## {title}\n", f"{key_descriptions.about(record)}\n", _HEAD, *rows, ""])
 
 
@@ -62,7 +62,7 @@ def _row(record: Any, key: str, hint: Any) -> str:
         kind,
         key_descriptions.unit(hint),
         key_descriptions.limits(hint),
-        _default(schema.default(record, key)),
+        _default(types_of_keys.default(record, key)),
         key_descriptions.meanings(record)[key],
     ]
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"

@@ -92,7 +92,7 @@ def stability(
         return 0
     from hapticlink.analysis.stability.modes import Bounds
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.orchestrator.results.write_files import write_json
 
     passivity = None
     if port:  # first, as what it refuses is known within seconds

@@ -36,7 +36,7 @@ def transparency(
     """
     from hapticlink.analysis.transparency import mobility_at_hand as analysis
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.orchestrator.results.write_files import write_json
     from hapticlink.visualization import figure_axes
     from hapticlink.visualization.figures import transparency_figure
 

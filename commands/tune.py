@@ -36,7 +36,7 @@ def tune(
     from hapticlink.analysis.tune.tune_gains import tune as find
     from hapticlink.orchestrator.base.errors import Interrupted
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.files import write_json
+    from hapticlink.orchestrator.results.write_files import write_json
     from hapticlink.visualization import figure_axes
     from hapticlink.visualization.figures import tuning_figure
 

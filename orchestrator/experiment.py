@@ -20,12 +20,12 @@ from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
-from hapticlink.orchestrator.results.files import remove_rows
+from hapticlink.orchestrator.results.read_results import Results, Table
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.orchestrator.results.windows import WINDOW_BYTES, opened
+from hapticlink.orchestrator.results.write_files import remove_rows
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run

@@ -22,6 +22,8 @@ from hapticlink.api.files import build as build
 from hapticlink.api.files import export as export
 from hapticlink.api.maps import stability_map as stability_map
 from hapticlink.api.real_time import RealTime as RealTime
+from hapticlink.api.replay import Replay as Replay
+from hapticlink.api.replay import view as view
 from hapticlink.api.result import Run as Run
 from hapticlink.api.runs import RunInterrupted as RunInterrupted
 from hapticlink.api.runs import load as load
@@ -31,12 +33,10 @@ from hapticlink.api.scenes import scene as scene
 from hapticlink.api.scenes import shipped as shipped
 from hapticlink.api.sweeps import Sweep as Sweep
 from hapticlink.api.sweeps import sweep as sweep
-from hapticlink.api.view import Replay as Replay
-from hapticlink.api.view import view as view
 from hapticlink.orchestrator.base.errors import Fault as Fault
 from hapticlink.orchestrator.base.errors import InputFault as InputFault
 from hapticlink.orchestrator.base.errors import SceneFault as SceneFault
-from hapticlink.orchestrator.results.tables import Table as Table
+from hapticlink.orchestrator.results.read_results import Table as Table
 from hapticlink.orchestrator.scene.scene import Scene as Scene
 
 __all__: list[str]

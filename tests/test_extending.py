@@ -9,8 +9,8 @@ import pytest
 
 from hapticlink.components.registry import Registry
 from hapticlink.orchestrator.holds import Hold, HoldContext
-from hapticlink.orchestrator.results import tables
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results import read_results
+from hapticlink.orchestrator.results.read_results import Results
 from tests.plugins import Ended, hapticlink
 
 PAGE = (Path(__file__).parent.parent / "docs" / "extending.md").read_text(encoding="utf-8")
@@ -36,7 +36,7 @@ def ended(folder: Path) -> dict[str, Ended]:
 def run(folder: Path, ended: dict[str, Ended]) -> Run:
     def loaded(name: str) -> Results:
         (found,) = (folder / "runs").glob(f"{name}*")  # options, if any, are part of the name
-        return tables.load(found)
+        return read_results.load(found)
 
     return loaded
 

@@ -19,7 +19,7 @@ from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import shortened
 from hapticlink.orchestrator.results.numbers import last_time, short
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

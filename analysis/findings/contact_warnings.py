@@ -23,8 +23,8 @@ from hapticlink.orchestrator.base.signal_names import (
     JOINT_COORDINATES,
 )
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 from hapticlink.orchestrator.results.recorded_scene import scene_part
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 ROWS = 500
 """Largest number of rows whose depths are computed."""

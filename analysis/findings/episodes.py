@@ -20,8 +20,8 @@ from hapticlink.analysis.findings.tracking import (
 )
 from hapticlink.analysis.findings.user_port import NOTICEABLE_J, UserPort, ports
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import all_devices
-from hapticlink.orchestrator.results.tables import Results, Vector
 
 EPISODES = {
     "folded": "graphics copy folded",

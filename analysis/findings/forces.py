@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base.signal_names import (
     TOPOLOGY_WRENCH,
     signal_of_user,
 )
-from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 
 WRENCHES = {
     HAND_WRENCH: "hand, F_hand",

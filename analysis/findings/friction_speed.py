@@ -18,7 +18,7 @@ import numpy as np
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.components.specs.linkage import COORDINATE_UNITS
 from hapticlink.orchestrator.base.signal_names import JOINT_RATES
-from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 
 BOUND = 0.1
 

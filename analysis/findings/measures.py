@@ -22,9 +22,9 @@ from hapticlink.analysis.findings.tracking import (
 )
 from hapticlink.analysis.findings.user_port import measured, ports
 from hapticlink.orchestrator.base.signal_names import CLOSURE_ERROR
+from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import all_devices
 from hapticlink.orchestrator.results.run_record import Energy, PortEnergy
-from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.orchestrator.results.windows import until
 
 

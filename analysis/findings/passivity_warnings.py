@@ -22,8 +22,8 @@ from hapticlink.orchestrator.base.signal_names import (
     user_of_block,
 )
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.read_results import Results, Table
 from hapticlink.orchestrator.results.recorded_scene import all_devices
-from hapticlink.orchestrator.results.tables import Results, Table
 
 
 def lines(results: Results, measures: Measures) -> Iterator[str]:

@@ -41,7 +41,7 @@ from hapticlink.orchestrator.base.signal_names import (
     TOPOLOGY_WRENCH,
     signal_of_user,
 )
-from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 
 WRENCHES = {"drift": DRIFT_WRENCH, "topology": TOPOLOGY_WRENCH, "environment": ENVIRONMENT_WRENCH}
 """By block, its wrench on the handle."""

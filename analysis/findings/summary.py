@@ -35,8 +35,8 @@ from hapticlink.orchestrator.base.signal_names import (
     user_of_block,
 )
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.read_results import TABLES, Results
 from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
-from hapticlink.orchestrator.results.tables import TABLES, Results
 from hapticlink.orchestrator.results.windows import last
 from hapticlink.orchestrator.scene.start_pose import outside
 from hapticlink.orchestrator.system.system import Replacement

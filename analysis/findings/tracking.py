@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
     user_of_block,
 )
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 
 
 class Tracking(NamedTuple):

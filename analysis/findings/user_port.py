@@ -51,8 +51,8 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 from hapticlink.orchestrator.results.run_record import BlockEnergy, PortEnergy
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
 
 NOTICEABLE_J = 1e-3
 """Energy (J) of a handle of 0.1 kg that vibrates by 1 mm at 20 Hz, or that of one of 0.3 kg at

@@ -11,8 +11,8 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH, HANDLE_POSE, POINT_POSE
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 from hapticlink.orchestrator.results.run_record import Energy, RunRecord
-from hapticlink.orchestrator.results.tables import Results, Table, Vector
 from hapticlink.orchestrator.system.latency_and_loss import Link
 
 

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.base.signal_names import (
     MEASURED_HANDLE_POSE,
     MOTOR_WRENCH,
 )
-from hapticlink.orchestrator.results.tables import Table, read_table
+from hapticlink.orchestrator.results.read_results import Table, read_table
 
 UNEVEN = 0.01
 """Of the sampling period, up to which samples are evenly spaced."""

@@ -31,7 +31,7 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import Results, Table, load
+from hapticlink.orchestrator.results.read_results import Results, Table, load
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.timeline import timeline

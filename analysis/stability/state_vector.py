@@ -22,7 +22,7 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_tank import NearEnd
-from hapticlink.orchestrator.holds.history import History
+from hapticlink.orchestrator.holds.holds_of_samples import History
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.latency_and_loss import Link
 from hapticlink.orchestrator.system.system import Fmu, System

@@ -22,7 +22,7 @@ from hapticlink.components.linkage.inverse_kinematics import InverseKinematics, 
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.scene.scene import Scene
 
 FROM, TRIED = 64, 4

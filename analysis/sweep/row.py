@@ -9,7 +9,7 @@ from typing import Any
 
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.orchestrator.experiment import Experiment
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 
 Row = dict[str, Any]
 

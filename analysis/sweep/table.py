@@ -14,8 +14,8 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.terminal_output import aligned
-from hapticlink.orchestrator.results.files import write_json
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.write_files import write_json
 
 NOT_REPRODUCIBLE = "run_time_s"
 HEADS = {

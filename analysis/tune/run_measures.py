@@ -14,7 +14,7 @@ import numpy as np
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.user_port import allowed, hand_work
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 
 TRACKED = 1.2
 

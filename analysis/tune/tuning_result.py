@@ -13,8 +13,8 @@ from hapticlink.analysis.stability.hands import SPRINGS
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.analysis.tune.felt_stiffness import HERTZ
 from hapticlink.orchestrator.base.arrays import Complex, Vector
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.recorded_scene import scene_file
-from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene import overrides
 
 EQUAL = 0.03

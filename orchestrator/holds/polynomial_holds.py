@@ -6,7 +6,7 @@ Until the second sample each of them is the zero-order hold, unless its docstrin
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.holds.history import OfSamples, Transition
+from hapticlink.orchestrator.holds.holds_of_samples import OfSamples, Transition
 from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
 
 

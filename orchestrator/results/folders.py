@@ -11,8 +11,8 @@ from typing import Any
 
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results.files import write_json
-from hapticlink.orchestrator.results.tables import Results, load
+from hapticlink.orchestrator.results.read_results import Results, load
+from hapticlink.orchestrator.results.write_files import write_json
 
 
 def ensure(folder: Path | str, option: str = "--out") -> Path:

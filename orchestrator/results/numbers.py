@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.windows import last
 
 

@@ -11,8 +11,8 @@ from pydantic import TypeAdapter, ValidationError
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import by_user
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.run_record import first_error
-from hapticlink.orchestrator.results.tables import Results
 from hapticlink.orchestrator.scene.overrides import toml
 
 

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from hapticlink.orchestrator.base import temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import folder_lock, rows
-from hapticlink.orchestrator.results.files import make_csv, remove_rows, write_json
+from hapticlink.orchestrator.results import binary_rows, folder_lock
 from hapticlink.orchestrator.results.numbers import last_time
+from hapticlink.orchestrator.results.read_results import load
 from hapticlink.orchestrator.results.run_folder import RUN
-from hapticlink.orchestrator.results.tables import load
+from hapticlink.orchestrator.results.write_files import make_csv, remove_rows, write_json
 
 KILLED = "the process of the run was killed"
 
@@ -44,8 +44,8 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
     recovered = {}
     for name in record.rates:
         table = folder / f"{name}.csv"
-        if (source := table.with_suffix(rows.SUFFIX)).is_file():
-            written = rows.Written(source)
+        if (source := table.with_suffix(binary_rows.SUFFIX)).is_file():
+            written = binary_rows.Written(source)
             count, last = make_csv(table), written.time(len(written) - 1)
             recovered[name] = Recovered(count, last, int(written.torn))
             remove_rows(table)

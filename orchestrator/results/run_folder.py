@@ -12,8 +12,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt, text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
-from hapticlink.orchestrator.results import rows
-from hapticlink.orchestrator.results.files import FileRecorder, text, write, write_json, write_over
+from hapticlink.orchestrator.results import binary_rows
 from hapticlink.orchestrator.results.run_record import (
     End,
     RecordedFault,
@@ -22,6 +21,13 @@ from hapticlink.orchestrator.results.run_record import (
     content,
 )
 from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.results.write_files import (
+    FileRecorder,
+    text,
+    write,
+    write_json,
+    write_over,
+)
 
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
@@ -82,9 +88,9 @@ class RunFolder(RunResults):
         OSError if the disk is full."""
         if not self.published and not _has_rows(self.folder):
             for clock, names in columns.items():
-                name = f"{clock}.csv" if self._csv else f"{clock}{rows.SUFFIX}"
+                name = f"{clock}.csv" if self._csv else f"{clock}{binary_rows.SUFFIX}"
                 with atomic_file(self.folder / name) as empty:
-                    empty.write_bytes(rows.header(("time", *names)))
+                    empty.write_bytes(binary_rows.header(("time", *names)))
             self.published = True
         if self.published:
             write_json(self.folder / RUN, self._setup | content(ending))
@@ -120,7 +126,7 @@ class RunFolder(RunResults):
 def _has_rows(folder: Path) -> bool:
     """Whether an earlier run in `folder` has a row behind the header of a table."""
     for name in _listed(folder):
-        if name.endswith((".csv", rows.SUFFIX)):
+        if name.endswith((".csv", binary_rows.SUFFIX)):
             path = folder / name
             with suppress(OSError):
                 if path.is_file() and _is_longer_than_a_line(path):
@@ -142,7 +148,12 @@ def _listed(folder: Path) -> set[str]:
         files = {n for n in texts if n != ".." and Path(n).name == n}
     except (InputFault, AttributeError, TypeError):
         return set()
-    tables = (folder / n for n in files if n.endswith((".csv", rows.SUFFIX)))
+    tables = (folder / n for n in files if n.endswith((".csv", binary_rows.SUFFIX)))
     files = {n for n in files if not (folder / n).is_dir() or (folder / n).is_symlink()}
-    left = [f for t in tables for f in (t.with_suffix(rows.SUFFIX), *rows.blocks(t)) if f.exists()]
+    left = [
+        f
+        for t in tables
+        for f in (t.with_suffix(binary_rows.SUFFIX), *binary_rows.blocks(t))
+        if f.exists()
+    ]
     return files | {f.name for f in left}

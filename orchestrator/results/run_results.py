@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.results import rows
-from hapticlink.orchestrator.results.tables import Table
+from hapticlink.orchestrator.results import binary_rows
+from hapticlink.orchestrator.results.read_results import Table
 
 
 class Recorder:
@@ -33,7 +33,7 @@ class Recorder:
         values: Vector,
         first: Callable[[], object],
         every: int = 1,
-        block: rows.Block | None = None,
+        block: binary_rows.Block | None = None,
     ) -> None:
         places = [*(recorded or {}).values()]
         self.values, self.places, self.every = values, np.array(places, np.int64), every
@@ -103,7 +103,7 @@ class RunResults:
     def _new(
         self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int
     ) -> Recorder:
-        block = None if recorded is None else rows.Block(1 + len(recorded))
+        block = None if recorded is None else binary_rows.Block(1 + len(recorded))
         return Recorder(recorded, values, self._publish, every, block)
 
     def flush(self) -> None:

@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.orchestrator.base import temporary_folders, text_files
-from hapticlink.orchestrator.results import rows, run_record
-from hapticlink.orchestrator.results.run_record import RunRecord
-from hapticlink.orchestrator.results.tables import (
+from hapticlink.orchestrator.results import binary_rows, run_record
+from hapticlink.orchestrator.results.read_results import (
     TABLES,
     FolderTables,
     Results,
@@ -28,6 +27,7 @@ from hapticlink.orchestrator.results.tables import (
     run_json,
     size,
 )
+from hapticlink.orchestrator.results.run_record import RunRecord
 
 WINDOW_BYTES = 1 << 24
 """Of the rows of a window, of all tables. Runs with fewer are one window."""
@@ -52,7 +52,7 @@ def of_run(folder: Path | str) -> Iterator[Results]:
     folder = Path(folder)
     run = run_json(folder)
     tables = [folder / n for n in run_record.read(run, folder).files if n.endswith(TABLES)]
-    csvs = [path for path in tables if path.suffix != rows.SUFFIX]
+    csvs = [path for path in tables if path.suffix != binary_rows.SUFFIX]
     if not all(path.is_file() for path in tables) or size(folder, run) <= WINDOW_BYTES:
         yield load(folder, binary=True)
     elif not csvs:
@@ -60,7 +60,7 @@ def of_run(folder: Path | str) -> Iterator[Results]:
     else:
         with temporary_folders.room() as room:
             for path in csvs:
-                copy_as_rows(path, room / f"{path.stem}{rows.SUFFIX}")
+                copy_as_rows(path, room / f"{path.stem}{binary_rows.SUFFIX}")
             yield Streamed(room, run, FolderTables(room, run["rates"], run["files"]))
 
 
@@ -69,7 +69,7 @@ def copy_as_rows(path: Path, target: Path) -> None:
     with target.open("xb") as file:
         for columns, part in csv_parts(path, WINDOW_BYTES):
             if not file.tell():
-                file.write(rows.header(columns))
+                file.write(binary_rows.header(columns))
             file.write(part.tobytes())
 
 
@@ -88,7 +88,7 @@ class Streamed(Results):
         assert self.folder
         record, end, beside = self.record, self.record.end.time or 0.0, _beside(self.record)
         files = {
-            name: rows.Written(self.folder / f"{name}{rows.SUFFIX}")
+            name: binary_rows.Written(self.folder / f"{name}{binary_rows.SUFFIX}")
             for name in record.rates
             if recorded(name, record.files)
         }
@@ -122,7 +122,7 @@ def _beside(record: RunRecord) -> float:
     return STEPS_BESIDE * max(longest, first) * int(record.scene["record"]["every"])
 
 
-def _part(table: rows.Written, begin: float, end: float) -> Table:
+def _part(table: binary_rows.Written, begin: float, end: float) -> Table:
     """The rows of begin <= time <= end (s)."""
     span = table.between(begin, end)
     return Table(table.columns, table[span], {}, span.start, len(table))

@@ -57,8 +57,8 @@ def record_crash(folder: Path, process: int) -> None:
     """Records in run.json that the run with the given process ID has crashed, and removes its
     temporary folders. Without a row of that run, only prints a message."""
     from hapticlink.orchestrator.results.numbers import last_time
+    from hapticlink.orchestrator.results.read_results import load
     from hapticlink.orchestrator.results.recover import recover
-    from hapticlink.orchestrator.results.tables import load
 
     temporary_folders.clear(process)
     for unfinished in folder.glob(f".*.{process}"):

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.network.served_part import OF_A_RUN
 from hapticlink.orchestrator.results import run_record
-from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.results.read_results import read_table
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, Job
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun

@@ -13,8 +13,13 @@ from types import NoneType
 from typing import Any
 
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.scene.schema import annotations_at, as_written, measured, types_at
 from hapticlink.orchestrator.scene.toml_keys import Path
+from hapticlink.orchestrator.scene.types_of_keys import (
+    annotations_at,
+    as_written,
+    measured,
+    types_at,
+)
 
 _COUNTS = ("no", "one", "two", "three", "four")
 

@@ -13,7 +13,7 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import COUNTED, near, shortened, unknown
-from hapticlink.orchestrator.scene import checks, key_descriptions, schema
+from hapticlink.orchestrator.scene import checks, key_descriptions, types_of_keys
 from hapticlink.orchestrator.scene.scene import adapter
 from hapticlink.orchestrator.scene.toml_keys import Path, value
 
@@ -57,8 +57,8 @@ def _path(error: Any, data: Any) -> Path | None:
         elif error["type"] == "missing" and i == len(error["loc"]) - 1:
             path = (*path, part)
         else:
-            kinds = schema.types_at(path, data)
-            names = {k.__name__ for k in schema.chosen(kinds, node)}
+            kinds = types_of_keys.types_at(path, data)
+            names = {k.__name__ for k in types_of_keys.chosen(kinds, node)}
             if part in {k.__name__ for k in kinds} - names:
                 return None
     return (*path, "type") if error["type"] == "union_tag_invalid" else path
@@ -84,7 +84,9 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
             place = typing.cast("int", path[-1])
             node += [filled] * (place + 1 - len(node))  # too short a vector
             node[place] = filled
-        elif isinstance(node, dict) and ((*path, "type") in untyped or schema.is_needed(path)):
+        elif isinstance(node, dict) and (
+            (*path, "type") in untyped or types_of_keys.is_needed(path)
+        ):
             node[path[-1]] = filled
     try:
         document = to_json(whole, inf_nan_mode="constants")
@@ -96,20 +98,20 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
 
 def _is_kind(path: Path) -> bool:
     """Whether the record at `path` is one of several, selected by its `type`."""
-    return sum(bool(schema.types(kind)) for kind in schema.types_at(path)) > 1
+    return sum(bool(types_of_keys.types(kind)) for kind in types_of_keys.types_at(path)) > 1
 
 
 def _placeholder(path: Path) -> Any:
     """A value of the right type that causes no error elsewhere; None where there is none."""
-    kinds = schema.types_at(path)
+    kinds = types_of_keys.types_at(path)
     if float in kinds or int in kinds:
         return 1
     if str in kinds:
         return "" if path[-1] not in ("name", "child") else None
     for kind in kinds:
-        if schema.types(kind):
-            needed = ((*path, key) for key in schema.keys([kind]))
-            return {p[-1]: _placeholder(p) for p in needed if schema.is_needed(p, kind)}
+        if types_of_keys.types(kind):
+            needed = ((*path, key) for key in types_of_keys.keys([kind]))
+            return {p[-1]: _placeholder(p) for p in needed if types_of_keys.is_needed(p, kind)}
         if typing.get_origin(kind) is tuple and Ellipsis not in typing.get_args(kind):
             return [_placeholder((*path, 0)) for _ in typing.get_args(kind)]
     return None
@@ -124,7 +126,7 @@ def _message(error: Any, path: Path, data: Any) -> str:
     if kind == "value_error":  # an unknown name of a registry
         return str(error["ctx"]["error"])
     if kind == "union_tag_invalid":
-        known = [t for k in schema.types_at(path[:-1]) for t in schema.types(k)]
+        known = [t for k in types_of_keys.types_at(path[:-1]) for t in types_of_keys.types(k)]
         return unknown("type", error["ctx"]["tag"], known)
     if kind in _RANGE:
         finite = "" if shown.lstrip("-") not in ("inf", "nan") else "finite "
@@ -154,13 +156,17 @@ def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     """The message for an unknown key, or for one that belongs to another `type` of the table."""
     if path in _GONE:
         return _GONE[path]
-    kinds, table, key = schema.types_at(path[:-1], data), value(data, path[:-1]), str(path[-1])
-    types = {name: k for k in kinds for name in schema.types(k)}
+    kinds, table, key = (
+        types_of_keys.types_at(path[:-1], data),
+        value(data, path[:-1]),
+        str(path[-1]),
+    )
+    types = {name: k for k in kinds for name in types_of_keys.types(k)}
     branch = loc[-2] if len(loc) > 1 else None  # without a type, pydantic tried the default's
     this = table.get("type", branch) if isinstance(table, dict) else branch
-    owners = [repr(name) for name, k in types.items() if key in schema.keys([k])]
+    owners = [repr(name) for name, k in types.items() if key in types_of_keys.keys([k])]
     kind = types.get(this) if isinstance(this, str) else None
     if kind and owners:
         return f"`{key}` belongs to type {' or '.join(owners)}, not {this!r}"
-    known = schema.keys([kind] if kind else kinds)
+    known = types_of_keys.keys([kind] if kind else kinds)
     return f"unknown key; {near(key, sorted(known))}"

@@ -19,7 +19,7 @@ from hapticlink.analysis.sweep import row as sweep_row
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import Experiment
-from hapticlink.orchestrator.results.tables import Vector
+from hapticlink.orchestrator.results.read_results import Vector
 from studies.mismatch.design import CONTINUOUS, FLOOR, REFERENCE
 
 GRID = 64

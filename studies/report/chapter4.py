@@ -11,7 +11,7 @@ import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
 from studies.report.entry import Entry, Runs, command
 

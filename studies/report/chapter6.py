@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import tracking
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
 from studies.report import measures
 from studies.report.entry import Entry, Runs, command

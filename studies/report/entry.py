@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.scene.overrides import as_typed
 
 HEAD = """# The report's figures, from runs of the FMUs

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 
 
 def held(results: Results, signal: str) -> Vector:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import tracking
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
 from studies.report import measures
 from studies.report.chapter6 import OFF, ON, path

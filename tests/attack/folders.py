@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from tests.attack.cases import Made, seeded
 from tests.attack.processes import Process, own_folder
 
@@ -59,7 +59,7 @@ def _whole(out: Path, regular: list[str], kills: bool) -> tuple[str, str]:
     there, listed = {p.name for p in out.iterdir()}, set(story["files"])
     if there != listed and not kills:
         return "lost", f"run.json lists other files: {', '.join(sorted(there ^ listed))}"
-    if tables.load(out).haptics["time"][-1] != story["end"]["time"]:
+    if read_results.load(out).haptics["time"][-1] != story["end"]["time"]:
         return "lost", "run.json says another end than the rows"
     return "done", ""
 

@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from tests.attack.cases import WITH_BELIEVED, Made, seeded
 from tests.attack.processes import PATIENCE, Room, own_folder
 from tests.orchestrator import hostile_slave
@@ -75,7 +75,7 @@ class Attack(Room):
         good = hostile_scene(folder / "2", "good_none_0")
         status, said = self._ended(good, "compiled", PATIENCE)
         assert status == 0, said
-        table = tables.load(self.out).haptics
+        table = read_results.load(self.out).haptics
         self._source = [table[f"source.{port}"].tolist() for port in ("y", "slope")]
 
     def made(
@@ -129,7 +129,7 @@ class Attack(Room):
         regular = run["end"]["reason"] in ("duration", "terminated")
         if (status == 0) != regular and not crash and not late:
             yield f"run.json says {run['end']['reason']}"
-        times = tables.load(self.out).haptics["time"]
+        times = read_results.load(self.out).haptics["time"]
         if len(times) and abs(times[-1] - run["end"]["time"]) > 1e-12:
             yield f"rows until {times[-1]} s, run.json until {run['end']['time']} s"
         if run["end"]["reason"] == "duration" and len(times) != ROWS:
@@ -145,7 +145,7 @@ class Attack(Room):
         whole = json.loads((self.out / "run.json").read_text())["end"]["reason"] == "duration"
         if (place, act) in CUT_SHORT and (fmi, act) != ("2", "early") and whole:
             yield f"a step that ended {act} was a whole one"
-        table = tables.load(self.out).haptics
+        table = read_results.load(self.out).haptics
         for port, good in zip(("y", "slope"), self._source, strict=True):
             numbers = table[f"source.{port}"].tolist()
             if numbers != good[: len(numbers)]:

@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from tests.attack.cases import Made, hear_interrupts
 from tests.attack.processes import PATIENCE, Process, Room, own_folder
 
@@ -87,7 +87,7 @@ class Attack(Room):
         end = json.loads(story)["end"]
         if end["reason"] not in (("duration",) if status == 0 else ("duration", "interrupted")):
             yield f"run.json says {end['reason']}"
-        elif tables.load(self.out).haptics["time"][-1] != end["time"]:
+        elif read_results.load(self.out).haptics["time"][-1] != end["time"]:
             yield "run.json says another end than the rows"
         there, listed = {p.name for p in self.out.iterdir()}, set(json.loads(story)["files"])
         if status == 0 and there != listed:

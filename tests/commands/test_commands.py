@@ -16,7 +16,7 @@ from hapticlink.commands.progress import progress, timed
 from hapticlink.fmus import durations
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from tests.shared_fixtures import status
 
 
@@ -24,7 +24,7 @@ def test_a_mechanism_alone_runs_at_the_haptic_rate(
     bar: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert status("run", str(bar), "--out", str(tmp_path / "out")) == 0
-    found = tables.load(tmp_path / "out")
+    found = read_results.load(tmp_path / "out")
     time = np.arange(129) / 512
     np.testing.assert_array_equal(found.haptics["time"], time)
     x = found.haptics["virtual_mechanism.x"][:, 0]
@@ -177,7 +177,7 @@ RUN = f"{sys.executable} -m hapticlink run pendulum --set duration=0.01 --no-fig
 )
 def test_a_closed_stream_is_no_fault(tmp_path: Path, closed: str) -> None:
     subprocess.run(f"{RUN} {closed}", shell=True, cwd=tmp_path, check=True)
-    found = tables.load(tmp_path / "out")
+    found = read_results.load(tmp_path / "out")
     assert found.run["end"]["reason"] == "duration"
     assert len(found.haptics["time"]) == 6
 

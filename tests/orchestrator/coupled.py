@@ -14,8 +14,8 @@ from hapticlink.fmus.build import build
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.read_results import Table
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.run.execute_plan import Outcome, run
 from hapticlink.orchestrator.scene.records import Iteration, PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules

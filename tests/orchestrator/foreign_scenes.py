@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 
 ISOLATED = "isolate = true\n"
 COMMAND = [sys.executable, "-m", "hapticlink"]
@@ -39,7 +39,7 @@ def scene(folder: Path, text: str, rate: int = 64, duration: float = 0.5) -> Pat
     return path
 
 
-def run(folder: Path, text: str, *options: str) -> tuple[Experiment, tables.Results]:
+def run(folder: Path, text: str, *options: str) -> tuple[Experiment, read_results.Results]:
     experiment = simulate(str(scene(folder, text)), folder / "out", options)
     return experiment, experiment.results
 
@@ -50,7 +50,7 @@ def process(path: Path | str, out: Path, **environment: str) -> subprocess.Compl
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
-def ran(folder: Path, text: str, *options: str) -> tables.Results:
+def ran(folder: Path, text: str, *options: str) -> read_results.Results:
     """The results of a run without a fault."""
     experiment, results = run(folder, text, *options)
     assert experiment.outcome.fault is None

@@ -14,7 +14,7 @@ from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.base.terminal_output import aligned
 from hapticlink.orchestrator.results.numbers import last_time, short
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.compare.settings import one_mechanism
 
 NONE = "-"

@@ -17,7 +17,7 @@ from hapticlink.analysis.findings.tracking import (
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.visualization.figure_axes import plain
 
 if TYPE_CHECKING:

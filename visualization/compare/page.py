@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hapticlink.analysis.findings import summary
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.recorded_scene import scene_file
-from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, settings
 from hapticlink.visualization.compare.numbers import Row
 from hapticlink.visualization.figure_axes import plain

@@ -22,7 +22,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.results.numbers import last_time
-from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.visualization.export.scene_update import WORLD, SceneDrawing, pose
 from hapticlink.visualization.replay.recorded_frames import Recorded
 

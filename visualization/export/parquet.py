@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.orchestrator.results.tables import Results, recorded
+from hapticlink.orchestrator.results.read_results import Results, recorded
 
 
 def write(results: Results, folder: Path) -> list[Path]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.user_port import UserPort, ports
-from hapticlink.orchestrator.results.tables import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 
 STRETCHES = 2048
 """Of a long run: more than a figure has pixels."""

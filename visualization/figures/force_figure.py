@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.forces import WRENCHES, all_wrenches, torques
 from hapticlink.analysis.findings.tracking import further_users
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.figure_axes import legend_above_curves, titled
 from hapticlink.visualization.figures.curves import Curve, curve
 

@@ -37,8 +37,8 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import last_time, short
+from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import all_devices, scene_part
-from hapticlink.orchestrator.results.tables import Results, Vector
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figure_axes import framed, plain, png, titled
 from hapticlink.visualization.figures.curves import Curve, curve, port_curve

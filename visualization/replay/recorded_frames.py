@@ -23,8 +23,8 @@ from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_POSE, by_user
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector, load
 from hapticlink.orchestrator.results.recorded_scene import scene_part
-from hapticlink.orchestrator.results.tables import Results, Table, Vector, load
 from hapticlink.visualization.mechanism.frame_signals import candidates
 from hapticlink.visualization.mechanism.picture import PORT, Picture
 

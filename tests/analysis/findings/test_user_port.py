@@ -11,7 +11,7 @@ from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.user_port import UserPort, allowance, user_port
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.figures.run_figures import figures
 
 

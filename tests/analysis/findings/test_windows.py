@@ -18,7 +18,7 @@ from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import windows
-from hapticlink.orchestrator.results.tables import Results, load
+from hapticlink.orchestrator.results.read_results import Results, load
 from hapticlink.orchestrator.results.windows import Streamed
 from hapticlink.visualization.figures import run_figures
 from hapticlink.visualization.figures.curves import STRETCHES, curve, extremes

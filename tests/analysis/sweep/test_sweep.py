@@ -27,8 +27,8 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
+from hapticlink.orchestrator.results.read_results import Results, Table
 from hapticlink.orchestrator.results.run_record import Energy
-from hapticlink.orchestrator.results.tables import Results, Table
 from hapticlink.visualization.figures import sweep_figure
 from tests.orchestrator.results.records import run_json
 from tests.shared_fixtures import status

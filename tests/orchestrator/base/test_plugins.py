@@ -193,7 +193,7 @@ def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path):
 def test_a_law_with_an_unknown_argument_is_the_plugin_s_error(tmp_path):
     law = (
         "from hapticlink.orchestrator.holds import HOLDS\n"
-        "from hapticlink.orchestrator.holds.history import {0} as Base\n"
+        "from hapticlink.orchestrator.holds.holds_of_samples import {0} as Base\n"
         "def law(y, speed): return y\n"
         "class Mine(Base):\n    laws = (law,)\n"
         'HOLDS.register("mine", Mine)\n'

@@ -12,8 +12,8 @@ from fmpy import fmi3
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.results.read_results import Table
 from hapticlink.orchestrator.results.run_record import Iterations
-from hapticlink.orchestrator.results.tables import Table
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.c_fmus import compiled
 from tests.orchestrator.coupled import NEWTON, simulate, system

@@ -12,7 +12,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, RUN, hostile_scene, process
@@ -75,7 +75,7 @@ def test_a_change_of_the_current_directory_is_undone_and_told(
     assert f"changed the current directory to {to}: it is {tmp_path} again" in caplog.text
     assert name in caplog.text
     assert {p.name for p in (tmp_path / "out").iterdir()} == set(run.run["files"])
-    assert len(tables.load(tmp_path / "out").haptics["time"]) == 33
+    assert len(read_results.load(tmp_path / "out").haptics["time"]) == 33
 
 
 def test_runs_in_threads_leave_the_current_directory_alone(tmp_path, monkeypatch):
@@ -163,7 +163,7 @@ def test_a_retried_step_that_asks_for_the_end_is_no_discard(tmp_path, capsys):
     told = capsys.readouterr()
     assert "scene: ended: step_finish_20 has asked to end the simulation, at 0.3125 s" in told.out
     assert not told.err
-    assert tables.load(tmp_path / "out").haptics["step_finish_20.slope"][-1] > 0
+    assert read_results.load(tmp_path / "out").haptics["step_finish_20.slope"][-1] > 0
 
 
 def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path):
@@ -185,7 +185,7 @@ def test_exit_of_c_is_no_success(tmp_path, fmi, loop):
     ended = process(hostile_scene(tmp_path, "step_exit_20"), out, HAPTICLINK_LOOP=loop)
     assert ended.returncode == 1
     assert "the process of the run ended after t = 0.296875 s" in ended.stderr
-    found = tables.load(out)
+    found = read_results.load(out)
     assert found.run["fault"]["kind"] == "Crash"
     assert found.haptics["time"].tolist() == [k / 64 for k in range(20)]
 
@@ -195,9 +195,9 @@ def test_a_crash_at_the_end_is_recorded_at_the_time_of_its_rows(tmp_path):
     hostile_fmu(tmp_path)
     out = tmp_path / "out"
     process(hostile_scene(tmp_path, "end_null_9"), out)
-    waited_for(lambda: tables.load(out).run["end"]["reason"] != "running")
-    assert tables.load(out).run["end"] == {"reason": "fault", "time": 0.5}
-    assert tables.load(out).haptics["time"][-1] == 0.5
+    waited_for(lambda: read_results.load(out).run["end"]["reason"] != "running")
+    assert read_results.load(out).run["end"] == {"reason": "fault", "time": 0.5}
+    assert read_results.load(out).haptics["time"][-1] == 0.5
 
 
 def mapped(pid: int) -> list[str]:

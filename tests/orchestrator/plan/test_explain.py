@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hapticlink.analysis.sweep.job import jobs
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.system.timeline import timeline
 from tests.shared_fixtures import sets, status
 
@@ -56,7 +56,7 @@ def test_what_does_not_come_round_is_told_to_its_end(tmp_path, capsys, scene, op
     told = explained(capsys, scene, *options).splitlines()
     assert told[-1] == "cut after 600 events; a run writes them all to plan.txt"
     assert status("run", scene, "--no-figures", "--out", tmp_path, *sets(options)) == 0
-    haptics = tables.load(tmp_path).haptics["time"]
+    haptics = read_results.load(tmp_path).haptics["time"]
     kept = (tmp_path / "plan.txt").read_text().splitlines()
     table = next(i for i, line in enumerate(told) if line.startswith("tick, "))
     assert kept[kept.index(told[table]) :][: len(told) - table - 1] == told[table:-1]

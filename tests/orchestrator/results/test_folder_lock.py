@@ -10,7 +10,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import folder_lock, tables
+from hapticlink.orchestrator.results import folder_lock, read_results
 from tests.orchestrator.foreign_scenes import RUN as COMMAND
 from tests.orchestrator.foreign_scenes import process
 from tests.shared_fixtures import status
@@ -28,7 +28,7 @@ def test_a_second_run_is_refused_at_once(tmp_path):
     first = hl.run("pendulum", {"duration": 20}, out=out, figures=False, progress=second)
     assert f"--out {out}: another run writes there, in process" in refusals[0]
     assert first.run["end"]["reason"] == "duration"
-    assert tables.load(out).haptics["time"][-1] == first.run["end"]["time"] == 20
+    assert read_results.load(out).haptics["time"][-1] == first.run["end"]["time"] == 20
     assert status("run", "pendulum", "--out", out, "--no-figures") == 0  # afterwards
 
 
@@ -77,4 +77,4 @@ def test_many_at_once_leave_one_whole_run(tmp_path):
     assert any(code == 0 for _, code in ends)
     story = json.loads((tmp_path / "o" / "run.json").read_text())
     assert {p.name for p in (tmp_path / "o").iterdir()} == set(story["files"])
-    assert tables.load(tmp_path / "o").haptics["time"][-1] == story["end"]["time"]
+    assert read_results.load(tmp_path / "o").haptics["time"][-1] == story["end"]["time"]

@@ -10,9 +10,9 @@ import pytest
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import rows, tables
-from hapticlink.orchestrator.results.files import FileRecorder
+from hapticlink.orchestrator.results import binary_rows, read_results
 from hapticlink.orchestrator.results.recover import Recovered, recover
+from hapticlink.orchestrator.results.write_files import FileRecorder
 from tests.orchestrator.c_fmus import hostile_fmu
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import COMMAND, ISOLATED, RUN, fmu_table, scene
@@ -29,7 +29,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path):
     path, out = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED), duration=5), tmp_path / "out"
     with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.DEVNULL) as running:
         while not (table := out / "haptics.rows").exists() or (
-            len(rows.Written(table)) < LAST * 64 + 1
+            len(binary_rows.Written(table)) < LAST * 64 + 1
         ):
             assert running.poll() is None
         with pytest.raises(InputFault, match=f"its run goes on, in process {running.pid}"):
@@ -41,7 +41,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path):
     assert run["end"] == {"reason": "fault", "time": LAST}
     assert run["fault"]["kind"] == "Killed"
     assert {p.name for p in out.iterdir()} == {"run.json", "haptics.csv"}
-    table = tables.load(out).haptics
+    table = read_results.load(out).haptics
     np.testing.assert_array_equal(table["time"], np.arange(LAST * 64 + 1) / 64)
 
 
@@ -58,9 +58,9 @@ def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
     with recorder.target.open("ab") as file:
         file.write(block.tobytes()[: 2 * 24 + 7])
     expected = [[k / 8, k, -k] for k in range(5)]
-    assert rows.Written(recorder.target)[:].tolist() == expected
+    assert binary_rows.Written(recorder.target)[:].tolist() == expected
     recorder.block.filled.value = 0
-    assert rows.Written(recorder.target)[:].tolist() == expected[:2]
+    assert binary_rows.Written(recorder.target)[:].tolist() == expected[:2]
     run = run_json(rates=["haptics"], files=["haptics.csv"])
     (tmp_path / "run.json").write_text(json.dumps(run))
     assert recover(tmp_path) == {"haptics": Recovered(2, 1 / 8, 1)}

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.orchestrator.results.files import FileRecorder, text, write, write_over
-from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.results.read_results import read_table
+from hapticlink.orchestrator.results.write_files import FileRecorder, text, write, write_over
 
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> FileRecorder:

@@ -10,7 +10,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.results.recover import recover
 from tests.shared_fixtures import status
 
@@ -63,7 +63,7 @@ def out(tmp_path):
 def test_a_run_replaces_them(out, spoil):
     spoil(out)
     assert status("run", "pendulum", "--set", "duration=0.1", "--out", out, "--no-figures") == 0
-    assert tables.load(out).haptics["time"][-1] == pytest.approx(0.1, abs=2e-3)
+    assert read_results.load(out).haptics["time"][-1] == pytest.approx(0.1, abs=2e-3)
 
 
 def test_a_folder_in_the_place_of_run_json_is_told(out, capsys):
@@ -77,7 +77,7 @@ def test_a_folder_in_the_place_of_run_json_is_told(out, capsys):
 )
 def test_what_reads_them_refuses_them(out, spoil):
     spoil(out)
-    for read in (tables.load, hl.load):
+    for read in (read_results.load, hl.load):
         with pytest.raises(InputFault, match=str(out)):
             read(out)
     for command in ("report", "compare", "view", "recover"):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from tests.orchestrator.c_fmus import hostile_fmu
 from tests.orchestrator.foreign_fmus import edited, edited_entries, slave
 from tests.orchestrator.foreign_scenes import fmu_table, run, scene
@@ -74,7 +74,7 @@ def test_without_an_earlier_row_the_fault_stands_in_run_json(tmp_path):
     for _ in range(2):  # the second finds the first, which has no row
         experiment, _ = run(tmp_path, ONE)
         assert experiment.outcome.published
-        found = tables.load(tmp_path / "out")
+        found = read_results.load(tmp_path / "out")
         assert found.run["fault"]["message"] == "one: output y is nan at t = 0 s"
         assert found.haptics["one.y"].tolist() == []
 
@@ -87,7 +87,7 @@ def test_results_of_a_run_without_rows_are_not_those_of_another(tmp_path):
     assert not experiment.outcome.published
     assert found.run["end"] == {"reason": "fault", "time": 0.0}
     assert found.haptics["one.y"].tolist() == []
-    assert tables.load(tmp_path / "out").run["end"]["reason"] == "duration"
+    assert read_results.load(tmp_path / "out").run["end"]["reason"] == "duration"
 
 
 def test_json_of_a_run_without_rows_tells_its_fault(tmp_path, capsys):

@@ -18,7 +18,7 @@ import pytest
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
 from tests.orchestrator.foreign_fmus import SLAVE, edited_entries, python_fmu, python_fmu_of, slave
@@ -240,7 +240,7 @@ def test_an_exception_in_terminate_is_told_after_the_last_row(tmp_path, body, is
     assert ended.status == 1
     assert "hapticlink: two: fmi2Terminate returned fatal at t = 0.5 s" in ended.said
     assert body[6:18] in ended.said
-    found = tables.load(out)
+    found = read_results.load(out)
     assert (found.run["end"]["reason"], found.haptics["time"][-1]) == ("fault", 0.5)
 
 
@@ -268,7 +268,7 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, cr
     ended = process(path, out)
     assert ended.returncode == status
     assert "isolate = true" in ended.stderr
-    found = tables.load(out)
+    found = read_results.load(out)
     np.testing.assert_array_equal(found.haptics["time"], np.arange(2 * 64 + 1) / 64)
     np.testing.assert_array_equal(found.haptics["one.y"][1:], found.haptics["time"][1:])
     assert found.run["end"] == {"reason": "fault", "time": 2.0}
@@ -313,7 +313,7 @@ def test_a_signal_keeps_results_and_exits_with_1(tmp_path, number, isolate):
     assert b"interrupted at t = " in said
     with pytest.raises(ProcessLookupError):  # the FMU's, when it has one of its own
         os.kill(int(started.read_text()), 0)
-    found = tables.load(out)
+    found = read_results.load(out)
     assert found.run["end"]["reason"] == "interrupted"
     assert found.haptics["time"][-1] == found.run["end"]["time"] >= 0.3
 
@@ -327,7 +327,7 @@ def test_a_full_disk_keeps_whole_rows_and_exits_with_1(tmp_path):
     assert ended.returncode == 1
     assert "File too large" in ended.stderr
     assert "Traceback" not in ended.stderr
-    found = tables.load(out)
+    found = read_results.load(out)
     assert found.run["end"]["time"] == found.haptics["time"][-1]
     rows = found.haptics["time"]
     np.testing.assert_array_equal(rows, np.arange(len(rows)) / 64)
@@ -362,7 +362,7 @@ def test_run_json_tells_how_a_run_ended_whose_disk_is_full(tmp_path, step):
     ended = subprocess.run(shell, capture_output=True, check=False)
     assert ended.stdout.splitlines()[-1] == b"1", ended.stderr
     assert told.encode() in ended.stderr
-    found = tables.load(tmp_path / "out")
+    found = read_results.load(tmp_path / "out")
     assert found.run["end"]["reason"] == "fault"
     assert told in found.run["fault"]["message"]
     assert found.run["end"]["time"] == found.haptics["time"][-1]

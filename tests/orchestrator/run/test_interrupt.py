@@ -15,7 +15,7 @@ import pytest
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import rows, tables
+from hapticlink.orchestrator.results import binary_rows, read_results
 from tests.orchestrator.c_fmus import hostile_fmu
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, RUN, fmu_table, scene
@@ -92,13 +92,13 @@ def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path):
         _, said = running.communicate(timeout=60)
     assert (running.returncode, said.count(b"\n")) == (1, 1)
     assert said.startswith(b"hapticlink: interrupted ")
-    assert tables.load(tmp_path / "out").run["end"]["reason"] == "interrupted"
+    assert read_results.load(tmp_path / "out").run["end"]["reason"] == "interrupted"
 
 
 def rows_of(folder: Path) -> int:
     """The number of rows of a run that goes on."""
     table = folder / "haptics.rows"
-    return len(rows.Written(table)[:]) if table.exists() else 0
+    return len(binary_rows.Written(table)[:]) if table.exists() else 0
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_a_second_signal_ends_an_fmu_that_hangs(tmp_path, name, fmu, more, numbe
             running.send_signal(number)
         _, said = running.communicate(timeout=60)
     assert (running.returncode, said) == (1, b"hapticlink: interrupted twice: ended at once\n")
-    found = tables.load(out)
+    found = read_results.load(out)
     assert found.run["end"] == {"reason": "interrupted", "time": 3 / 64}
     assert found.run["fault"]["message"] == "interrupted at t = 0.046875 s"
     assert found.haptics["time"][-1] == 3 / 64

@@ -16,7 +16,7 @@ import pytest
 
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import read_table
+from hapticlink.orchestrator.results.read_results import read_table
 from hapticlink.orchestrator.run import concurrent_fmus, pace
 from hapticlink.orchestrator.run.compiled.library import CHOICE
 from hapticlink.orchestrator.run.real_time import RealTimeRun

@@ -12,7 +12,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays
-from hapticlink.orchestrator.results import tables
+from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.run import execute_plan
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import COMMAND, fault, fmu_table, run, scene
@@ -26,7 +26,7 @@ def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path):
     out = tmp_path / "out"
     assert status("run", "closed-loop", "--out", out, *SHORT) == 0
     first = {p.name for p in out.iterdir()}
-    assert set(tables.load(out).run["files"]) == first
+    assert set(read_results.load(out).run["files"]) == first
     assert {"graphics.csv", "constraints.png"} <= first
     (out / "notes.txt").write_text("mine")
     outside = tmp_path / "outside.txt"
@@ -36,7 +36,7 @@ def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path):
     (out / "run.json").write_text(json.dumps(run))
     assert status("run", "four-bar", "--no-figures", "--out", out, *SHORT) == 0
     found = {p.name for p in out.iterdir()}
-    assert found == {*tables.load(out).run["files"], "notes.txt"}
+    assert found == {*read_results.load(out).run["files"], "notes.txt"}
     assert "graphics.csv" not in found
     assert outside.read_text() == "mine"
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import Table
+from hapticlink.orchestrator.results.read_results import Table
 from hapticlink.orchestrator.scene.blocks import FromGraphics, blocks
 
 SHORT = "duration=0.2"

@@ -12,7 +12,7 @@ from fmpy.ssp.ssd import read_ssd
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from tests.orchestrator.c_fmus import c_fmu3, clock_fmu3
 from tests.orchestrator.foreign_fmus import python_fmu, slave, with_units
 from tests.orchestrator.foreign_scenes import PAIR, fmu_table, scene, wire_table

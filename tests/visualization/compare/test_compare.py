@@ -16,8 +16,8 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.results.folders import named
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.recorded_scene import scene_file
-from hapticlink.orchestrator.results.tables import Results
 from hapticlink.visualization.compare import numbers, overlay, page, settings
 from tests.shared_fixtures import status
 

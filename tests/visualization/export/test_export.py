@@ -25,7 +25,7 @@ from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.results import windows
-from hapticlink.orchestrator.results.tables import Results, Table
+from hapticlink.orchestrator.results.read_results import Results, Table
 from hapticlink.visualization.mechanism import drawing
 from hapticlink.visualization.replay.recorded_frames import Recorded
 from tests.shared_fixtures import status

@@ -7,7 +7,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.findings.user_port import user_port
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figures import run_figures, sweep_figure
 from hapticlink.visualization.figures.force_figure import forces

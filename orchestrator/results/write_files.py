@@ -11,13 +11,14 @@ from typing import Any, BinaryIO
 
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.results import rows
+from hapticlink.orchestrator.results import binary_rows
 from hapticlink.orchestrator.results.run_results import Recorder
 
 
 class FileRecorder(Recorder):
     """Writes a table to files: rows are kept in a block, which a crash of the process leaves
-    (`rows.FileBlock`), and go to a file of doubles beside it, of which `finish` makes the CSV.
+    (`binary_rows.FileBlock`), and go to a file of doubles beside it, of which `finish` makes the
+    CSV.
     `first` has to call `publish`, which moves that file to its place, `target`.
     """
 
@@ -30,18 +31,18 @@ class FileRecorder(Recorder):
         every: int = 1,
     ) -> None:
         super().__init__(recorded, values, first, every)
-        self.path, self.target = path, path.with_suffix(rows.SUFFIX)
+        self.path, self.target = path, path.with_suffix(binary_rows.SUFFIX)
         self._full: float | None = None
         self._file: BinaryIO | None = None
         if recorded is None:
             return
-        self.block: rows.FileBlock = rows.FileBlock(path, len(self.columns))
+        self.block: binary_rows.FileBlock = binary_rows.FileBlock(path, len(self.columns))
         self.files = (self.target.name, self.block.path.name)
         self._unfinished = path.with_name(f".{self.target.name}.{os.getpid()}")
         self._unfinished.unlink(missing_ok=True)
         self._file = self._unfinished.open("xb", buffering=0)  # never through a link
         try:
-            self._write(rows.header(self.columns))
+            self._write(binary_rows.header(self.columns))
         except OSError:
             self.__exit__()
             raise
@@ -99,15 +100,15 @@ class FileRecorder(Recorder):
 def make_csv(path: Path) -> int:
     """Make the CSV `path` of its rows, which stay; their number. Raises OSError, as on a full
     disk."""
-    source = path.with_suffix(rows.SUFFIX)
+    source = path.with_suffix(binary_rows.SUFFIX)
     with atomic_file(path) as unfinished, unfinished.open("xb") as file:
-        count = rows.write_csv(source, file)
+        count = binary_rows.write_csv(source, file)
     return count
 
 
 def remove_rows(path: Path) -> None:
     """Remove the rows of which the CSV `path` was made."""
-    for left in (path.with_suffix(rows.SUFFIX), *rows.blocks(path)):
+    for left in (path.with_suffix(binary_rows.SUFFIX), *binary_rows.blocks(path)):
         left.unlink(missing_ok=True)
 
 

@@ -18,10 +18,10 @@ from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.results import rows, run_record
+from hapticlink.orchestrator.results import binary_rows, run_record
 from hapticlink.orchestrator.results.run_record import RunRecord
 
-TABLES = (".csv", rows.SUFFIX)
+TABLES = (".csv", binary_rows.SUFFIX)
 """Endings of the names of tables."""
 
 
@@ -170,7 +170,7 @@ def size(folder: Path, run: Mapping[str, Any], binary: bool = False) -> int:
 def _place(path: Path, binary: bool = False) -> Path:
     """Where a table is: a CSV, or what it is made of where the run was killed, or where that is
     wanted (`binary`) and still there."""
-    left = path.with_suffix(rows.SUFFIX)
+    left = path.with_suffix(binary_rows.SUFFIX)
     return left if left.exists() and (binary or not path.exists()) else path
 
 
@@ -237,7 +237,7 @@ def read_table(
     tables. Raises InputFault for a table that is not as a run writes it."""
     if (place := _place(path, binary)) != path:
         _require_file(place)
-        written = rows.Written(place)
+        written = binary_rows.Written(place)
         return Table(written.columns, written[:], {} if others is None else others)
     (columns, values), *_ = csv_parts(path)
     return Table(columns, values, {} if others is None else others)

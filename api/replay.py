@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from hapticlink.orchestrator.results.tables import Results
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.replay import replay_page
 from hapticlink.visualization.replay.recorded_frames import Recorded
 
