@@ -20,7 +20,7 @@ from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
-from hapticlink.orchestrator.results.read_results import Results, Table
+from hapticlink.orchestrator.results.read_results import Results, Table, described
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
 from hapticlink.orchestrator.results.run_results import RunResults
@@ -71,7 +71,7 @@ class Experiment:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
                 return opened(self.folder, record)
-            return Results(None, self.run, self.memory.tables()).described_by(record)
+            return described(Results(None, self.run, self.memory.tables()), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:

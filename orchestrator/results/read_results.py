@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import chain, islice
 from pathlib import Path
 from textwrap import fill
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -114,11 +114,6 @@ class Results:
     begin: float = -math.inf
     end: float = math.inf
 
-    def described_by(self, record: RunRecord) -> Self:
-        """These results, whose `record` is known without reading it from `run`."""
-        vars(self)["record"] = record
-        return self
-
     @property
     def number(self) -> int:
         """The number of `windows`."""
@@ -159,6 +154,12 @@ class Results:
     def graphics(self) -> Table:
         """The Table of the graphics rate; KeyError where no FMU runs at it."""
         return self.tables["graphics"]
+
+
+def described(results: Results, record: RunRecord) -> Results:
+    """Results whose `record` is known without reading it from `run`."""
+    vars(results)["record"] = record
+    return results
 
 
 def size(folder: Path, run: Mapping[str, Any], binary: bool = False) -> int:
@@ -208,7 +209,7 @@ def load(folder: Path | str, binary: bool = False, record: RunRecord | None = No
     run = run_json(folder)
     record = record or run_record.read(run, folder)
     tables = FolderTables(folder, record.rates, record.files, binary)
-    return Results(folder, run, dict(tables)).described_by(record)
+    return described(Results(folder, run, dict(tables)), record)
 
 
 def run_json(folder: Path) -> dict[str, Any]:

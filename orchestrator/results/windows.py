@@ -21,6 +21,7 @@ from hapticlink.orchestrator.results.read_results import (
     Results,
     Table,
     csv_parts,
+    described,
     empty,
     load,
     recorded,
@@ -42,7 +43,7 @@ def opened(folder: Path, record: RunRecord | None = None) -> Results:
     if size(folder, run, binary=True) <= WINDOW_BYTES:
         return load(folder, binary=True, record=record)
     streamed = Streamed(folder, run, FolderTables(folder, run["rates"], run["files"]))
-    return streamed.described_by(record) if record else streamed
+    return described(streamed, record) if record else streamed
 
 
 @contextmanager
@@ -100,14 +101,14 @@ class Streamed(Results):
                 name: _part(files[name], *span) if name in files else empty({})
                 for name in record.rates
             }
-            yield Results(self.folder, self.run, tables, begin, until).described_by(record)
+            yield described(Results(self.folder, self.run, tables, begin, until), record)
 
 
 def until(results: Results, time: float) -> Iterator[Results]:
     """The windows of results until a time (s)."""
     for window in results.windows():
         if window.begin < time:
-            yield replace(window, end=min(window.end, time)).described_by(results.record)
+            yield described(replace(window, end=min(window.end, time)), results.record)
 
 
 def last(results: Results) -> Results:

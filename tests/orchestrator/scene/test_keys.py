@@ -25,7 +25,7 @@ from hapticlink.orchestrator.scene import (
     key_descriptions,
     overrides,
     read_and_check,
-    schema,
+    types_of_keys,
 )
 from hapticlink.orchestrator.scene.rates import Exact
 from hapticlink.orchestrator.scene.scene import Scene
@@ -34,17 +34,17 @@ from hapticlink.orchestrator.scene.scene_source import Source
 
 def records(hint: Any) -> Iterator[Any]:
     """Every record that is reached from a type."""
-    for kind in schema.branches(hint):
+    for kind in types_of_keys.branches(hint):
         if is_dataclass(kind):
             yield kind
-            yield from chain.from_iterable(map(records, schema.hints(kind).values()))
+            yield from chain.from_iterable(map(records, types_of_keys.hints(kind).values()))
         else:
             yield from chain.from_iterable(map(records, typing.get_args(kind)))
 
 
 def bare(hint: Any) -> Iterator[Any]:
     """The numbers within a type that say neither unit nor range."""
-    for kind, quantity in schema.measured(hint):
+    for kind, quantity in types_of_keys.measured(hint):
         if kind in (float, int) and not quantity:
             yield kind
         elif typing.get_origin(kind) in (tuple, Mapping):
@@ -62,7 +62,7 @@ def test_records_of_every_table_are_found():
 @pytest.mark.parametrize("record", RECORDS)
 def test_every_key_has_a_meaning_and_every_number_a_quantity(record):
     meanings = key_descriptions.meanings(record)
-    for name, hint in schema.hints(record).items():
+    for name, hint in types_of_keys.hints(record).items():
         assert meanings[name].endswith("."), name
         assert not list(bare(hint)), name
 
@@ -80,7 +80,7 @@ class Number(NamedTuple):
 
 def numbers(hint: Any, value: Any, path: tuple[str | int, ...]) -> Iterator[Number]:
     """Every number that a key may hold: of its value's type, or of any where it has none."""
-    for kind, quantity in schema.measured(hint):
+    for kind, quantity in types_of_keys.measured(hint):
         origin, arguments = typing.get_origin(kind), typing.get_args(kind)
         if kind in (float, int) and quantity and not isinstance(value, tuple):
             yield Number(path, (), value, quantity, kind is int and not isinstance(quantity, Exact))
@@ -91,7 +91,7 @@ def numbers(hint: Any, value: Any, path: tuple[str | int, ...]) -> Iterator[Numb
             for field in fields(value):
                 key = field.name.rstrip("_")
                 yield from numbers(
-                    schema.hints(kind)[key], getattr(value, field.name), (*path, key)
+                    types_of_keys.hints(kind)[key], getattr(value, field.name), (*path, key)
                 )
         elif origin is tuple and is_dataclass(arguments[0]):
             for i, each in enumerate(value or ()):
