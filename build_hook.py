@@ -14,6 +14,8 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+from contextlib import suppress
+from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +49,10 @@ class Build(BuildHookInterface):
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         if self.target_name == "wheel" and version != "editable":
             self._room.cleanup()
+            cached = Path(cache_from_source(__file__))  # of this module, in the checkout
+            cached.unlink(missing_ok=True)
+            with suppress(OSError):  # there are others
+                cached.parent.rmdir()
 
     def _compiled(self, folder: Path, tag: str | None = None) -> Path | None:
         """The compiled loop, in `folder`; None where it cannot be compiled here. It is then
