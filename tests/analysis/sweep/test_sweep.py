@@ -555,3 +555,7 @@ def test_ctrl_c_ends_a_sweep_while_its_points_are_read() -> None:
     with interrupt.held(), pytest.raises(Interrupted):
         points_of.jobs("pendulum", [], points())
     assert len(read) <= 4
+
+
+def test_the_run_time_is_the_last_column():
+    assert table.columns([{"run_time_s": 1.0, "b": 2.0}, {"a": 3.0}]) == ["b", "a", "run_time_s"]
