@@ -19,7 +19,7 @@ from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
-from hapticlink.analysis.stability.smooth_scene import frame_length, short, whole_frames
+from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault

@@ -49,7 +49,8 @@ from hapticlink.analysis.stability.port_response import (
     response,
 )
 from hapticlink.analysis.stability.poses import in_own_hand
-from hapticlink.analysis.stability.smooth_scene import linearisable, rounded
+from hapticlink.analysis.stability.short_hyperperiod import rounded
+from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Vector

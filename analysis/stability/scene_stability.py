@@ -32,7 +32,8 @@ from hapticlink.analysis.stability.poses import (
     settled,
     simulated,
 )
-from hapticlink.analysis.stability.smooth_scene import linearisable, short, with_quicker_fmus
+from hapticlink.analysis.stability.short_hyperperiod import short
+from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
 from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.analysis.stability.workspace_grid import grid_poses

@@ -28,7 +28,7 @@ from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import Pose, evenly_spaced, fault_of, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
-from hapticlink.analysis.stability.smooth_scene import whole_frames
+from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.tune.felt_stiffness import CONSTRAINED, RIGID, mobility
 from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.components.linkage.parameters import mean_link_length

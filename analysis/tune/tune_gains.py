@@ -25,7 +25,7 @@ import numpy as np
 
 from hapticlink.analysis.stability.poses import Pose, at_equilibrium, evenly_spaced, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene
-from hapticlink.analysis.stability.smooth_scene import whole_frames
+from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.tune.felt_stiffness import Feel
 from hapticlink.analysis.tune.run_measures import RunLimit, motion
 from hapticlink.analysis.tune.search import COARSE, search
