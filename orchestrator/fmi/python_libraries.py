@@ -69,24 +69,28 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> str:
 
 
 def tell_exceptions(module: str, tell: Callable[[bytes], object]) -> None:
-    """Have the newest instance of a Python FMU `tell` the file and line of an exception, of which
-    its library logs the text alone. Its module has been executed for this instance, so that the
-    classes in it are of this instance, too."""
+    """Have the newest instance of a Python FMU `tell` at which line of its own files an exception
+    came up, of which its library logs the text alone. Its module has been executed for this
+    instance, so that the classes in it are of this instance, too."""
     scope = vars(sys.modules[module]) if module in sys.modules else {}
+    own_files = Path(scope.get("__file__") or "").parent
     for kind in [*scope.values()]:
         own = isinstance(kind, type) and kind.__module__ == module and not kind.__subclasses__()
         for name in filter(CALLED.fullmatch, dir(kind) if own else ()):
             if isfunction(method := getattr_static(kind, name)):
-                setattr(kind, name, _telling(method, tell))
+                setattr(kind, name, _telling(method, own_files, tell))
 
 
-def _telling(method: Callable[..., Any], tell: Callable[[bytes], object]) -> Callable[..., Any]:
+def _telling(
+    method: Callable[..., Any], own_files: Path, tell: Callable[[bytes], object]
+) -> Callable[..., Any]:
     @wraps(method)
     def telling(*arguments: Any, **named: Any) -> Any:
         try:
             return method(*arguments, **named)
         except Exception as error:
-            last = extract_tb(error.__traceback__)[-1]
+            frames = extract_tb(error.__traceback__)
+            last = ([f for f in frames if Path(f.filename).parent == own_files] or frames)[-1]
             where = f"{Path(last.filename).name}, line {last.lineno}, in {last.name}: {last.line}"
             tell(f"{where}: {type(error).__name__}: {error}".encode())
             raise

@@ -23,12 +23,21 @@ def test_the_newest_messages_are_kept_and_no_novel():
 
 
 @pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
-def test_an_exception_of_a_python_fmu_has_its_file_and_line(tmp_path, isolate):
-    python_fmu(tmp_path, "Slow", "self.y = 1 / (2 - self.steps)")
+@pytest.mark.parametrize(
+    ("code", "error"),
+    [
+        ("self.y = 1 / (2 - self.steps)", "ZeroDivisionError: division by zero"),
+        (  # in a file of another library
+            "self.y = Fraction(1, 2 - self.steps)", "ZeroDivisionError: Fraction(1, 0)"
+        ),
+    ],
+)  # fmt: skip
+def test_an_exception_of_a_python_fmu_has_its_file_and_line(tmp_path, isolate, code, error):
+    python_fmu(tmp_path, "Slow", f"from fractions import Fraction; {code}")
     (module,) = tmp_path.glob("m*.py")
     text = module.read_text().splitlines()
-    line = next(i for i, code in enumerate(text, 1) if "1 / (2" in code)
+    line = next(i for i, each in enumerate(text, 1) if code in each)
     path = scene(tmp_path, fmu_table("slow", "Slow", isolate))
     fault = str(simulate(str(path), tmp_path / "out").outcome.fault)
-    where = f"{module.name}, line {line}, in do_step: self.y = 1 / (2 - self.steps)"
-    assert f"slow says: {where}: ZeroDivisionError: division by zero\n" in fault
+    where = f"{module.name}, line {line}, in do_step: {text[line - 1].strip()}"
+    assert f"slow says: {where}: {error}\n" in fault
