@@ -20,7 +20,7 @@ from benchmarks.page import Progress, table
 from benchmarks.timing import Row, made_anew, measured_scenes, simulated
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
 
 DURATION = 3.0

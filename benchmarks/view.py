@@ -29,7 +29,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 from hapticlink.visualization.live_page.server_pipe import Link
 from hapticlink.visualization.live_page.session import Session
 

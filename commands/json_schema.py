@@ -14,8 +14,8 @@ from typing import Any
 
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.scene import key_descriptions, types_of_keys
-from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import ForeignFmu
 from hapticlink.orchestrator.scene.toml_keys import NAMED
 
 DRAFT = "https://json-types_of_keys.org/draft/2020-12/schema"

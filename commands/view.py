@@ -107,9 +107,9 @@ def view(
     default = default_folder("runs", scene)
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
-    second_run = "hapticlink.commands.compared_run", f"{root}-b"
+    second_run = "hapticlink.commands.view_second_run", f"{root}-b"
     with _server(host, port, token, *second_run) as link:
-        from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+        from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 
         read = viewed(scene, changes.options)  # while the server starts
         served_port = _port(link, host, port)
@@ -128,7 +128,7 @@ def view(
 
 def _written(name: str, changes: Changes, path: Path) -> int:
     """Write the page of a scene that needs no server."""
-    from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+    from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
     from hapticlink.visualization.standalone import page
 
     scene = viewed(name, changes.options)

@@ -49,7 +49,7 @@ BUILDINGS = {
         "mechanism",
         "figures",
         "browser_code",
-        "interactive_scene",
+        "live_and_standalone",
         "live_page",
         "standalone",
         "replay",

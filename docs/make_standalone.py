@@ -21,7 +21,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
 
 FOLDER = Path(__file__).parents[1] / "standalone"

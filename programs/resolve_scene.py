@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
-from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account

@@ -1,4 +1,4 @@
-"""The interface of a loaded FMU, implemented in this process (`in_process_fmi2`, `in_process_fmi3`)
+"""The interface of a loaded FMU, implemented in this process (`calls_of_fmi2`, `calls_of_fmi3`)
 and in a process of its own (`isolated`)."""
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
 from hapticlink.orchestrator.plan.sample_ages import Delay
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.system import Replacement
 
 

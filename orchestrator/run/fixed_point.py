@@ -15,7 +15,7 @@ from hapticlink.orchestrator.run.jacobians import Through
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.solvers import SOLVERS, Matrix, Newton, Solution, Vector
-from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.scene.scene_tables import Iteration
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.ports import beside
 from hapticlink.orchestrator.system.system import Connection, System

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Needs, Vector
 from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.scene.records import SetSpring
+from hapticlink.orchestrator.scene.scene_tables import SetSpring
 from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 from hapticlink.orchestrator.system.ports import beside, kind, turns
 from hapticlink.orchestrator.system.springs import spring

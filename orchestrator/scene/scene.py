@@ -31,7 +31,8 @@ from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN, by_user
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
-from hapticlink.orchestrator.scene.records import (
+from hapticlink.orchestrator.scene.scene_source import Source
+from hapticlink.orchestrator.scene.scene_tables import (
     SCHEMES,
     ForeignFmu,
     HoldName,
@@ -43,7 +44,6 @@ from hapticlink.orchestrator.scene.records import (
     TimedEvent,
     Wire,
 )
-from hapticlink.orchestrator.scene.scene_source import Source
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 

@@ -9,7 +9,7 @@ from dataclasses import fields
 from typing import Any
 
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.scene.toml import TOKEN, loads
 
 Path = tuple[str | int, ...]

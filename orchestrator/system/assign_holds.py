@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.records import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.system import springs
 from hapticlink.orchestrator.system.ports import beside, between_plants, carries_power, kind, names
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused

@@ -16,8 +16,8 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.scene.blocks import Blocks, blocks
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
-from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Path as Keys
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system import (

@@ -9,8 +9,8 @@ from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
 from hapticlink.orchestrator.fmi.kind_check import misfit
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.records import PowerPort
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import PowerPort
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 from hapticlink.orchestrator.system import springs
 from hapticlink.orchestrator.system.ports import between_plants, names, size

@@ -8,7 +8,7 @@ from dataclasses import replace
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, conversion
 from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
-from hapticlink.orchestrator.scene.records import Wire
+from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem, reported
 from hapticlink.orchestrator.system.fmu_tables import outputs, settable
 from hapticlink.orchestrator.system.system import Connection, Fmu

@@ -15,8 +15,8 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.fmi.process_cache import described
 from hapticlink.orchestrator.fmi.start_values import Starts, fitting
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.scene.records import ForeignFmu, Value
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import ForeignFmu, Value
 from hapticlink.orchestrator.scene.toml_keys import Problem, reported
 from hapticlink.orchestrator.system.port_map import Mapped, mapped, renamed, with_declarations
 

@@ -20,7 +20,7 @@ import numpy as np
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.hold import Vector
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 
 
 class Link:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import power_across_rates

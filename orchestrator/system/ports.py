@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.kind_check import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.scene.records import PowerPort
+from hapticlink.orchestrator.scene.scene_tables import PowerPort
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.fmi.variables import WRITTEN
-from hapticlink.orchestrator.scene.records import Record
+from hapticlink.orchestrator.scene.scene_tables import Record
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import System
 

@@ -9,8 +9,8 @@ from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.blocks import BlockPlan
-from hapticlink.orchestrator.scene.records import Wire
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.port_map import Mapped
 from hapticlink.orchestrator.system.system import Replacement, System

@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from hapticlink.orchestrator.fmi.annotation import SPRING_ENDS
 from hapticlink.orchestrator.fmi.units import SAME
-from hapticlink.orchestrator.scene.records import SetSpring
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import SetSpring
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.ports import size
 from hapticlink.orchestrator.system.system import Connection, Fmu, System

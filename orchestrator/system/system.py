@@ -14,7 +14,7 @@ from hapticlink.orchestrator.fmi.start_values import Starts
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.conditions import Condition
-from hapticlink.orchestrator.scene.records import Iteration, Latency, PowerPort, SetSpring
+from hapticlink.orchestrator.scene.scene_tables import Iteration, Latency, PowerPort, SetSpring
 
 
 @dataclass(frozen=True)

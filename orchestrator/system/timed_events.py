@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from hapticlink.orchestrator.base.errors import shortened
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.scene.records import TimedEvent, Value
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import TimedEvent, Value
 from hapticlink.orchestrator.scene.toml_keys import Problem, reported
 from hapticlink.orchestrator.system.fmu_tables import entries_of
 from hapticlink.orchestrator.system.ports import carries_power, scalars_of

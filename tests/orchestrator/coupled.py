@@ -17,7 +17,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.read_results import Table
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import Outcome, run
-from hapticlink.orchestrator.scene.records import Iteration, PowerPort, SetSpring
+from hapticlink.orchestrator.scene.scene_tables import Iteration, PowerPort, SetSpring
 from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Coupling, EnergyPorts, Fmu, System
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from hapticlink.orchestrator.fmi.description import Description, describe
-from hapticlink.orchestrator.scene.records import PowerPort, SetSpring
+from hapticlink.orchestrator.scene.scene_tables import PowerPort, SetSpring
 from tests.orchestrator.c_fmus import attributes, packed
 
 K, C, K_C, C_C = 100.0, 1.0, 100.0, 1.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.scene.records import Wire
+from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
 from hapticlink.orchestrator.system.build_system import built

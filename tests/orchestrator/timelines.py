@@ -16,8 +16,8 @@ from hapticlink.orchestrator.base.ticks import (
     variable,
 )
 from hapticlink.orchestrator.scene.rates import AnyRate, VariableRate
-from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Haptics, Scene
+from hapticlink.orchestrator.scene.scene_tables import ForeignFmu
 
 CAUSAL = ("gauss-seidel", "jacobi")
 """Schemes in which nobody reads a value stamped later than the start of its step."""

@@ -18,7 +18,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.programs.build import build_program, program_files
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 from hapticlink.visualization.standalone import page
 from tests.fmus.named_fmu import Named
 from tests.orchestrator import c_fmus, foreign_scenes, native_mass

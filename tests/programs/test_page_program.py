@@ -32,7 +32,7 @@ from hapticlink.programs.page_program import webassembly_files
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolve_scene import resolved
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.interactive_scene.viewed_scene import STIFFNESS, viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, viewed
 from hapticlink.visualization.standalone import page
 from hapticlink.visualization.standalone.description import Description
 from tests.visualization.browser_code.javascript import javascript

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.system.live_changes import choices_between_rates
-from hapticlink.visualization.interactive_scene.offered_controls import (
+from hapticlink.visualization.live_and_standalone.offered_controls import (
     CLOCK,
     JITTER,
     RATE,

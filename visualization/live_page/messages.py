@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError
 
-from hapticlink.visualization.interactive_scene.offered_controls import RENDERED
+from hapticlink.visualization.live_and_standalone.offered_controls import RENDERED
 
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

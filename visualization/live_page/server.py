@@ -229,7 +229,7 @@ async def _served(
         try:
             while (message := read(sys.stdin.buffer)) is not None:
                 if message["type"] == "opening":
-                    from hapticlink.visualization.interactive_scene import opening_message
+                    from hapticlink.visualization.live_and_standalone import opening_message
 
                     message = opening_message.opening(message["title"], *message["picture"])
                 loop.call_soon_threadsafe(pages.show, message)

@@ -17,9 +17,9 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
-from hapticlink.visualization.interactive_scene import scene_message
-from hapticlink.visualization.interactive_scene.offered_controls import Settings, target
-from hapticlink.visualization.interactive_scene.viewed_scene import packed
+from hapticlink.visualization.live_and_standalone import scene_message
+from hapticlink.visualization.live_and_standalone.offered_controls import Settings, target
+from hapticlink.visualization.live_and_standalone.viewed_scene import packed
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.frames import Frames

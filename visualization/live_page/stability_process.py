@@ -87,8 +87,8 @@ def main() -> None:
         os._exit(1)
 
     threading.Thread(target=receive, daemon=True).start()
-    from hapticlink.visualization.interactive_scene.prediction import verdicts
-    from hapticlink.visualization.interactive_scene.viewed_scene import unpacked
+    from hapticlink.visualization.live_and_standalone.prediction import verdicts
+    from hapticlink.visualization.live_and_standalone.viewed_scene import unpacked
 
     while True:
         number, scene, *changes = questions.get()

@@ -12,8 +12,8 @@ from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.visualization.interactive_scene import opening_message, scene_message
-from hapticlink.visualization.interactive_scene.offered_controls import (
+from hapticlink.visualization.live_and_standalone import opening_message, scene_message
+from hapticlink.visualization.live_and_standalone.offered_controls import (
     Offered,
     stiffness,
     target,

@@ -19,7 +19,7 @@ from hapticlink.programs.page_program import webassembly, webassembly_files
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolve_scene import resolved
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.interactive_scene.prediction import predicted
+from hapticlink.visualization.live_and_standalone.prediction import predicted
 from hapticlink.visualization.standalone.description import Description
 
 POLICY = (

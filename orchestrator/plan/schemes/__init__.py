@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from hapticlink.components.registry import Registry, no_instance
 from hapticlink.orchestrator.plan.operations import Event, Operation
 from hapticlink.orchestrator.plan.schemes import gauss_seidel, gauss_seidel_plants, iterated, jacobi
-from hapticlink.orchestrator.scene import records
+from hapticlink.orchestrator.scene import scene_tables
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
@@ -25,7 +25,7 @@ class Scheme:
     ordered: Callable[[System], list[list[Fmu]]] = lambda system: []
 
 
-SCHEMES: Registry[Scheme] = records.SCHEMES
+SCHEMES: Registry[Scheme] = scene_tables.SCHEMES
 SCHEMES.misfit = lambda part: no_instance(part, Scheme)
 SCHEMES |= {
     "gauss-seidel": Scheme(gauss_seidel.block, gauss_seidel.ordered),

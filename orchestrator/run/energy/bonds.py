@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.scene.records import PowerPort
+from hapticlink.orchestrator.scene.scene_tables import PowerPort
 from hapticlink.orchestrator.system.ports import paired
 from hapticlink.orchestrator.system.system import Connection
 

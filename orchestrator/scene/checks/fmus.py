@@ -10,8 +10,8 @@ from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.base.signal_names import SHARED
 from hapticlink.orchestrator.scene.blocks import Blocks
-from hapticlink.orchestrator.scene.records import ForeignFmu
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import ForeignFmu
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hapticlink.components.specs.device import Device
-from hapticlink.orchestrator.scene.records import Latency
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 

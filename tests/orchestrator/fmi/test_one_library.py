@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from hapticlink.fmus.build import build, build_native
+from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.fmi.in_process_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.process_cache import described
 from tests.orchestrator import coupled
 from tests.orchestrator.c_fmus import hostile_fmu

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.holds import HOLDS, HoldContext
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.run.energy.meter import Meter
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 Vector = NDArray[np.float64]

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
 from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.holds_on_manifolds import Unwrapped
 from hapticlink.orchestrator.run.make_holds import WithFurther
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 Vector = NDArray[np.float64]

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_record import Timings
 from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import Events
-from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.scene.scene_tables import Iteration
 from tests.orchestrator import coupled
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table

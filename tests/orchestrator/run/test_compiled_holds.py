@@ -25,7 +25,7 @@ from hapticlink.orchestrator.run.compiled.hold_structures import (
 )
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.energy.bonds import Reader
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.latency_and_loss import Late, Link
 
 NUMERATOR, DENOMINATOR = 3, 7680

@@ -20,7 +20,7 @@ from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged
-from hapticlink.orchestrator.scene.records import Iteration
+from hapticlink.orchestrator.scene.scene_tables import Iteration
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.coupled import (
     HERMITE,

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
-from hapticlink.orchestrator.scene.records import Latency
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
 from hapticlink.orchestrator.system.latency_and_loss import Link
 from hapticlink.orchestrator.system.system import System

@@ -7,7 +7,7 @@ import json
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.interactive_scene.offered_controls import RATE, Settings
+from hapticlink.visualization.live_and_standalone.offered_controls import RATE, Settings
 from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.messages import Hand, Set, Time, newest, parse
 from tests.api.test_real_time import ENERGY, ran

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.interactive_scene.scene_message import power
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.scene_message import power
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 from hapticlink.visualization.live_page.frames import Frames
 from tests.visualization.browser_code.javascript import javascript
 

@@ -11,7 +11,7 @@ import pytest
 from hapticlink.fmus import blocks as block_fmus
 from hapticlink.fmus import cache, lock
 from hapticlink.orchestrator.scene.blocks import blocks
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 from tests.visualization.browser_code.chromium import Page, chromium
 from tests.visualization.browser_code.served_page import Served
 

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.interactive_scene.offered_controls import RATE, Settings, target
-from hapticlink.visualization.interactive_scene.prediction import judged
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.offered_controls import RATE, Settings, target
+from hapticlink.visualization.live_and_standalone.prediction import judged
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.frames import Frames
 from tests.visualization.browser_code.chromium import Page

@@ -11,7 +11,7 @@ from tests.visualization.browser_code.chromium import Page, differ_without_topol
 from tests.visualization.browser_code.served_page import Served, values
 
 SERVED = "closed-loop"
-NAME = "hapticlink.commands.compared_run"
+NAME = "hapticlink.commands.view_second_run"
 
 
 def second_runs(served: Served) -> list[int]:

@@ -25,8 +25,8 @@ from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.live_changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
-from hapticlink.visualization.interactive_scene.offered_controls import JITTER, RATE, Settings
-from hapticlink.visualization.interactive_scene.viewed_scene import DAMPING, STIFFNESS
+from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
+from hapticlink.visualization.live_and_standalone.viewed_scene import DAMPING, STIFFNESS
 
 MAX_COST = {"native": 2e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map

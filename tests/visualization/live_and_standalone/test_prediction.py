@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from hapticlink.visualization.interactive_scene.offered_controls import JITTER, RATE, Settings
-from hapticlink.visualization.interactive_scene.prediction import predicted
-from hapticlink.visualization.interactive_scene.viewed_scene import STIFFNESS, viewed
+from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
+from hapticlink.visualization.live_and_standalone.prediction import predicted
+from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, viewed
 from tests.analysis.stability.own_hand import own_hand
 from tests.visualization.browser_code.chromium import Page, chromium
 from tests.visualization.browser_code.served_page import Served, values

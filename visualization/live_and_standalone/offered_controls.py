@@ -14,7 +14,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.live_changes import choices_of_slower
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import System
-from hapticlink.visualization.interactive_scene.viewed_scene import STIFFNESS
+from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
 
 GAINS = (HAND, CONTROLLER)
 """Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""

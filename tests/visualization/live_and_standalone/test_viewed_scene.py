@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.visualization.interactive_scene.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
 
 
 def test_a_scene_without_a_mechanism_is_refused(tmp_path: Path) -> None:

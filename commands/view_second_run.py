@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.base.errors import Fault
-from hapticlink.visualization.interactive_scene.viewed_scene import unpacked
+from hapticlink.visualization.live_and_standalone.viewed_scene import unpacked
 from hapticlink.visualization.live_page.server_pipe import Pipe, read, to_caller
 
 

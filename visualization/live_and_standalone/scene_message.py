@@ -9,7 +9,7 @@ from hapticlink.analysis.findings import labels
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, HAND
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import Connection, System
-from hapticlink.visualization.interactive_scene.offered_controls import users
+from hapticlink.visualization.live_and_standalone.offered_controls import users
 
 
 def running(scene: Scene, system: System, meters: Iterable[str]) -> dict[str, Any]:
