@@ -19,8 +19,8 @@ from hapticlink.fmus.cache import sources
 from hapticlink.fmus.versions import installed
 
 PACKAGES = (
-    "hapticlink", "casadi", "ziglang", "numpy", "scipy", "mujoco", "pin", "exudyn", "fmpy",
-    "pythonfmu", "libcosimpy", "ecospy",
+    "hapticlink", "casadi", "ziglang", "numpy", "scipy", "mujoco", "pin", "exudyn", "drake",
+    "fmpy", "pythonfmu", "libcosimpy", "ecospy",
 )  # fmt: skip
 """Those that take part, of which some need not be installed."""
 

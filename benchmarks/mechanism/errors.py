@@ -1,4 +1,4 @@
-"""Run time against error on three mechanisms: our integrators and three multibody codes.
+"""Run time against error on three mechanisms: our integrators and four multibody codes.
 
 Every code starts from the same assembled pose and rates, and takes steps of equal length; only
 stepping is timed. Runs are interleaved round by round and the least of the rounds counts. The
@@ -27,7 +27,7 @@ from benchmarks.rows import Rows
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 
-PEERS = ("mujoco_peer", "pinocchio_peer", "exudyn_peer")
+PEERS = ("mujoco_peer", "pinocchio_peer", "exudyn_peer", "drake_peer")
 EVALUATIONS = {
     "dormand-prince-8": 12,
     "rk4": 4,

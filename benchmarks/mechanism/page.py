@@ -21,6 +21,7 @@ COLOURS = {
     "MuJoCo": "#d1495b",
     "Exudyn": "#e0a030",
     "Pinocchio": "#5a8f3c",
+    "Drake": "#7b5ea7",
 }
 
 NOTES = f"""- `ours, C` is what a native FMU runs (`packaging = "native"`): the same compiler and
@@ -31,7 +32,11 @@ NOTES = f"""- `ours, C` is what a native FMU runs (`packaging = "native"`): the 
   in C++ would take for the same RK4 step; the ratio above counts it, at the error of our RK4 with
   projection.
 - It is one tip at one time, so an error that crosses zero is too small in its row.
-- MuJoCo's equalities are soft, with one stiffness (time constant 2 h).
+- MuJoCo's equalities are soft, with one stiffness (time constant 2 h): its error is theirs, and no
+  smaller with a method of higher order. Drake takes loops in its discrete plant alone, whose step
+  is of first order.
+- Pinocchio with generated code, by CasADi or CppADCodeGen, is in none of its wheels on PyPI. A step
+  in minimal coordinates, and where their charts end: [formulations](../formulations/README.md).
 - Runs longer than {SLOW:g} s were not repeated. With an error above {LOST:g} m, or none, a run has
   diverged.""".splitlines()
 
