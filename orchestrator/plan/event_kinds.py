@@ -34,10 +34,11 @@ def keyed_events(
         start = starts[:-1][starts[:-1] <= until]
         after = starts[1 : len(start) + 1]
         keys[np.searchsorted(ticks, start), 1 + i] = 2 * (after - start) + (after > timeline.end)
-    kinds: dict[bytes, list[int]] = {}
-    for i, key in enumerate(map(bytes, keys[:most])):
-        kinds.setdefault(key, []).append(i)
-    return ticks[:most], {event(timeline, key): np.array(rows) for key, rows in kinds.items()}
+    whole = keys[:most].view(np.dtype((np.void, keys.strides[0]))).ravel()
+    _, first, kind = np.unique(whole, return_index=True, return_inverse=True)
+    rows = np.split(np.argsort(kind, kind="stable"), np.bincount(kind).cumsum()[:-1])
+    order = np.argsort(first)
+    return ticks[:most], {event(timeline, whole[first[k]].tobytes()): rows[k] for k in order}
 
 
 def key_of(timeline: Timeline, kind: Event) -> list[int]:

@@ -16,3 +16,6 @@ def test_what_is_left_out_is_told_with_its_reason() -> None:
     alone = {n.part: n.needed for n in requirements.needs(open_scene.load("five-bar"))}
     assert not alone["virtual_environment"]
     assert alone["loop closures"]
+    one_spring = open_scene.load("five-bar", ["linkage.joint.elbow1.stiffness=1"])
+    assert {n.part: n.needed for n in requirements.needs(one_spring)}["springs and dampers"]
+    assert not alone["springs and dampers"]
