@@ -37,7 +37,7 @@ def stability_map(
     called with the numbers of finished and of all lines of points. Raises InputFault for invalid
     input, Fault if the map is interrupted.
     """
-    from hapticlink.visualization.figures import map_figure as drawing
+    from hapticlink.visualization.figures import stability_map_figure as drawing
 
     if jobs is not None and jobs < 1:
         raise InputFault(f"--jobs {jobs}: give 1 or more")

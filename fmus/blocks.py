@@ -61,7 +61,7 @@ def build_block(
     """
 
     def make(folder: Path) -> Path:
-        from hapticlink.fmus.build import build, build_engine, build_native
+        from hapticlink.fmus.build_fmu import build, build_engine, build_native
         from hapticlink.fmus.fmu_functions import GRAPHS
 
         with GRAPHS:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree as ET
 
 from hapticlink.fmus import model_description_fmi3
-from hapticlink.fmus.described import Described, annotation, as_text, definitions, icon
+from hapticlink.fmus.description_common import Described, annotation, as_text, definitions, icon
 from hapticlink.fmus.scalar_variables import ScalarVariable
 
 

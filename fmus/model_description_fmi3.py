@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from xml.etree import ElementTree as ET
 
-from hapticlink.fmus.described import (
+from hapticlink.fmus.description_common import (
     Described,
     annotation,
     as_text,

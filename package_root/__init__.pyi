@@ -3,14 +3,14 @@
 from hapticlink.analysis.fit.fit import Fitted as Fitted
 from hapticlink.analysis.fit.fit import fit as fit
 from hapticlink.analysis.maps.stability_map import Map as Map
-from hapticlink.analysis.stability.passivity import Passivity as Passivity
-from hapticlink.analysis.stability.passivity import passivity as passivity
-from hapticlink.analysis.stability.scene_stability import (
+from hapticlink.analysis.stability.judge_scene import (
     equilibrium_stability as equilibrium_stability,
 )
-from hapticlink.analysis.stability.scene_stability import stability as stability
-from hapticlink.analysis.stability.stability_verdict import Stability as Stability
+from hapticlink.analysis.stability.judge_scene import stability as stability
+from hapticlink.analysis.stability.passivity import Passivity as Passivity
+from hapticlink.analysis.stability.passivity import passivity as passivity
 from hapticlink.analysis.stability.varying_rate import VaryingStability as VaryingStability
+from hapticlink.analysis.stability.verdict_record import Stability as Stability
 from hapticlink.analysis.transparency.mobility_at_hand import Transparency as Transparency
 from hapticlink.analysis.transparency.mobility_at_hand import transparency as transparency
 from hapticlink.analysis.tune.tune_gains import Tuned as Tuned

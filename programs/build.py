@@ -12,7 +12,7 @@ from hapticlink.components.component import Component
 from hapticlink.fmus import cache, model_description
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.blocks import component
-from hapticlink.fmus.described import CAPABILITIES
+from hapticlink.fmus.description_common import CAPABILITIES
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler import (
     FLAGS,

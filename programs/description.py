@@ -7,7 +7,7 @@ from html import escape
 from pathlib import PurePosixPath
 
 from hapticlink.components.base_units import BASES
-from hapticlink.fmus.described import Described, base_attributes
+from hapticlink.fmus.description_common import Described, base_attributes
 from hapticlink.fmus.documentation import PAGE, page, table
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.scene.scene import Scene

@@ -13,7 +13,7 @@ import numpy as np
 from hapticlink.components.component import Component
 from hapticlink.fmus.cache import sha
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
-from hapticlink.fmus.native.native_fmu import COMMON, WRAPPER
+from hapticlink.fmus.native.native_fmu_entries import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number, table
 from hapticlink.fmus.reproducible_zip import guid_of
 from hapticlink.orchestrator.base.ticks import exact

@@ -13,7 +13,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.commands import main
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.description import describe

@@ -19,7 +19,7 @@ import numpy as np
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus.engine.mjcf import HAND, chain, coordinates, mjcf, offset, points
 from hapticlink.fmus.errors import FmuError
-from hapticlink.fmus.python_fmu import packed
+from hapticlink.fmus.python_fmu_entries import packed
 
 INTEGRATORS = {
     "semi-implicit-euler": "Euler",

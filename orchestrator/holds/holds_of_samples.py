@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Vector
-from hapticlink.orchestrator.holds.polynomial_hold_laws import Law, Value, arguments
+from hapticlink.orchestrator.holds.laws_of_holds import Law, Value, arguments
 
 
 class History:

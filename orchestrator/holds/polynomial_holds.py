@@ -1,5 +1,5 @@
 """Holds whose value is a polynomial in time, through samples or towards them. Their laws are in
-`polynomial_hold_laws`; s = t - t_n is the time since the newest stamp, H = t_n - t_{n-1}.
+`laws_of_holds`; s = t - t_n is the time since the newest stamp, H = t_n - t_{n-1}.
 
 Until the second sample each of them is the zero-order hold, unless its docstring says otherwise.
 """
@@ -7,7 +7,7 @@ Until the second sample each of them is the zero-order hold, unless its docstrin
 from __future__ import annotations
 
 from hapticlink.orchestrator.holds.holds_of_samples import OfSamples, Transition
-from hapticlink.orchestrator.holds.polynomial_hold_laws import LAWS
+from hapticlink.orchestrator.holds.laws_of_holds import LAWS
 
 
 class Lead(OfSamples):

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
+from hapticlink.orchestrator.holds.holds_of_samples import OfSamples
+from hapticlink.orchestrator.holds.laws_of_holds import LAWS
 
-from hapticlink.orchestrator.holds.hold import Hold, HoldContext, Vector
 
-
-class ZeroOrder(Hold):
+class ZeroOrder(OfSamples):
+    laws = LAWS["ZERO_ORDER"]
+    depth = 1
     gives_samples = True
     interpolates = True
-
-    def __init__(self, context: HoldContext) -> None:
-        self._newest = np.zeros(context.size)
-
-    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        self._newest[:] = sample
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        return self._newest
 
 
 class Latest(ZeroOrder):

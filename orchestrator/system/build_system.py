@@ -30,7 +30,7 @@ from hapticlink.orchestrator.system import (
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
 from hapticlink.orchestrator.system.connections import connect, whole, with_texts
 from hapticlink.orchestrator.system.fmu_files import fmu_files
-from hapticlink.orchestrator.system.recorded import recorded
+from hapticlink.orchestrator.system.outputs_to_record import recorded
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
     Connection,

@@ -9,7 +9,7 @@ from pathlib import Path
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.results import folders
 from studies.report import chapter1, chapter3, chapter4, chapter6, graphics_copy, section_b6
-from studies.report.entry import Entry, Runs, write
+from studies.report.report_page import Entry, Runs, write
 
 CHAPTERS = (chapter1, chapter3, chapter4, chapter6, graphics_copy, section_b6)
 

@@ -11,7 +11,7 @@ from hapticlink.fmus.blocks import build_block
 from hapticlink.fmus.check import session
 from hapticlink.orchestrator.base import temporary_folders
 from studies import draw
-from studies.report.entry import Entry, Runs, command
+from studies.report.report_page import Entry, Runs, command
 
 RULES = ("forward", "backward", "trapezoidal")
 STATED = {

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from studies import draw
-from studies.report.entry import Entry, Runs, command
+from studies.report.report_page import Entry, Runs, command
 
 SHORTEST_LINK = 0.0184  # m, l3 of Table 6.1
 EULER = "mechanism.integrator=semi-implicit-euler"

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH
 from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
-from studies.report.entry import Entry, Runs, command
+from studies.report.report_page import Entry, Runs, command
 
 SCENES = {"enclosure": draw.BLUE, "obstacles": draw.ORANGE, "push-disc": draw.GREEN}
 RATES = (10, 20, 30, 60)

@@ -12,7 +12,7 @@ from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
 from studies.report import measures
-from studies.report.entry import Entry, Runs, command
+from studies.report.report_page import Entry, Runs, command
 
 DIRECTIONS = "mechanism.directions=true"
 ON = ("controller.topology=true", DIRECTIONS)

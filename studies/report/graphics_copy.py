@@ -10,7 +10,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import folded, tracking
 from studies import draw
-from studies.report.entry import Entry, Runs, command
+from studies.report.report_page import Entry, Runs, command
 
 PULLED = "graphics.sync=operational"
 

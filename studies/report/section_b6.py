@@ -12,7 +12,7 @@ from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
 from studies.report import measures
 from studies.report.chapter6 import OFF, ON, path
-from studies.report.entry import Entry, Runs, command
+from studies.report.report_page import Entry, Runs, command
 
 SCENE = "closed-loop-b1"
 

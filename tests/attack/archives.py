@@ -15,7 +15,7 @@ from pathlib import Path
 
 from fmpy import platform, sharedLibraryExtension
 
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from tests.attack import cases
 from tests.attack.commands import Place
 from tests.attack.processes import own_folder

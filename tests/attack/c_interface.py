@@ -20,9 +20,9 @@ from hapticlink.components.component import Component
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.fmus.native.compiler import compile_library
-from hapticlink.fmus.native.native_fmu import WRAPPER
+from hapticlink.fmus.native.native_fmu_entries import WRAPPER
 from hapticlink.fmus.native.source import component_source
-from hapticlink.fmus.python_fmu import entries
+from hapticlink.fmus.python_fmu_entries import entries
 from tests.attack import cases
 from tests.attack.caller import TOLD, Target
 from tests.attack.processes import own_folder

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.native.native_fmu import WRAPPER
+from hapticlink.fmus.native.native_fmu_entries import WRAPPER
 from tests.attack.c_interface import Fmu, called, can_sanitize, native, python, sanitized, trapped
 from tests.attack.cases import counted, total
 from tests.fmus import sample_components

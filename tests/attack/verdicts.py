@@ -25,7 +25,7 @@ import numpy as np
 import hapticlink as hl
 from hapticlink.analysis.stability.hand_cases import Case
 from hapticlink.analysis.stability.hands import OWN, standing
-from hapticlink.analysis.stability.stability_verdict import Stability
+from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.components.specs.hand import ArmHand, SpringHand
 from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
 

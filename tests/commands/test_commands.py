@@ -93,7 +93,7 @@ def test_bad_input_is_status_2(
     assert message in " ".join("".join(capsys.readouterr()).split())
 
 
-EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.python_fmu", "scipy")
+EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.python_fmu_entries", "scipy")
 
 
 @pytest.mark.parametrize(

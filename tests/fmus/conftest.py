@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hapticlink.fmus.build import build, build_native
+from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.check import Session, session
 from tests.fmus import sample_components
 

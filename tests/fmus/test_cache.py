@@ -13,7 +13,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.fmus import cache, lock
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.fmus.cache import cached
 from hapticlink.fmus.check import check_fmu
 from tests.fmus import sample_components

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.components.component import INERTIA, MOBILITY, WRENCH
-from hapticlink.fmus.described import described as of_component
+from hapticlink.fmus.description_common import described as of_component
 from hapticlink.fmus.errors import InvalidUnit
 from hapticlink.fmus.model_description import files
 from hapticlink.fmus.scalar_variables import feed_through, initial_dependencies

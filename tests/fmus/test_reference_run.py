@@ -10,7 +10,7 @@ import fmpy
 import numpy as np
 import pytest
 
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.fmus.documentation import documentation
 from hapticlink.fmus.reference_run import reference_run
 from tests.fmus.sample_components import controller, fragile, spring, stateless

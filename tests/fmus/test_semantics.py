@@ -14,7 +14,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from hapticlink.components.component import Block, Variable
-from hapticlink.fmus.build import build, build_native
+from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.check import Session, check_fmu, session
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named

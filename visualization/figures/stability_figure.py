@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hapticlink.analysis.stability.stability_verdict import Stability
+from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.visualization.figure_axes import headline, plain
 
 COLOURS = {"stable": "tab:green", "marginal": "0.6", "unstable": "tab:red", "drift": "tab:orange"}

@@ -1,4 +1,4 @@
-"""Writes the laws of the holds (holds/polynomial_hold_laws.py) in C: each is evaluated once on
+"""Writes the laws of the holds (holds/laws_of_holds.py) in C: each is evaluated once on
 symbols, which note the operations. It needs the standard library only, since the build of the
 package runs it, too."""
 
@@ -8,7 +8,7 @@ import runpy
 from pathlib import Path
 from typing import Any
 
-LAWS = Path(__file__).parents[2] / "holds" / "polynomial_hold_laws.py"
+LAWS = Path(__file__).parents[2] / "holds" / "laws_of_holds.py"
 VECTORS = ("y", "y1", "y2", "w", "wd")
 """Arguments of a law with an entry k for each of the signal; the others are numbers."""
 BESIDE = {"yd": "y[n + k]", "yd1": "y1[n + k]"}

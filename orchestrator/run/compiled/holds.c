@@ -1,5 +1,5 @@
 /* The shipped holds: what they keep of their samples. The laws of those whose value is a polynomial
- * in time are `orchestrator/holds/polynomial_hold_laws.py`; generate_laws.py writes hold_laws.h from it. Of the
+ * in time are `orchestrator/holds/laws_of_holds.py`; generate_laws.py writes hold_laws.h from it. Of the
  * others the classes in `orchestrator/holds/` are the specification, operation by operation. */
 
 #include "loop.h"
@@ -31,7 +31,7 @@ static void keep(Hold *h, const double *y, int64_t stamp) {
 
 #define LAW(kind, i) (3 * (kind) + (i))
 
-/* The value of a law of polynomial_hold_laws.py, of `kind`: the hold's own, or that of its slope. Without a loop
+/* The value of a law of laws_of_holds.py, of `kind`: the hold's own, or that of its slope. Without a loop
  * there are no seconds. */
 static void law(const Hold *h, int64_t kind, const Loop *l, int64_t tick, double ahead, double *value) {
     const int64_t n = h->n, last = h->count - 1, *t = h->stamps + last;

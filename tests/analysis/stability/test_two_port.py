@@ -24,7 +24,7 @@ from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.passivity import Passivity
 from hapticlink.analysis.stability.port_response import HandPort, MechanismPort
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import Coupling, Fmu, System

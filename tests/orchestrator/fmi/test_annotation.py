@@ -8,7 +8,7 @@ import pytest
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.ports import Power, Spring
-from hapticlink.fmus.build import build, build_native
+from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import describe

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 
-from hapticlink.fmus.build import build, build_native
+from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.process_cache import described

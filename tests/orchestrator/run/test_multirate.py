@@ -21,7 +21,7 @@ from hapticlink.analysis.stability.lifted_map import lifted_map
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.varying_rate import edges_of
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.plan.plan import Plan

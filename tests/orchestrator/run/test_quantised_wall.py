@@ -9,7 +9,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from tests.orchestrator.foreign_scenes import fmu_table, wire_table
 
 T, QUANTUM = 1e-3, 2 * math.pi * 0.010 / 1024

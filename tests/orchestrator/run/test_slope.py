@@ -8,7 +8,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.orchestrator.base.errors import SceneFault
 from tests.orchestrator.foreign_scenes import fmu_table, wire_table
 

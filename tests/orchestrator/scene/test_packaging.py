@@ -85,14 +85,14 @@ def test_all_platforms_are_for_what_is_compiled(tmp_path, capsys):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The platforms compiled for, by a stand-in: tests/fmus/test_native_fmu.py compiles."""
+    """The platforms compiled for, by a stand-in: tests/fmus/test_native_fmu_entries.py compiles."""
     asked = []
 
     def compiled(source, name, folder, platforms):
         asked.extend(platforms)
         return {compiler.entry(p, name): p.encode() for p in platforms}
 
-    monkeypatch.setattr("hapticlink.fmus.native.native_fmu.binaries", compiled)
+    monkeypatch.setattr("hapticlink.fmus.native.native_fmu_entries.binaries", compiled)
     return asked
 
 

@@ -20,9 +20,9 @@ from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Block, Variable
 from hapticlink.fmus.blocks import build_block
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
-from hapticlink.fmus.python_fmu import entries
+from hapticlink.fmus.python_fmu_entries import entries
 from hapticlink.fmus.write_fmu import findings, write_fmu
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -38,7 +38,7 @@ def test_same_component_same_bytes(fmus, tmp_path):
 def test_same_bytes_from_another_process(fmus, tmp_path):
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "import sample_components\nfrom hapticlink.fmus.build import build\n"
+        "import sample_components\nfrom hapticlink.fmus.build_fmu import build\n"
         "build(sample_components.spring(), sys.argv[2])"
     )
     here = str(Path(__file__).parent)

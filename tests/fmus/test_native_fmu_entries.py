@@ -44,7 +44,7 @@ from hapticlink.components.specs.linkage import (
 )
 from hapticlink.components.specs.paths import CoordinateSine, Interpolation
 from hapticlink.fmus.blocks import component
-from hapticlink.fmus.build import build, build_native
+from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native import compile_library, compiler, split_functions

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hapticlink.components.component import Component
 from hapticlink.fmus import model_description
-from hapticlink.fmus.described import described
+from hapticlink.fmus.description_common import described
 from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.fmu_functions import GRAPHS
 from hapticlink.fmus.native.compiler import (
@@ -24,7 +24,7 @@ from hapticlink.fmus.native.compiler import (
 from hapticlink.fmus.native.fmi3_interface import fmi3_sources
 from hapticlink.fmus.native.linking import WINDOWS
 from hapticlink.fmus.native.source import component_source
-from hapticlink.fmus.python_fmu import check_functions
+from hapticlink.fmus.python_fmu_entries import check_functions
 from hapticlink.fmus.reference_run import reference_run
 from hapticlink.fmus.reproducible_zip import digest, guid_of
 

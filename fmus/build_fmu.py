@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.python_fmu import entries, require_platform
+from hapticlink.fmus.python_fmu_entries import entries, require_platform
 from hapticlink.fmus.write_fmu import write_fmu
 
 
@@ -50,10 +50,10 @@ def build_native(
     Raises FmuError if ziglang is not installed or a platform is unknown, CompilerError if the
     source does not compile.
     """
-    from hapticlink.fmus.native import host_platform, native_fmu
+    from hapticlink.fmus.native import host_platform, native_fmu_entries
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     platforms = tuple(platforms) or (host_platform(fmi),)
-    files = native_fmu.entries(component, folder, platforms, fmi, **experiment)
+    files = native_fmu_entries.entries(component, folder, platforms, fmi, **experiment)
     return write_fmu(files, folder, component.name)

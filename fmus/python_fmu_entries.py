@@ -22,7 +22,7 @@ import casadi as ca
 
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus import model_description
-from hapticlink.fmus.described import described
+from hapticlink.fmus.description_common import described
 from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.fmu_functions import one_pass

@@ -34,8 +34,8 @@ from hapticlink.analysis.stability.poses import (
 )
 from hapticlink.analysis.stability.short_hyperperiod import short
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
-from hapticlink.analysis.stability.stability_verdict import Stability
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
+from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.stability.workspace_grid import grid_poses
 from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity

@@ -18,7 +18,7 @@ from fmpy.fmi1 import FMICallException
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Block, Variable
 from hapticlink.components.specs.linkage import Mechanism
-from hapticlink.fmus.build import build
+from hapticlink.fmus.build_fmu import build
 from hapticlink.fmus.check import check_fmu, session
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
