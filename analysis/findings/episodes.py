@@ -18,7 +18,7 @@ from hapticlink.analysis.findings.tracking import (
     constraint_counts,
     of_block,
 )
-from hapticlink.analysis.findings.user_port import NOTICEABLE_J, UserPort, ports
+from hapticlink.analysis.findings.user_port import UserPort, ports, tolerated
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import all_devices
@@ -50,8 +50,8 @@ def episodes(results: Results) -> list[Episode]:
     counts = constraint_counts(results.windows())
     usual = max(counts, key=lambda number: counts[number], default=0.0)
     unusual = {number: usual for number in sorted(counts) if number != usual}
-    windows = zip(results.windows(), ports(results), strict=True)
-    return _episodes(_states(window, port, unusual) for window, port in windows)
+    windows, most = zip(results.windows(), ports(results), strict=True), tolerated(results)
+    return _episodes(_states(window, port, most, unusual) for window, port in windows)
 
 
 def saturations(results: Results) -> list[Episode]:
@@ -102,15 +102,16 @@ State = tuple[str, Vector, NDArray[np.bool_], str]
 
 
 def _states(
-    window: Results, port: UserPort | None, unusual: Mapping[float, float]
+    window: Results, port: UserPort | None, most: float, unusual: Mapping[float, float]
 ) -> Iterator[State]:
-    """unusual: numbers of constrained directions, with the one that is usual."""
+    """most: the energy (J) that is tolerated at the user's port; unusual: numbers of constrained
+    directions, with the one that is usual."""
     if branch := of_block(window, COPY_BRANCH_OK):
         rows = window.within(branch["time"])
         yield "folded", branch["time"][rows], branch[COPY_BRANCH_OK][rows] == 0, ""
     yield from _saturated(window)
     if port:
-        yield "energy", port.time_s, port.generated_J > NOTICEABLE_J, ""
+        yield "energy", port.time_s, port.generated_J > most, ""
     if counted := constrained(window):
         table, name = counted
         rows = window.within(table["time"])

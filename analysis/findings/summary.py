@@ -215,7 +215,7 @@ def _refused_holds(record: RunRecord) -> Iterator[str]:
     for hold, ports in by_hold.items():
         reasons = dict.fromkeys(reason for _, reason in ports)
         targets = ", ".join(target for target, _ in ports)
-        yield f"zoh instead of the default hold {hold} for {targets}: {'; '.join(reasons)}"
+        yield f"zoh instead of the hold {hold} for {targets}: {'; '.join(reasons)}"
 
 
 def _passivity(results: Results, measures: Measures) -> Iterator[str]:

@@ -126,6 +126,11 @@ def hand_work(results: Results) -> float:
     return deque((_hand_work(window, works) for window in results.windows()), maxlen=1).pop()
 
 
+def tolerated(results: Results) -> float:
+    """What is `allowed` (J) in a run."""
+    return allowed(hand_work(results))
+
+
 def _hand_work(window: Results, works: Works) -> float:
     """The same until the end of a window."""
     total = 0.0

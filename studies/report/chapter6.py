@@ -18,7 +18,7 @@ DIRECTIONS = "mechanism.directions=true"
 ON = ("controller.topology=true", DIRECTIONS)
 OFF = ("controller.topology=false", DIRECTIONS)
 LENGTH_SCALE = (0.042 + 0.042 + 0.0184 + 0.0564) / 4  # m, mean link length of Table 6.1
-PANELS = ("(a) active", "(b) inactive")
+PANELS = ("(a) topology controller active", "(b) inactive")
 
 
 def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
@@ -34,7 +34,7 @@ def path(axis: Any, results: Results, point_name: str) -> Any:
     point = 1e3 * results.haptics["virtual_mechanism.x"]
     handle = 1e3 * results.haptics["haptic_device.x_true"]
     axis.plot(point[:, 0], point[:, 1], color=draw.BLUE, label=point_name)
-    axis.plot(handle[:, 0], handle[:, 1], "--", color=draw.ORANGE, label="handle (HD)")
+    axis.plot(handle[:, 0], handle[:, 1], "--", color=draw.ORANGE, label="handle, x_D")
     axis.set(xlabel="x (mm)", ylabel="y (mm)")
     axis.set_aspect("equal", adjustable="datalim")
     return point
@@ -43,13 +43,13 @@ def path(axis: Any, results: Results, point_name: str) -> Any:
 def _trajectories(on: Results, off: Results, folder: Path) -> Entry:
     figure, axes = draw.panels(2)
     for axis, results, name in zip(axes, (on, off), PANELS, strict=True):
-        axis.plot(*path(axis, results, "operational point (HS)")[0, :2], "k.", ms=8, label="start")
+        axis.plot(*path(axis, results, "operational point, x_S")[0, :2], "k.", ms=8, label="start")
         axis.set_title(f"{name}: apart by at most {tracking(results)[1].max():.3g} mm")
     axes[0].legend(fontsize="small")
     time, gap = tracking(on)
     ended, wide = tracking(off)
     common = gap[time <= ended[-1]].max()
-    count = measures.count(on)
+    count, left = measures.count(on), off.record.end.reason == "stop_when"
     return Entry(
         "Figure 6.1, hand trajectories",
         draw.save(figure, folder, "figure_6_1.png"),
@@ -57,7 +57,8 @@ def _trajectories(on: Results, off: Results, folder: Path) -> Entry:
         "experiment is stopped before the device reaches its workspace limits",
         f"active: at most {gap.max():.2g} mm apart in 3 s; inactive: "
         f"{np.interp(2, ended, wide):.0f} mm at 2 s, {wide.max() / common:.0f} times more over the "
-        f"common interval, out of the workspace at {ended[-1]:.2f} s. Device acceleration at "
+        f"common interval, {'out of' if left else 'within'} the workspace at {ended[-1]:.2f} s. "
+        f"Device acceleration at "
         f"t = 0 is Lambda^-1 F_h to {measures.acceleration_error(on):.0e}; F_T leaves "
         f"{measures.free_work(on, LENGTH_SCALE):.0e} of itself on free motion. The mechanism's "
         f"own count of constrained directions is 2 in {len(count.episodes)} episodes "
@@ -77,8 +78,8 @@ def _coordinates(on: Results, off: Results, folder: Path) -> Iterator[Entry]:
             time = haptics["time"]
             point = 1e3 * haptics["virtual_mechanism.x"][:, i]
             handle = 1e3 * haptics["haptic_device.x_true"][:, i]
-            axis.plot(time, point, color=draw.BLUE, label="operational point (HS)")
-            axis.plot(time, handle, "--", color=draw.ORANGE, label="handle (HD)")
+            axis.plot(time, point, color=draw.BLUE, label="operational point, x_S")
+            axis.plot(time, handle, "--", color=draw.ORANGE, label="handle, x_D")
             worst.append(np.abs(point - handle).max())
             title = f"{name}: {axis_name} differs by at most {worst[-1]:.3g} mm"
             axis.set(xlabel="time (s)", ylabel=f"{axis_name} (mm)", title=title)
@@ -86,7 +87,7 @@ def _coordinates(on: Results, off: Results, folder: Path) -> Iterator[Entry]:
         yield Entry(
             f"Figure 6.{i + 2}, {axis_name}-position of the trajectories",
             draw.save(figure, folder, f"figure_6_{i + 2}.png"),
-            "the difference of HD and HS is smaller with the topology controller than without",
+            "the difference of handle (HD) and operational point (HS) is smaller with the topology controller than without",
             f"at most {worst[0]:.2g} mm with it, {worst[1]:.3g} mm without",
             f"{command('closed-loop', *ON)}; {command('closed-loop', *OFF)}",
         )

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.user_port import UserPort, ports
+from hapticlink.analysis.findings.user_port import UserPort, ports, tolerated
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
@@ -61,6 +61,7 @@ class _Messages:
     def __init__(self, results: Results) -> None:
         self._results, self._units = results, results.record.units
         self._tick = Fraction(results.record.base.removesuffix(" s")) * 10**9
+        self._tolerated = tolerated(results)
         self._most = int(FRAMES_PER_S * last_time(results)) + 1
         self._kinds: dict[str, tuple[Any, list[_Field]]] = {}
         self._drawing: SceneDrawing | None = None
@@ -119,7 +120,7 @@ class _Messages:
             self.why = "" if self._drawing else str(fault)
             return
         self.why = ""
-        for time, frame in zip(self._ns(run.times), run.frames(port), strict=True):
+        for time, frame in zip(self._ns(run.times), run.frames(port, self._tolerated), strict=True):
             self._drawing = self._drawing or SceneDrawing(run.picture.marks, frame)
             yield time, "/scene/mechanism", self._drawing.update(frame, time)
             for user, seen in {"": frame, **frame.get("others", {})}.items():

@@ -11,14 +11,13 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.analysis.findings.episodes import FULL_TORQUE
-from hapticlink.analysis.findings.user_port import NOTICEABLE_J
 from hapticlink.components.device.numeric_torques import torque_function
 from hapticlink.components.device.workspace import link_function
 from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.visualization.mechanism.marks import marks, point_of, reach, state
+from hapticlink.visualization.mechanism.marks import marks, point_of, state
 
 PORT = "user's port"
 RAW = ("ghost", "q", "lambda", "P_c", "F_motor", "measured")
@@ -102,8 +101,6 @@ class Picture:
                 states += [state(part.gives, part.user)] if value else []
             else:
                 (shown["others"][part.user] if part.user else shown)[part.gives] = value
-        if (reach(frame, ("energy", PORT)) or 0.0) > NOTICEABLE_J:
-            states.append("energy")
         return shown | {"states": states}
 
     def at_rest(self, q: Any) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.tracking import further_users, of_any_shape, of_block, table_of
-from hapticlink.analysis.findings.user_port import UserPort, user_port
+from hapticlink.analysis.findings.user_port import UserPort, tolerated, user_port
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
@@ -94,10 +94,14 @@ class Recorded:
                 values[key] = table[signal][rows].reshape(len(rows), -1)
         return values
 
-    def frames(self, port: UserPort | None = None) -> list[dict[str, Any]]:
+    def frames(
+        self, port: UserPort | None = None, most: float | None = None
+    ) -> list[dict[str, Any]]:
         """The frames as the live page gets them, without their time and what is not finite. port:
-        the energy at the user's port, which in a window began before it."""
+        the energy at the user's port, which in a window began before it; most: what is tolerated
+        of it (J) in the whole run."""
         values, port = self.values(), port or user_port(self.results)
+        most = tolerated(self.results) if most is None else most
         energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
         made = []
         for i in range(len(self.times)):
@@ -105,7 +109,9 @@ class Recorded:
             frame = _by_user(row)
             if energy is not None and np.isfinite(energy[i]):
                 frame["energy"] = {PORT: float(energy[i])}
-            made.append(self.picture.drawn(frame))
+            made.append(drawn := self.picture.drawn(frame))
+            if energy is not None and energy[i] > most:
+                drawn["states"].append("energy")
         return made
 
     def message(self) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path):
         "one: 7 steps were discarded and repeated with smaller ones",
         "warning: 2 of 5 iterated steps did not converge",
         "a.y -> b.u: 2 of 9 samples were lost, 1 overtaken",
-        "zoh instead of the default hold passive for b.u, b.u: no power",
+        "zoh instead of the hold passive for b.u, b.u: no power",
     ]
 
 
