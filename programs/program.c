@@ -614,6 +614,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
                     start, m->now.time);
     if (!(size > 0.0 && end * l->denominator < 0x1p52 * l->numerator))
         return fail(m, fmi2Error, "a step by %.17g s from t = %.17g s has no end", size, start);
+    if (!(end > m->now.time))
+        return fail(m, fmi2Error, "a step from t = %.17g s to %.17g s goes back: the program stands at "
+                    "%.17g s", start, end, m->now.time);
     const int64_t until = (int64_t)floor(end * l->denominator / l->numerator + NEAR);
     if (until > m->now.tick && !advance(m, until)) {
         if (m->now.mode == ENDED) {
@@ -669,6 +672,13 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
     return fmi2OK;
 }
 
+/* FNV-1a (Fowler, Noll, Vo), 64 bits: a damaged state would lead anywhere. */
+static uint64_t checksum(const fmi2Byte bytes[], size_t size) {
+    uint64_t sum = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < size; i++) sum = (sum ^ (unsigned char)bytes[i]) * 0x100000001b3u;
+    return sum;
+}
+
 static size_t member_state_size(const Model *m, int i, const Saved *saved) {
     size_t size = 0;
     members[i].state_size(m->members[i], saved->members[i], &size);
@@ -679,7 +689,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_
     Model *m = c;
     if (is_null(m, __func__, 1, state, size) || !is_ours(m, state)) return fmi2Error;
     if (lacks(m, __func__, WITHOUT_BYTES)) return fmi2Error;
-    *size = sizeof(State);
+    *size = sizeof(State) + sizeof(uint64_t);
     for (int i = 0; i < N_MEMBERS; i++) *size += member_state_size(m, i, state);
     return fmi2OK;
 }
@@ -704,6 +714,8 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b
         if (members[i].serialize(m->members[i], saved->members[i], bytes + at, part)) return fmi2Error;
         at += part;
     }
+    const uint64_t sum = checksum(bytes, at);
+    memcpy(bytes + at, &sum, sizeof sum);
     return fmi2OK;
 }
 
@@ -718,6 +730,11 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     if (fmi2SerializedFMUstateSize(c, own, &needed) != fmi2OK || size != needed) {
         fmi2FreeFMUstate(c, &own);
         return fail(m, fmi2Error, "the FMU state has %zu bytes instead of %zu", size, needed);
+    }
+    const uint64_t sum = checksum(bytes, size - sizeof sum);
+    if (memcmp(bytes + size - sizeof sum, &sum, sizeof sum)) {
+        fmi2FreeFMUstate(c, &own);
+        return fail(m, fmi2Error, "the FMU state is damaged: its checksum is that of other bytes");
     }
     fmi2FreeFMUstate(c, state);
     Saved *saved = *state = own;

@@ -6,13 +6,14 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
 from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
@@ -156,7 +157,8 @@ def _rooms(plan: Plan, title: str) -> dict[str, int]:
         refusals.of_simulation(simulation, title)
         loop = CompiledLoop(plan, simulation, load())
         simulation.start()
-        loop.run(lambda tick: None)
+        with suppress(FmuFault):  # a scene that fails has the rooms up to there
+            loop.run(lambda tick: None)
         return {
             name: 2 * hold.room
             for name, hold in simulation.holds.items()

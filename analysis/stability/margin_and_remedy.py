@@ -67,12 +67,14 @@ class Margin:
 
 @dataclass(frozen=True)
 class Remedy:
-    """Options, and the growth rate (1/s) of the worst case in all poses and hands with them.
-    stable: whether it decays by DECAY at least."""
+    """Options, and the growth rate (1/s) of the worst case in all poses and hands with them, those
+    aside that are marginal or only drift. stable: whether it decays by DECAY at least; marginal:
+    the hands in which small motions neither grow nor decay in some pose."""
 
     options: tuple[str, ...]
     growth: float
     stable: bool
+    marginal: tuple[str, ...] = ()
 
 
 def improvements(
@@ -216,11 +218,11 @@ class _Search:
             if growth[change] >= 0.0 and judged:
                 break
             judged[change] = self._in_all(change, visited)
-            if judged[change].stable:
+            if judged[change].stable and not judged[change].marginal:
                 break
         if growth.get(softer, 0.0) < 0.0 and softer not in judged:
             judged[softer] = self._in_all(softer, visited)
-        every = sorted(judged.values(), key=lambda remedy: remedy.growth)
+        every = sorted(judged.values(), key=lambda r: (r.growth >= 0.0, len(r.marginal), r.growth))
         return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
 
     def _in_all(self, change: tuple[str, ...], visited: Visited) -> Remedy:
@@ -231,7 +233,8 @@ class _Search:
             return Remedy(change, float("inf"), False)
         cases, without = in_poses(changed, poses, self._hands, self._bounds)
         worst = _worst(cases) if cases and not without else float("inf")
-        return Remedy(change, worst, worst < -DECAY)
+        marginal = dict.fromkeys(case.hand for case in cases if case.verdict == "marginal")
+        return Remedy(change, worst, worst < -DECAY, tuple(marginal))
 
 
 def _set_rate(clock: str, rate: Fraction) -> str:

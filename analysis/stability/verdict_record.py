@@ -154,6 +154,8 @@ class Stability:
                 how = "nothing grows by more than a drift"
             elif not remedy.stable and remedy.growth >= 0.0:
                 how = f"improves most, to {remedy.growth:.2g} 1/s, which is not enough"
+            if remedy.marginal:
+                how += f"; marginal in {len(remedy.marginal)} of the hands"
             yield f"{'remedy' if remedy is self.remedies[0] else 'or'}: {options}: {how}"
         if not self.remedies and self.verdict == "unstable":
             yield "remedy: no single change of hold, rate, gain or damping that was tried"

@@ -6,7 +6,6 @@ A point is {dotted key: value as text}, as `--set` takes them.
 from __future__ import annotations
 
 import csv
-import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -186,18 +185,15 @@ def _csv(path: Path, text: str) -> Iterator[Point]:
         yield {key.strip(): cell.strip() for key, cell in row.items() if cell.strip()}
 
 
-def _toml(path: Path, text: str) -> Iterator[Point]:
+def _toml(path: Path, content: str) -> Iterator[Point]:
     try:
-        runs = loads(text).get("run", [])
+        runs = loads(content).get("run", [])
     except ValueError as error:
         raise InputFault(f"--runs {path}: not TOML: {error}") from error
     if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
         raise InputFault(f"--runs {path}: `run` is no array of tables; write [[run]]")
     for run in runs:
-        options = {key: value for key, value in flat(run) if value != {}}
-        yield {
-            k: v if isinstance(v, str) else json.dumps(v, default=str) for k, v in options.items()
-        }
+        yield {key: text(value, key) for key, value in flat(run) if value != {}}
 
 
 def number(text: str) -> float | None:

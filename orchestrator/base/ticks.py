@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -128,6 +129,10 @@ class Timeline:
         """The correctly rounded time of a tick (true division of integers rounds once)."""
         numerator, denominator = self.base.numerator, self.base.denominator
         return lambda tick: tick * numerator / denominator
+
+    def points(self, clock: Clock) -> int:
+        """The number of a clock's communication points within the run."""
+        return min(bisect_right(clock.starts, self.end), len(clock.starts) - 1)
 
     def clock(self, name: str) -> Clock:
         return next(c for c in self.clocks if c.name == name)

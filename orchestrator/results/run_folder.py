@@ -62,9 +62,10 @@ class RunFolder(RunResults):
                 self._broken_off("fault", error)
 
     def _new(
-        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int
+        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int, end: int
     ) -> FileRecorder:
-        return FileRecorder(self.folder / f"{clock}.csv", recorded, values, self._publish, every)
+        path = self.folder / f"{clock}.csv"
+        return FileRecorder(path, recorded, values, self._publish, every, end)
 
     def finish(self) -> None:
         if self._csv:

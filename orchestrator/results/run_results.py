@@ -15,8 +15,9 @@ from hapticlink.orchestrator.results.read_results import Table
 
 class Recorder:
     """Records rows of a table: `time` and those `values` whose places the columns `recorded` name,
-    at every `every`-th call of `row`; where `recorded` is None there is no table, and rows are
-    counted only. `first` is called after the first row. A context manager.
+    at every `every`-th call of `row`, and at the one numbered `end`, from 0 on; where `recorded` is
+    None there is no table, and rows are counted only. `first` is called after the first row. A
+    context manager.
 
     block: the newest rows, which `flush` moves to `parts`. `view` is `values` at `places` where
     these are side by side, else None. `due`: whether the next row is written. `room`: of the block,
@@ -33,10 +34,12 @@ class Recorder:
         values: Vector,
         first: Callable[[], object],
         every: int = 1,
+        end: int = 0,
         block: binary_rows.Block | None = None,
     ) -> None:
         places = [*(recorded or {}).values()]
-        self.values, self.places, self.every = values, np.array(places, np.int64), every
+        self.values, self.places = values, np.array(places, np.int64)
+        self.every, self.end = every, end
         self.columns, self.parts = ("time", *(recorded or ())), list[Vector]()
         span = slice(places[0], places[-1] + 1) if places else slice(0)
         self.view = values[span] if places == [*range(len(values))[span]] else None
@@ -61,7 +64,7 @@ class Recorder:
             filled.value += 1
         self.reached.value = time
         self.count.value += 1
-        self.due.value = self.count.value % self.every == 0
+        self.due.value = self.count.value % self.every == 0 or self.count.value == self.end
         if self.count.value == 1:
             self._first()
             self.room.value = len(self.block.rows) if self.block else 1
@@ -94,17 +97,22 @@ class RunResults:
         self._recorders: dict[str, Recorder] = {}
 
     def recorder(
-        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int = 1
+        self,
+        clock: str,
+        recorded: Mapping[str, int] | None,
+        values: Vector,
+        every: int = 1,
+        end: int = 0,
     ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
-        self._recorders[clock] = made = self._new(clock, recorded, values, every)
+        self._recorders[clock] = made = self._new(clock, recorded, values, every, end)
         return made
 
     def _new(
-        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int
+        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int, end: int
     ) -> Recorder:
         block = None if recorded is None else binary_rows.Block(1 + len(recorded))
-        return Recorder(recorded, values, self._publish, every, block)
+        return Recorder(recorded, values, self._publish, every, end, block)
 
     def flush(self) -> None:
         """Move the rows of all clocks out of their blocks. Raises OSError, as on a full disk."""

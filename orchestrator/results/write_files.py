@@ -29,8 +29,9 @@ class FileRecorder(Recorder):
         values: Vector,
         first: Callable[[], object],
         every: int = 1,
+        end: int = 0,
     ) -> None:
-        super().__init__(recorded, values, first, every)
+        super().__init__(recorded, values, first, every, end)
         self.path, self.target = path, path.with_suffix(binary_rows.SUFFIX)
         self._full: float | None = None
         self._file: BinaryIO | None = None

@@ -95,7 +95,8 @@ class Simulation(LoadedFmus):
                 self.setters[fmu.name, True] = self.setter(incoming, self.signals.sources)
         for clock in self.system.timeline.clocks:
             recorded, every = self.signals.recorded(clock.name), self.system.recording.every
-            recorder = self._results.recorder(clock.name, recorded, values, every)
+            end = self.system.timeline.points(clock) - 1
+            recorder = self._results.recorder(clock.name, recorded, values, every, end)
             self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:

@@ -101,7 +101,8 @@ class Record:
     """all: every output; connected: those that a connection reads; none: no table; or a list of
     FMUs, of their outputs `fmu.port`, and of entries of these, `fmu.port[1]`."""
     every: Annotated[int, Quantity("1", ge=1, le=1_000_000)] = 1
-    """Every so many communication points of a rate, from the one at t = 0 on, it gets a row."""
+    """Every so many communication points of a rate, from the one at t = 0 on, it gets a row, and at
+    the last one within the scene's duration."""
     format: Literal["csv", "rows"] = "csv"
     """csv; or rows, the header of the CSV and a line feed, then rows of doubles, which take less
     than half the time to write and almost none to read."""

@@ -87,7 +87,8 @@ def _coordinates(on: Results, off: Results, folder: Path) -> Iterator[Entry]:
         yield Entry(
             f"Figure 6.{i + 2}, {axis_name}-position of the trajectories",
             draw.save(figure, folder, f"figure_6_{i + 2}.png"),
-            "the difference of handle (HD) and operational point (HS) is smaller with the topology controller than without",
+            "the difference of handle (HD) and operational point (HS) is smaller with the topology "
+            "controller than without",
             f"at most {worst[0]:.2g} mm with it, {worst[1]:.3g} mm without",
             f"{command('closed-loop', *ON)}; {command('closed-loop', *OFF)}",
         )

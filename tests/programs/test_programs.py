@@ -16,6 +16,7 @@ from fmpy.fmi1 import FMICallException
 from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.experiment import simulate
 from hapticlink.programs.build import build_program, program_files
 from tests.fmus.named_fmu import Named
 from tests.programs import life
@@ -226,6 +227,40 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
         assert before != slave.getReal([*names.values()])
         slave.terminate()
         assert "is terminated" in fails(slave.doStep, 0.2, 0.1)
+
+
+def test_a_state_whose_bytes_are_damaged_is_refused() -> None:
+    path = program("closed-loop", DELAYED)
+    with session(path) as opened:
+        fmu = Named(opened).start()
+        fmu.step(0.0, 0.1)
+        whole = fmu.slave.serializeFMUState(fmu.slave.getFMUState())
+        for place in (len(whole) // 7, len(whole) // 2, len(whole) - 1):
+            damaged = bytearray(whole)
+            damaged[place] ^= 4
+            with pytest.raises(FMICallException):
+                fmu.slave.deserializeFMUState(bytes(damaged))
+            assert "damaged" in opened.messages[-1]
+        fmu.slave.setFMUState(fmu.slave.deserializeFMUState(whole))
+        fmu.step(0.1, 0.1)
+
+
+def test_steps_that_each_begin_a_little_early_do_not_take_the_program_back() -> None:
+    with session(program("pendulum", (HALF,))) as opened:
+        fmu = Named(opened).start()
+        fmu.step(0.0, 0.1)
+        early = 0.1 - 4e-7  # less than 1/1000 tick
+        with pytest.raises(FMICallException):
+            fmu.step(early, 1e-12)
+        assert "goes back: the program stands at 0.1" in opened.messages[-1]
+        fmu.step(early, 0.1)
+
+
+def test_a_scene_that_diverges_becomes_a_program(tmp_path: Path) -> None:
+    """What its latencies need is known from its run, up to where that fails."""
+    options = (HALF, "controller.teleoperation.stiffness=[1e6,1e6,1e3]", *DELAYED[1:])
+    assert simulate("closed-loop", tmp_path, options).outcome.reason == "diverged"
+    assert program("closed-loop", options).exists()
 
 
 def test_a_run_that_diverges_names_the_output() -> None:

@@ -4,8 +4,9 @@ of the others; a map for two numeric keys with many values each."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.table import columns
 from hapticlink.fmus.cache import sha, sources
 from hapticlink.fmus.versions import version
-from hapticlink.orchestrator.base.errors import InputFault, unknown
+from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -40,6 +41,8 @@ NAMES = {
 }
 UNITS = {"rate": "Hz", "duration": "s", "phase": "s", "mass": "kg", "inertia": "kg m2"}
 """Units of the keys that are varied most often, by the last part of the key."""
+FEW_KEYS = 3
+"""Keys whose values alone name a row: of more, each row says those that it gives."""
 FEW = 8
 """Number of lines that differ in colour; further ones also differ in dash pattern."""
 GOOD = ("duration",)
@@ -143,14 +146,24 @@ def finding(
     """A title with the smallest value of a quantity such as `RMS tracking error (mm)`, the point of
     the row `best` that has it, and how many of the `of` runs ended early or failed."""
     name, _, measured = quantity.partition(" (")
-    where = ", ".join(f"{k} = {best.get(k, 'as in the scene')} {unit(k)}".rstrip() for k in keys)
+    named = _naming(best, keys)
+    where = ", ".join(f"{k} = {best.get(k, 'as in the scene')} {unit(k)}".rstrip() for k in named)
     text = f"{name[:1].upper()}{name[1:]} down to {short(value)} {measured.rstrip(')')}".rstrip()
     few = f"; {ended} of {of} runs ended early or failed" if ended else ""
     return f"{text} at {where}{few}"
 
 
-def _label(row: Row, keys: Iterable[str]) -> str:
-    return plain(", ".join(str(row.get(k, "as in the scene")) for k in keys))
+def _naming(row: Row, keys: Sequence[str]) -> Sequence[str]:
+    """The keys by which a row is named: all if they are few, else those that it gives."""
+    return keys if len(keys) <= FEW_KEYS else [k for k in keys if row.get(k, "") != ""]
+
+
+def _label(row: Row, keys: Sequence[str]) -> str:
+    """The values of a row; of many keys those that it gives, by name."""
+    if len(keys) <= FEW_KEYS:
+        return plain(", ".join(str(row.get(k, "as in the scene")) for k in keys))
+    given = ", ".join(shortened(f"{k}={row[k]}") for k in _naming(row, keys))
+    return plain(fill(given, 50)) or "as in the scene"
 
 
 def _shown(row: Row, metric: str) -> bool:
@@ -215,8 +228,11 @@ def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str) -> N
             axes.text(
                 0.01, i, f" {rows[i]['end']}", va="center", transform=axes.get_yaxis_transform()
             )
-    axes.invert_yaxis()
-    axes.set(xlabel=_named(metric), ylabel=", ".join(keys))
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    if len(keys) > FEW_KEYS:
+        axes.figure.set_figwidth(10)
+    axes.figure.set_figheight(max(4.6, 1.5 + sum(0.2 + 0.2 * len(t.split("\n")) for t in labels)))
+    axes.set(xlabel=_named(metric), ylabel=", ".join(keys) if len(keys) <= FEW_KEYS else "")
 
 
 def _scale(axes: Any, values: Sequence[float]) -> None:

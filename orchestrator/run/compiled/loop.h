@@ -201,8 +201,8 @@ typedef struct {
 } Meter;
 
 /* Of `n` signals, at `where`, or side by side from `view` on where that is NULL, each `every`-th of
- * the `count` rows so far is written to `block`, (room, 1 + n) of time and values, of which `rows`
- * are filled; NULL where there is no table. due: whether the next one is. room: 0 before the
+ * the `count` rows so far, and the one numbered `end`, is written to `block`, (room, 1 + n) of time and
+ * values, of which `rows` are filled; NULL where there is no table. due: whether the next one is. room: 0 before the
  * first. reached: time of the newest, written or not. */
 typedef struct {
     double *block /* [room[0] * (1 + n)] */;
@@ -212,7 +212,7 @@ typedef struct {
     const int64_t *room;
     int64_t *due, *count;
     double *reached;
-    int64_t n, every;
+    int64_t n, every, end;
 } Table;
 
 /* --- the plan --------------------------------------------------------------------------------- */

@@ -299,7 +299,7 @@ class Machine:
             c = self._tables[index]
             if recorder.block:
                 c.fill(block=recorder.block.rows, rows=recorder.block.filled)
-            c.fill(recorder, "room", "due", "count", "reached", "every", "view")
+            c.fill(recorder, "room", "due", "count", "reached", "every", "end", "view")
             where = recorder.places if recorder.view is None else None
             c.fill(n=len(recorder.places), where=where)
             return recorder

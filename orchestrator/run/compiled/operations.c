@@ -59,7 +59,7 @@ static int record(const Loop *l, Table *t, int64_t tick) {
     }
     *t->reached = time;
     ++*t->count;
-    *t->due = t->every == 1 || *t->count % t->every == 0;
+    *t->due = t->every == 1 || *t->count % t->every == 0 || *t->count == t->end;
     return 0;
 }
 

@@ -143,6 +143,8 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     again = hl.stability("virtual-wall", [*overrides.written(beyond), *pasted], poses=1)
     held = [c.growth for c in again.cases if not c.free and c.verdict != "marginal"]
     assert max(held) == pytest.approx(found.remedies[0].growth, rel=1e-9)
+    marginal = {c.hand for c in again.cases if not c.free and c.verdict == "marginal"}
+    assert {*found.remedies[0].marginal} == marginal
     hands = len({c.hand for c in again.cases if not c.free})
     edge = [replace(c, verdict="stable" if c.free else "marginal") for c in again.cases]
     assert f"marginal in {hands} hands and" in replace(again, cases=tuple(edge)).finding

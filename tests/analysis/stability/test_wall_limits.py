@@ -33,6 +33,8 @@ def test_closed_forms_give_the_reference_numbers() -> None:
     assert stable == pytest.approx([5147.9288, 1721.95, 1038.20], rel=1e-5)
     largest = [wall_limits.undamped(1.0, 1.0, n / 10) for n in range(1, 10)]
     assert largest == pytest.approx(TABLE, abs=5e-5)
+    scaled = wall_limits.undamped(M, T, 0.8 * M / T) * T**2 / M
+    assert scaled == pytest.approx(largest[7])
     assert wall_limits.passive(D, T) == pytest.approx(5120)
     assert wall_limits.passive(D, T, B=-1.0) == pytest.approx(4096)
     assert wall_limits.undamped_measured(T, 5.0) == pytest.approx(5120)

@@ -105,10 +105,12 @@ def test_runs_from_a_file(tmp_path: Path) -> None:
     (tmp_path / "runs.toml").write_text(
         '[[run]]\nhold = "zoh"\n[run.graphics.rate]\nmin = 10\nmax = 60\n'
         "[[run]]\nhand.wrench = [1, 0, 0]\n"
+        "[[run]]\nat = [{ time = 0.3, set = { hold = 'foh' } }]\n"
     )
     assert listed(tmp_path / "runs.toml") == [
         {"hold": "zoh", "graphics.rate.min": "10", "graphics.rate.max": "60"},
         {"hand.wrench": "[1, 0, 0]"},
+        {"at": '[{ "time" = 0.3, "set" = { "hold" = "foh" } }]'},
     ]
     for name, text in (
         ("a.csv", "hold\n"),

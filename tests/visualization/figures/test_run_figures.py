@@ -1,5 +1,6 @@
 """Figures: their titles, and the signals that they draw."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -132,6 +133,18 @@ def test_a_sampled_spring_shows_its_energy() -> None:
     energy = 0.5 * v**2 + 50 * x**2  # 1 kg on 100 N/m
     assert bar.get_width() == pytest.approx(energy[-1] - energy[0], rel=1e-6)
     assert "(J;" in axes.get_xlabel()
+
+
+def test_runs_that_differ_in_many_keys_are_named_by_those_they_give() -> None:
+    keys = [f"linkage.body.link{n}.mass" for n in range(12)]
+    rows = [{key: "2", "tracking_max_mm": 1.0 + n, "end": "duration"} for n, key in enumerate(keys)]
+    figure = sweep_figure.draw([*rows, {"tracking_max_mm": 5.0, "end": "duration"}], keys, None)
+    assert figure
+    with warnings.catch_warnings(action="error"):
+        figure.canvas.draw()
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels == [*(f"{key}=2" for key in keys), "as in the scene"]
+    assert figure.axes[0].get_title().endswith("1 mm at linkage.body.link0.mass = 2 kg")
 
 
 def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
