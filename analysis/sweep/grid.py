@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date, time
 from decimal import Decimal, InvalidOperation
 from itertools import product
 from pathlib import Path
@@ -193,7 +194,11 @@ def _toml(path: Path, content: str) -> Iterator[Point]:
     if not isinstance(runs, list) or not all(isinstance(run, dict) for run in runs):
         raise InputFault(f"--runs {path}: `run` is no array of tables; write [[run]]")
     for run in runs:
-        yield {key: text(value, key) for key, value in flat(run) if value != {}}
+        yield {
+            key: str(value) if isinstance(value, date | time) else text(value, key)
+            for key, value in flat(run)
+            if value != {}
+        }
 
 
 def number(text: str) -> float | None:
