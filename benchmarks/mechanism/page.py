@@ -112,7 +112,7 @@ def _page(
         "The smallest ratio over the rows that no other row of the same code beats, to our fastest",
         "row (as C) with no larger error.",
         "",
-        *table(f"mechanism | {' | '.join(OTHERS)} | reference", "lrrrr", relative),
+        *table(f"mechanism | {' | '.join(OTHERS)} | reference", f"l{'r' * len(OTHERS)}l", relative),
         "",
         "Times are the smallest of interleaved rounds, comparable within one run only. All codes",
         "start from the same pose and rates and take equal steps; building is not timed.",
