@@ -31,7 +31,9 @@ def read(path: Path, what: str, most: int, encoding: str = "utf-8") -> str:
         if len(content) > most:
             raise InputFault(f"{why}: it has more than {most} bytes")
         return content.decode(encoding)
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise InputFault(f"{why}: it is not UTF-8 ({error.reason}); save it as UTF-8") from error
+    except OSError as error:
         raise InputFault(f"{why}: {error}") from error
 
 

@@ -61,6 +61,9 @@ class _Events:
         if name == GRAPHICS_RATE and key == "set":
             begin = self._begin("graphics", event.time)
             return Change(begin, f"{name} = {value} Hz")
+        table = GRAPHICS_RATE.partition(".")[0]
+        if name.startswith(f"{table}.") and table not in self._system.fmu:
+            raise ValueError(f"of the keys of a scene's rates {GRAPHICS_RATE} alone can be set")
         scalars = self._scalars(name)
         feeding = self._feeding(name)
         text = f"{name} = {shortened(str(value))}"
