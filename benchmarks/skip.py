@@ -32,7 +32,7 @@ from hapticlink.analysis.findings import block_costs
 from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.fmi import calls_of_fmi2, process_cache
+from hapticlink.orchestrator.fmi import calls_of_fmi, process_cache
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.scene import blocks, find_scene
@@ -60,7 +60,7 @@ def nothing_skipped() -> Iterator[None]:
         for module, name, instead in (
             (blocks, "_loop", lambda scene, _: build(scene, False)),
             (experiment, "with_fetched", lambda system: system),
-            (calls_of_fmi2, "Setter", always),
+            (calls_of_fmi, "Setter", always),
         ):
             stack.enter_context(patch.object(module, name, instead))
         yield

@@ -346,7 +346,7 @@ static int judge(Model *m, Fmu *f) {
 }
 
 /* Whether a block has discarded a step because it ends the simulation there: it is then the last one
- * of the block. 0, with a message, where it failed or ends within the step: calls_of_fmi2.py. */
+ * of the block. 0, with a message, where it failed or ends within the step: calls_of_fmi.py. */
 static int took_its_last_step(Model *m, int64_t fmu, fmi2Status status) {
     const Member *member = members + fmu_members[fmu];
     fmi2Component c = m->members[fmu_members[fmu]];

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account

@@ -12,7 +12,7 @@ import numpy as np
 
 from hapticlink.fmus.native import compile_library
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.build_system import built

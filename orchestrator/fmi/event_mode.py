@@ -28,9 +28,9 @@ import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd
-from hapticlink.orchestrator.fmi.calls_of_fmi3 import InProcess3
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, Clock
+from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.status import DISCARD, SHARE, succeeded
 from hapticlink.orchestrator.fmi.transfer import Transfer

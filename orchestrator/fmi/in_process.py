@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
-from hapticlink.orchestrator.fmi.calls_of_fmi3 import InProcess3
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.capabilities import has_event_mode
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.event_mode import InProcessWithEvents
+from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 
 
 def in_process(description: Description) -> type[InProcess]:

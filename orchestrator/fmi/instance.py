@@ -1,4 +1,4 @@
-"""The interface of a loaded FMU, implemented in this process (`calls_of_fmi2`, `calls_of_fmi3`)
+"""The interface of a loaded FMU, implemented in this process (`calls_of_fmi`, `fmi3_differences`)
 and in a process of its own (`isolated`)."""
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
-from hapticlink.orchestrator.fmi.calls_of_fmi3 import InProcess3
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
+from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.run import step_check

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hapticlink.fmus.build_fmu import build, build_native
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.process_cache import described
 from tests.orchestrator import coupled

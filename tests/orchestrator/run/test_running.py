@@ -9,7 +9,7 @@ import pytest
 
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.results import read_results

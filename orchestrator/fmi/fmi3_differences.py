@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from fmpy import fmi3
 
-from hapticlink.orchestrator.fmi.calls_of_fmi2 import InProcess
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.messages import keep
 from hapticlink.orchestrator.fmi.setter import Setting
 from hapticlink.orchestrator.fmi.start_values import wide

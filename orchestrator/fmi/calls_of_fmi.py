@@ -1,5 +1,5 @@
 """The calls of an FMU that is loaded into this process, with its values in shared arrays: FMI 2.0
-here, the differences of FMI 3.0 in `calls_of_fmi3`.
+here, the differences of FMI 3.0 in `fmi3_differences`.
 
 FMPy loads the library and instantiates; during the run the C functions are called directly, with
 pointers that are created once. Every status is checked, every output must be finite, and the
