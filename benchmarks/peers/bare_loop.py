@@ -11,11 +11,6 @@ from time import thread_time
 import numpy as np
 
 from hapticlink.fmus.native import compile_library
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
-from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.build_system import built
 
 SOURCE = Path(__file__).with_name("bare_loop.c")
 
@@ -41,6 +36,13 @@ def seconds(scene: str, options: list[str], steps: int, folder: Path) -> float:
     """Processor time of `steps` steps of the fastest FMUs of a scene, initialised as in a run, in a
     loop that hands their outputs on as they are. All variables have to be reals of FMI 2.0 at fixed
     rates."""
+    # A ring alone, whose start-up is measured, needs none of these.
+    from hapticlink.orchestrator import open_scene
+    from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
+    from hapticlink.orchestrator.results.run_results import RunResults
+    from hapticlink.orchestrator.run.simulation import Simulation
+    from hapticlink.orchestrator.system.build_system import built
+
     run = bare_loop(folder).loop
     with built(open_scene.load(scene, options)) as system, ExitStack() as stack:
         simulation = Simulation(system, RunResults(), stack)

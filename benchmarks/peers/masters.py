@@ -92,8 +92,9 @@ def libcosim(ring: Ring) -> Steps:
     return timed(run)
 
 
-def _slaves(ring: Ring) -> tuple[list[Any], list[int], list[int]]:
-    """The FMUs of a ring, initialised, by FMPy; the references of an FMU's inputs and outputs."""
+def _slaves(ring: Ring, one_library: bool = False) -> tuple[list[Any], list[int], list[int]]:
+    """The FMUs of a ring, initialised, by FMPy; the references of an FMU's inputs and outputs.
+    one_library: all are instances of the first, whose file each of them is."""
     from fmpy import extract, fmi2, read_model_description
 
     logging.getLogger("fmpy").setLevel(logging.ERROR)
@@ -103,12 +104,14 @@ def _slaves(ring: Ring) -> tuple[list[Any], list[int], list[int]]:
         for causality in ("input", "output")
     )
     made = []
+    unpacked = ring.fmus[:1] if one_library else ring.fmus
+    folders = [extract(str(path), str(ring.folder / f"fmu{i}")) for i, path in enumerate(unpacked)]
     for i, path in enumerate(ring.fmus):
         model = read_model_description(str(path), validate=False)
         slave = fmi2.FMU2Slave(
             guid=model.guid,
             modelIdentifier=model.coSimulation.modelIdentifier,
-            unzipDirectory=extract(str(path), str(ring.folder / f"fmu{i}")),
+            unzipDirectory=folders[0 if one_library else i],
             instanceName=f"f{i}",
         )
         slave.instantiate()
@@ -171,7 +174,7 @@ def bare(ring: Ring) -> Steps:
     """A loop in C over the FMUs' functions alone: what they cost themselves."""
     from benchmarks.peers.bare_loop import bare_loop
 
-    slaves, inputs, outputs = _slaves(ring)
+    slaves, inputs, outputs = _slaves(ring, one_library=True)
     calls = [
         [ctypes.cast(function, ctypes.c_void_p).value for function in found]
         for found in _functions(slaves)
