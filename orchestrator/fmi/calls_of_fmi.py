@@ -107,7 +107,8 @@ class InProcess(Instance):
         self.holds_python = bool(module)
         slave.instantiate(loggingOn=True, **self._logging())
         if module and about.block is None:
-            python_libraries.tell_exceptions(module, partial(messages.keep, self._key, ERROR))
+            tell = partial(messages.keep, self._key, ERROR)
+            python_libraries.tell_exceptions(module, self.name, tell)
         return slave
 
     def _logging(self) -> dict[str, Any]:

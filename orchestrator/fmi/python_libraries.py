@@ -68,33 +68,43 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> str:
     raise ValueError("resources/slavemodule.txt names no module beside it; build the FMU again")
 
 
-def tell_exceptions(module: str, tell: Callable[[bytes], object]) -> None:
-    """Have the newest instance of a Python FMU `tell` at which line of its own files an exception
-    came up, of which its library logs the text alone. Its module has been executed for this
-    instance, so that the classes in it are of this instance, too."""
+_told: dict[tuple[str, str], Callable[[bytes], object]] = {}
+"""By module and name of an instance, what is told of its exceptions."""
+
+
+def tell_exceptions(module: str, instance: str, tell: Callable[[bytes], object]) -> None:
+    """Have the instance of a Python FMU `tell` at which line of its own files an exception came up,
+    of which its library logs the text alone. Instances may share the classes of their module, whose
+    methods are replaced once."""
+    _told[module, instance] = tell
     scope = vars(sys.modules[module]) if module in sys.modules else {}
     own_files = Path(scope.get("__file__") or "").parent
     for kind in [*scope.values()]:
         own = isinstance(kind, type) and kind.__module__ == module and not kind.__subclasses__()
         for name in filter(CALLED.fullmatch, dir(kind) if own else ()):
-            if isfunction(method := getattr_static(kind, name)):
-                setattr(kind, name, _telling(method, own_files, tell))
+            method = getattr_static(kind, name)
+            if isfunction(method) and TELLS not in vars(method):
+                setattr(kind, name, _telling(method, module, own_files))
 
 
-def _telling(
-    method: Callable[..., Any], own_files: Path, tell: Callable[[bytes], object]
-) -> Callable[..., Any]:
+TELLS = "tells_exceptions"
+"""The mark of a method that was replaced."""
+
+
+def _telling(method: Callable[..., Any], module: str, own_files: Path) -> Callable[..., Any]:
     @wraps(method)
-    def telling(*arguments: Any, **named: Any) -> Any:
+    def telling(slave: Any, *arguments: Any, **named: Any) -> Any:
         try:
-            return method(*arguments, **named)
+            return method(slave, *arguments, **named)
         except Exception as error:
             frames = extract_tb(error.__traceback__)
             last = ([f for f in frames if Path(f.filename).parent == own_files] or frames)[-1]
             where = f"{Path(last.filename).name}, line {last.lineno}, in {last.name}: {last.line}"
-            tell(f"{where}: {type(error).__name__}: {error}".encode())
+            if tell := _told.get((module, getattr(slave, "instance_name", ""))):
+                tell(f"{where}: {type(error).__name__}: {error}".encode())
             raise
 
+    vars(telling)[TELLS] = True
     return telling
 
 

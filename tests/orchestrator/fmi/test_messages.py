@@ -1,5 +1,7 @@
 """Log messages of FMUs are kept up to their bounds."""
 
+import sys
+
 import pytest
 
 from hapticlink.orchestrator.experiment import simulate
@@ -41,3 +43,16 @@ def test_an_exception_of_a_python_fmu_has_its_file_and_line(tmp_path, isolate, c
     fault = str(simulate(str(path), tmp_path / "out").outcome.fault)
     where = f"{module.name}, line {line}, in do_step: {text[line - 1].strip()}"
     assert f"slow says: {where}: {error}\n" in fault
+
+
+def test_instances_that_share_a_class_each_have_their_own_exceptions(tmp_path):
+    """However often they run: a method is replaced once, and no call becomes dearer."""
+    python_fmu(tmp_path, "Shared", "1 / (self.instance_name != 'second' or self.steps - 2)")
+    path = scene(tmp_path, fmu_table("first", "Shared") + fmu_table("second", "Shared"))
+    (module,) = tmp_path.glob("m*.py")
+    for _ in range(3):
+        fault = str(simulate(str(path), tmp_path / "out").outcome.fault)
+        assert f"second says: {module.name}, line " in fault
+        assert "first says" not in fault
+        step = sys.modules[module.stem].Shared.do_step
+        assert not hasattr(step.__wrapped__, "__wrapped__")
