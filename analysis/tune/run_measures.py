@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from hapticlink.analysis.findings.measures import Measures
-from hapticlink.analysis.findings.user_port import allowed, hand_work
+from hapticlink.analysis.findings.user_port import tolerated
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results.read_results import Results
 
@@ -39,7 +39,7 @@ class RunLimit:
         self._end = Measures(run).tracking[""].end_s
         own = motion(run)
         self._distance = TRACKED * own["distance"]
-        self._energy = max(own["energy_peak"], allowed(hand_work(run)))
+        self._energy = max(own["energy_peak"], tolerated(run))
         if not np.isfinite(self._distance):
             raise InputFault(
                 f"the scene's own run fails: {run.record.fault}; take smaller gains, or a duration "

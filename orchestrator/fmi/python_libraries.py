@@ -68,6 +68,8 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> str:
     raise ValueError("resources/slavemodule.txt names no module beside it; build the FMU again")
 
 
+TELLS = "tells_exceptions"
+"""The mark of a method that was replaced."""
 _told: dict[tuple[str, str], Callable[[bytes], object]] = {}
 """By module and name of an instance, what is told of its exceptions."""
 
@@ -85,10 +87,6 @@ def tell_exceptions(module: str, instance: str, tell: Callable[[bytes], object])
             method = getattr_static(kind, name)
             if isfunction(method) and TELLS not in vars(method):
                 setattr(kind, name, _telling(method, module, own_files))
-
-
-TELLS = "tells_exceptions"
-"""The mark of a method that was replaced."""
 
 
 def _telling(method: Callable[..., Any], module: str, own_files: Path) -> Callable[..., Any]:
