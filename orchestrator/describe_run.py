@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from hapticlink.fmus.versions import installed
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.signal_names import MECHANISM
+from hapticlink.orchestrator.fmi.kind_check import MATRICES
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_record import (
     ClockSteps,
@@ -18,9 +20,8 @@ from hapticlink.orchestrator.results.run_record import (
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.ports import power_across_rates
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Connection, System
 
 PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
 """Those whose versions are recorded."""
@@ -67,11 +68,9 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
             u.name: system.coupling.substeps.get(u.name, 1) for u in system.fmus if not u.sampled
         },
         within_a_step={
-            c.name: _within_a_step(
-                held_polynomials.order(system, c), system.coupling.substeps.get(c.target, 1)
-            )
+            c.name: _within_a_step(system.coupling.substeps.get(c.target, 1))
             for c in system.connections
-            if held_polynomials.degree(system, c)
+            if _varies_within_a_step(system, c)
         },
         get_after_set=list(system.coupling.get_after_set),
         power_across_rates=power_across_rates(system),
@@ -89,11 +88,16 @@ def _units(system: System) -> dict[str, str]:
     return units if written is None else {name: units[name] for name in written if name in units}
 
 
-def _within_a_step(order: int, substeps: int) -> str:
+def _varies_within_a_step(system: System, c: Connection) -> bool:
+    """Whether the held input of a plant is a polynomial within its step, as projectors and
+    semidefinite matrices are not."""
+    if not c.hold or c.initial or system.fmu[c.target].sampled or c.kind in MATRICES:
+        return False
+    return HOLDS[c.hold].degree > 0
+
+
+def _within_a_step(substeps: int) -> str:
     """How a plant takes an input whose hold varies within its step."""
-    if order:
-        renewed = f", renewed in {substeps} substeps" if substeps > 1 else ""
-        return f"derivatives to order {order}{renewed}"
     if substeps > 1:
         return f"constant in each of {substeps} substeps"
     return "constant, the hold at the middle (half-step lead)"

@@ -317,8 +317,6 @@ class ForwardSensitivity:
             case Set(fmu):
                 into = system.into(fmu)
                 places = {p for c in into for p in (*signals.places(c), *signals.sources(c))}
-                for c in into:
-                    places.update(every[signals.derivatives(c.name)], signals.mean(c))
                 return reach({fmu}, set(), sorted(places))
             case Step(fmu):
                 return reach({fmu}, set())
@@ -326,9 +324,7 @@ class ForwardSensitivity:
                 c = system.connection[connection]
                 shared = HOLDS[c.hold or ""].needs
                 holds = set(keepers(simulation)) - set(simulation.holds) if shared else set()
-                held, derived = every[signals.hold(connection)], signals.derivatives(connection)
-                mean = signals.mean(c) if derived.stop else []
-                writes = sorted({*held, *every[derived], *mean})
+                writes = [*every[signals.hold(connection)]]
                 pushed = isinstance(operation, Push)
                 reads = every if shared else signals.sources(c) if pushed else writes
                 written = every if shared else () if pushed else writes

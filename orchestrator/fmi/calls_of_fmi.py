@@ -20,7 +20,7 @@ import numpy as np
 from fmpy import fmi2
 
 from hapticlink.orchestrator.base import interpreter_state
-from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries, rounding_mode
 from hapticlink.orchestrator.fmi.capabilities import restores_state
@@ -28,7 +28,7 @@ from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.load_library import loaded
 from hapticlink.orchestrator.fmi.retry import Retry, Saved
-from hapticlink.orchestrator.fmi.setter import Setter, Setting, Varying
+from hapticlink.orchestrator.fmi.setter import Setter, Setting
 from hapticlink.orchestrator.fmi.status import (
     DISCARD,
     ERROR,
@@ -178,20 +178,6 @@ class InProcess(Instance):
         except Unfit as why:
             raise self._fault(str(why), self.time, passing, repeatable=True) from None
 
-    def connect_derivatives(
-        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
-    ) -> Callable[[Vector], None]:
-        varying = Varying(self.slave, scalars, orders, places)
-        if self.retry:
-            self.retry.renew = varying.renew
-
-        def set_from(signals: Vector) -> None:
-            self.place.setter = 0  # the inputs move on from what was set
-            if not self.ended and not succeeded(status := varying.set(signals)):
-                raise self.failed(varying.name, status)
-
-        return set_from
-
     def _setting(self, scalars: Sequence[Scalar], start: bool = False) -> Setting:
         """`whole`, `into` and `transfers` of a Setter of `scalars`, sorted by type; start: with
         their start values, which no signal replaces."""
@@ -268,7 +254,6 @@ class InProcess(Instance):
         begin, size = self.place.begin, self.place.size
         status = self._settled(status, begin)
         if self.retry:
-            self.retry.begin = begin
             status = self.retry.after(status, begin, size)
         self.stepped(status)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from hapticlink.orchestrator.fmi.description import Description
 
 VARIABLE_STEP = "canHandleVariableCommunicationStepSize"
-INPUT_DERIVATIVES = "canInterpolateInputs"
 NEEDS_TOOL = "needsExecutionTool"
 STATE = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
 SERIALISED = {"2": "canSerializeFMUstate", "3": "canSerializeFMUState"}
@@ -24,11 +23,6 @@ def has_event_mode(description: Description) -> bool:
 
 def varies_step(description: Description) -> bool:
     return VARIABLE_STEP in description.flags
-
-
-def takes_input_derivatives(description: Description) -> bool:
-    """FMI 3.0 has no fmi2SetRealInputDerivatives."""
-    return description.fmi == "2" and INPUT_DERIVATIVES in description.flags
 
 
 def restores_state(description: Description) -> bool:

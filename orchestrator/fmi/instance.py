@@ -180,14 +180,6 @@ class Instance(ABC):
         vector."""
 
     @abstractmethod
-    def connect_derivatives(
-        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
-    ) -> Callable[[Vector], None]:
-        """A function that sets time derivatives of inputs, of the given orders, from the indices
-        `places` of a signal vector. Rows of order 0, the values, come first; retried steps need
-        them."""
-
-    @abstractmethod
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
         """The Jacobian (outputs, inputs) at the current state, by directional derivatives; None if
         the FMU does not provide them."""

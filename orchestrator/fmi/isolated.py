@@ -18,7 +18,7 @@ from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.fmi.units import SAME, Linear
+from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.fmi.worker_process import Died, Process
 
@@ -117,22 +117,9 @@ class Isolated(Instance):
     # --- the calls of a run ---------------------------------------------------------------
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+        """The function queues the values, converted, for the setter `key` of the worker."""
+        key = self._ask("connect", [s.name for s in scalars])
         conversions = [s.conversion for s in scalars]
-        return self._remote(self._ask("connect", [s.name for s in scalars]), conversions, places)
-
-    def connect_derivatives(
-        self, scalars: Sequence[Scalar], orders: Sequence[int], places: Sequence[int]
-    ) -> Callable[[Vector], None]:
-        of_orders = zip((s.conversion for s in scalars), orders, strict=True)
-        conversions = [Linear(c.factor) if order else c for c, order in of_orders]
-        key = self._ask("connect_derivatives", [s.name for s in scalars], list(orders))
-        return self._remote(key, conversions, places)
-
-    def _remote(
-        self, key: int, conversions: Sequence[Linear], places: Sequence[int]
-    ) -> Callable[[Vector], None]:
-        """A function that queues the values at `places`, converted, for the setter `key` of the
-        worker."""
         where, same = np.array(places, dtype=np.intp), all(c == SAME for c in conversions)
         factors = np.array([c.factor for c in conversions])
         offsets = np.array([c.offset for c in conversions])

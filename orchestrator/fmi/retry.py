@@ -48,14 +48,12 @@ class Saved:
 
 class Retry:
     """Takes steps with the state before each saved. smaller: number of steps taken in halves.
-    begin: of the step (s). saved: the states by depth of halving. renew: sets varying inputs for a
-    time (s) after the beginning of the step."""
+    saved: the states by depth of halving."""
 
     def __init__(
         self, slave: Any, fmi: str, place: Place, advance: Callable[[float, float], int]
     ) -> None:
-        self._advance, self.smaller, self.begin = advance, 0, 0.0
-        self.renew: Callable[[float], int] = lambda elapsed: 0
+        self._advance, self.smaller = advance, 0
         self.saved = [Saved(slave, fmi, place) for _ in range(HALVINGS + 1)]
 
     @staticmethod
@@ -67,11 +65,9 @@ class Retry:
         return f"not retried: the FMU lacks {' and '.join(missing)}" if missing else ""
 
     def step(self, time: float, size: float, depth: int = 0) -> int:
-        """Status of a step from `time` over `size` (s), in up to 2^10 parts; inputs stay, or go on
-        as they vary."""
+        """Status of a step from `time` over `size` (s), in up to 2^10 parts with the same
+        inputs."""
         saved = self.saved[depth]
-        if depth == 0:
-            self.begin = time
         if not succeeded(status := saved.save()):
             return status
         return self.after(self._advance(time, size), time, size, depth)
@@ -85,8 +81,6 @@ class Retry:
             return status
         half = size / 2
         if not succeeded(status := self.step(time, half, depth + 1)):
-            return status
-        if not succeeded(status := self.renew(time + half - self.begin)):
             return status
         return self.step(time + half, half, depth + 1)
 

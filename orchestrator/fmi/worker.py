@@ -52,17 +52,9 @@ class Worker:
         self.instance.__enter__()
 
     def connect(self, names: Sequence[str]) -> int:
-        return self._connected(self.instance.connect, names)
-
-    def connect_derivatives(self, names: Sequence[str], orders: Sequence[int]) -> int:
-        return self._connected(self.instance.connect_derivatives, names, orders)
-
-    def _connected(
-        self, connect: Callable[..., Callable[[Any], None]], names: Sequence[str], *orders: Any
-    ) -> int:
-        """The key of a setter of these inputs, or of their derivatives of these orders."""
+        """The key of a setter of these inputs."""
         scalars = [self._inputs[name] for name in names]
-        self._setters.append(connect(scalars, *orders, range(len(names))))
+        self._setters.append(self.instance.connect(scalars, range(len(names))))
         return len(self._setters) - 1
 
     def called(self, pending: Any, call: str, arguments: Any) -> Any:

@@ -21,7 +21,6 @@ MOST = 1 << 20
 ARGUMENTS: Mapping[str, tuple[type, ...]] = {
     "hello": (str, list, dict),
     "connect": (list,),
-    "connect_derivatives": (list, list),
     "enter_initialization": (float,),
     "exit_initialization": (),
     "read": (),
@@ -112,7 +111,7 @@ def answer_of(message: bytes, call: str, outputs: int) -> Answer:
     elif call == "read":
         fits = isinstance(content, bytes) and len(content) == size
     else:
-        fits = not call.startswith("connect") or type(content) is int
+        fits = call != "connect" or type(content) is int
     if not fits:
         raise Malformed(f"{call}: an answer of another form or size")
     return answer

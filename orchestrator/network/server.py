@@ -39,9 +39,9 @@ KINDS = 50
 BACK = 1e-9
 """Seconds by which a step may begin before the end of the one before it: rounding."""
 PHASES = {
-    "loaded": ("connect", "connect_derivatives", "read", "enter_initialization", "close"),
-    "initializing": ("connect", "connect_derivatives", "read", "exit_initialization", "close"),
-    "running": ("connect", "connect_derivatives", "read", "step", "save", "rollback", "close"),
+    "loaded": ("connect", "read", "enter_initialization", "close"),
+    "initializing": ("connect", "read", "exit_initialization", "close"),
+    "running": ("connect", "read", "step", "save", "rollback", "close"),
     "closed": (),
 }
 """The calls that FMI allows in each phase."""
@@ -68,17 +68,11 @@ class Session(Worker):
         )
         self.load(fmu.name, kept, fmu.starts, policy)
 
-    def _connected(
-        self, connect: Callable[..., Callable[[Any], None]], names: Sequence[str], *orders: Any
-    ) -> int:
+    def connect(self, names: Sequence[str]) -> int:
         """Raises Malformed for what no run asks for."""
-        if any(
-            len(of) != len(names) or any(type(n) is not int or n < 0 for n in of) for of in orders
-        ):
-            raise Malformed("connect_derivatives: an order for each input")
         if not all(type(name) is str and name in self._inputs for name in names):
             raise Malformed("connect: inputs that the FMU does not have")
-        key = super()._connected(connect, names, *orders)
+        key = super().connect(names)
         self._sizes.append(len(names))
         return key
 

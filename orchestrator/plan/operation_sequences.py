@@ -18,7 +18,6 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     StopWhen,
 )
-from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
@@ -60,21 +59,17 @@ def feed(system: System, event: Event, fmu: Fmu, part: int = 0) -> Iterator[Oper
     """Evaluate the holds in front of an FMU and set its inputs.
 
     A plant keeps an input constant over its step or substep, so it gets the hold's value at the
-    middle of it, or, where it interpolates inputs, the value and the derivatives at the beginning.
-    A sampled block gets the value at this tick.
+    middle of it. A sampled block gets the value at this tick.
     """
     incoming = system.into(fmu.name)
     width = Fraction(0)
     if not fmu.sampled:
         width = Fraction(dticks(event, fmu), system.coupling.substeps.get(fmu.name, 1))
-    orders = {c.name: held_polynomials.order(system, c) for c in incoming if c.hold}
-    for name, order in orders.items():
-        if order:
-            yield Evaluate(name, part * width, order, width)
-        else:
-            yield Evaluate(name, part * width + width / 2)
+    for connection in incoming:
+        if connection.hold:
+            yield Evaluate(connection.name, part * width + width / 2)
     if incoming:
-        yield Set(fmu.name, derivatives=any(orders.values()))
+        yield Set(fmu.name)
 
 
 def dticks(event: Event, fmu: Fmu) -> int:

@@ -44,25 +44,19 @@ class Push:
 @dataclass(frozen=True)
 class Evaluate:
     """Evaluate a hold from the samples known at this tick for the instant `ahead` of it: the middle
-    of the step for a plant, 0 for a sampled block.
-
-    A plant that can interpolate inputs gets the value at the beginning of its step of `width`, and
-    its derivatives up to `order`."""
+    of the step for a plant, 0 for a sampled block."""
 
     connection: str
     ahead: Fraction = Fraction(0)
-    order: int = 0
-    width: Fraction = Fraction(0)
 
 
 @dataclass(frozen=True)
 class Set:
-    """Set all connected inputs of an FMU to their held values, with `derivatives` also their
-    derivatives; with `now`, to the sources' newest outputs without holds."""
+    """Set all connected inputs of an FMU to their held values; with `now`, to the sources' newest
+    outputs without holds."""
 
     fmu: str
     now: bool = False
-    derivatives: bool = False
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.solvers import SOLVERS, Matrix, Newton, Solution, Vector
 from hapticlink.orchestrator.scene.scene_tables import Iteration
-from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.ports import beside
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -151,7 +150,6 @@ def _constant(c: Connection, system: System) -> bool:
     are those after the step."""
     return (
         system.coupling.substeps.get(c.target, 1) == 1
-        and held_polynomials.order(system, c) == 0
         and c.target not in system.coupling.get_after_set
         and c.latency is None
         and c.kind in (None, "table")

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-import numpy as np
-
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import (
@@ -38,7 +36,6 @@ from hapticlink.orchestrator.run.instructions import (
 )
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
-from hapticlink.orchestrator.system import held_polynomials
 
 
 class Stop(Exception):
@@ -72,20 +69,16 @@ class OperationsInPython:
                 instances[fmu].get()
             case Get(fmu):
                 instances[fmu].read()
-            case Set(fmu, now, derivatives):
+            case Set(fmu, now):
                 simulation.setters[fmu, now](values)
-                if derivatives:
-                    simulation.derivative_setters[fmu](values)
             case Step(fmu):
                 self._step(instruction, tick)
             case Push(connection, ahead):
                 sample = values[self._sources[connection]]
                 simulation.holds[connection].push(tick + ahead, sample, tick + late)
-            case Evaluate(connection, ahead, 0):
+            case Evaluate(connection, ahead):
                 hold, held = self._held(connection)
                 held[:] = hold.value(tick + late, float(ahead) - late)
-            case Evaluate():
-                self._derive(instruction, tick)
             case Blend(connection, points):
                 hold, held = self._held(connection)
                 held[:] = sum(w * hold.value(tick + late, float(at) - late) for w, at in points)
@@ -161,20 +154,6 @@ class OperationsInPython:
         """The hold of a connection, and where its value stands among the signals."""
         signals = self.simulation.signals
         return self.simulation.holds[connection], signals.values[signals.hold(connection)]
-
-    def _derive(self, operation: Evaluate, tick: int) -> None:
-        """Writes the hold's value at the beginning of a step, the derivatives there, and the mean
-        over the step, from the polynomial through order + 1 equidistant values."""
-        simulation, order, width = self.simulation, operation.order, float(operation.width)
-        hold, held = self._held(operation.connection)
-        values, late = simulation.signals.values, simulation.late
-        span = simulation.signals.derivatives(operation.connection)
-        instants = [float(operation.ahead) + i * width / order for i in range(order + 1)]
-        samples = np.stack([hold.value(tick + late, instant - late) for instant in instants])
-        held[:] = samples[0]
-        derivatives, mean = held_polynomials.split(samples, simulation.seconds(width))
-        values[span] = derivatives.ravel()
-        values[span.stop : span.stop + len(held)] = mean
 
 
 class PythonLoop:

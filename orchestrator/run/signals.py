@@ -1,12 +1,10 @@
-"""All signals of a run in one vector: outputs by clock and FMU, then held values, then the
-derivatives and means of held values that vary within a step, then the energies that the far sides
-of springs have put in."""
+"""All signals of a run in one vector: outputs by clock and FMU, then held values, then the energies
+that the far sides of springs have put in."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
@@ -19,7 +17,6 @@ class SignalVector:
         self._of_fmu: dict[str, slice] = {}
         self._of_clock: dict[str, slice] = {}
         self._of_hold: dict[str, slice] = {}
-        self._of_derivatives: dict[str, slice] = {}
         self._of_scalar: dict[tuple[str, str], int] = {}
         end = 0
         for clock in system.timeline.clocks:
@@ -35,10 +32,6 @@ class SignalVector:
             if connection.hold:
                 self._of_hold[connection.name] = slice(end, end + len(connection.inputs))
                 end += len(connection.inputs)
-                if order := held_polynomials.order(system, connection):
-                    span = slice(end, end + order * len(connection.inputs))
-                    self._of_derivatives[connection.name] = span
-                    end = span.stop + len(connection.inputs)
         self._credits = end
         self.values = np.zeros(end + len(system.energy.springs))
 
@@ -50,18 +43,6 @@ class SignalVector:
 
     def hold(self, connection: str) -> slice:
         return self._of_hold[connection]
-
-    def derivatives(self, connection: str) -> slice:
-        """Derivatives of a held value: the first of all entries, then the second of all, ...; empty
-        if it is constant within a step."""
-        return self._of_derivatives.get(connection, slice(0, 0))
-
-    def mean(self, connection: Connection) -> list[int]:
-        """Indices of the mean over the target's step, or of the value itself if it is constant."""
-        span = self.derivatives(connection.name)
-        if span.stop:
-            return list(range(span.stop, span.stop + len(connection.inputs)))
-        return self.places(connection)
 
     def credit(self, spring: int) -> int:
         """Index of the energy that the far side of a spring has put into it."""

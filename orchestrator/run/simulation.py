@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
@@ -24,7 +23,7 @@ from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.step_check import StepCheck
-from hapticlink.orchestrator.system.system import Connection, System
+from hapticlink.orchestrator.system.system import System
 
 Call = Callable[[int], object]
 Set = Callable[[Vector], object]
@@ -34,7 +33,7 @@ class Simulation(LoadedFmus):
     """The objects of a run, which `stack` closes; rows are written to `results`.
 
     setters set the inputs of an FMU from the signals: with held values, or `now` with the newest
-    outputs of the sources; derivative_setters the derivatives of held values.
+    outputs of the sources.
 
     pace: the schedule of a run in real time. beside: the FMUs whose steps are then taken beside the
     loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock,
@@ -65,7 +64,6 @@ class Simulation(LoadedFmus):
         self.balance = Balance(self.signals)
         self.recorders: dict[str, Recorder] = {}
         self.setters: dict[tuple[str, bool], Set] = {}
-        self.derivative_setters: dict[str, Set] = {}
 
     def _dismiss(self) -> None:
         for instance in self.instances.values():
@@ -87,10 +85,6 @@ class Simulation(LoadedFmus):
             if not incoming:
                 continue
             self.setters[fmu.name, False] = self.setter(incoming, self.signals.places)
-            if derived := self._derived(incoming):
-                orders, inputs, derivatives = zip(*derived, strict=True)
-                derive = self.instances[fmu.name].connect_derivatives
-                self.derivative_setters[fmu.name] = derive(inputs, orders, derivatives)
             if fmu.name in self.system.coupling.get_after_set:
                 self.setters[fmu.name, True] = self.setter(incoming, self.signals.sources)
         for clock in self.system.timeline.clocks:
@@ -129,16 +123,6 @@ class Simulation(LoadedFmus):
     def remote(self) -> dict[str, Remote]:
         """The FMUs on other computers."""
         return {n: i for n, i in self.instances.items() if isinstance(i, Remote)}
-
-    def _derived(self, incoming: Iterable[Connection]) -> list[tuple[int, Scalar, int]]:
-        """Order, input and signal index of each derivative that an FMU gets with its inputs, by
-        their order."""
-        rows = []
-        for c in incoming:
-            span, n = self.signals.derivatives(c.name), len(c.inputs)
-            places = [*self.signals.places(c), *range(span.start, span.stop)] if span.stop else []
-            rows += [(i // n, c.inputs[i % n], place) for i, place in enumerate(places)]
-        return sorted(rows, key=lambda row: row[0])
 
     def links(self) -> dict[str, LinkCounts]:
         """Per connection with a latency, the number of samples sent, lost and overtaken."""

@@ -9,7 +9,6 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system import held_polynomials
 from hapticlink.orchestrator.system.assign_holds import misfit
 from hapticlink.orchestrator.system.ports import power_across_rates
 from hapticlink.orchestrator.system.system import Connection, System
@@ -31,8 +30,6 @@ def changed(system: System, c: Connection, hold: str | None, delay: float | None
     on_force = spring and any(d.needs == "spring" for d in system.connections)
     if on_force or "spring" in (c.needs, new.needs):
         why = "holds of a spring share its energy: take `reset`"
-    if held_polynomials.order(system, c) or held_polynomials.order(system, new):
-        why = "the FMU takes derivatives of its inputs: take `reset`"
     if why:
         raise InputFault(f"hold of {c.name} = {new.hold}: {why}")
     return new

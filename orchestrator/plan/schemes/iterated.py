@@ -9,8 +9,8 @@ for Jacobi, with a smaller error and no stability limit on the step size beyond 
 A plant holds its inputs constant over each substep. Two adjacent substeps get
 (f1 + f2)/2 -+ (2/sqrt 3)(f2 - f1)/2, with f1, f2 the input at the two Gauss points of the pair:
 mean and first moment equal those of the input up to cubics, so that substeps cause an error of
-order 4 (the commutator-free rule of Blanes and Moan 2006, for constant stages). A plant that can
-interpolate its inputs gets the hold's derivatives and needs no substeps. The scheme is not causal.
+order 4 (the commutator-free rule of Blanes and Moan 2006, for constant stages). The scheme is not
+causal.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def _step(system: System, event: Event, fmu: Fmu, loop: list[Connection]) -> Ite
     for part in range(parts):
         for operation in operation_sequences.feed(system, event, fmu, part):
             match operation:
-                case Evaluate(name, order=0) if name in inside:
+                case Evaluate(name) if name in inside:
                     yield Blend(name, substep(part, parts, dticks))
                 case _:
                     yield operation

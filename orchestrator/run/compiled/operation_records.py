@@ -188,7 +188,7 @@ class Machine:
         match instruction:
             case Get(fmu, judged=judged) if (index := self._fmu(fmu)) is not None:
                 return Op(structures.GET, index, judged)
-            case Set(fmu, now, False) if (index := self._setter(fmu, now)) is not None:
+            case Set(fmu, now) if (index := self._setter(fmu, now)) is not None:
                 return Op(structures.SET, index)
             case Step(fmu) if fmu in simulation.beside:
                 return "the FMU runs beside the loop, in a thread"
@@ -198,7 +198,7 @@ class Machine:
                 return Op(structures.STEP, index, part * dticks, count, over, size)
             case Push(connection, ahead) if (index := self._hold(connection)) is not None:
                 return Op(structures.PUSH, index, ahead)
-            case Evaluate(connection, ahead, 0) if (index := self._hold(connection)) is not None:
+            case Evaluate(connection, ahead) if (index := self._hold(connection)) is not None:
                 return Op(structures.EVALUATE, index, x=float(ahead))
             case Blend(connection, points) if (index := self._hold(connection)) is not None:
                 first = len(self._points)
@@ -219,10 +219,6 @@ class Machine:
                 place = simulation.signals.scalar(condition.fmu, condition.variable)
                 comparison = [*COMPARISONS].index(condition.comparison)
                 return Op(structures.STOP_WHEN, place, comparison, x=condition.value)
-            case Evaluate(order=order) if order:
-                return "the FMU takes derivatives of its inputs"
-            case Set(derivatives=True):
-                return "the FMU takes derivatives of its inputs"
             case Push(connection) | Evaluate(connection) | Blend(connection):
                 kind = type(parts(simulation.holds[connection]).own).__name__
                 return f"there is no C for {kind}, or none that takes samples back"

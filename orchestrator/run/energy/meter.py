@@ -207,7 +207,7 @@ class Meters:
             if power := bond(c, signals):
                 source, held = (
                     Reader(signals, power.of(places), power.factor, power.offset)
-                    for places in (signals.sources(c), signals.mean(c))
+                    for places in (signals.sources(c), signals.places(c))
                 )
                 self.of[c.name] = Meter(source, held, Reader(signals, power.moved, power.scale))
                 self.of_source.setdefault(c.source, []).append(c.name)

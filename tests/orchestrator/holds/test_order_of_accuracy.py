@@ -1,7 +1,7 @@
 """Observed order, size of the error and limit of stability of every hold, on real FMUs.
 
 The two-mass oscillator with exact subsystems (computed independently, two ways). Where the plant
-must take inputs that vary within a step it takes substeps, or it interpolates its inputs itself.
+must take inputs that vary within a step it takes substeps.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ import pytest
 
 from hapticlink.orchestrator.fmi.description import Description
 from tests.orchestrator import coupled
-from tests.orchestrator.native_mass import WARM, held, native
+from tests.orchestrator.native_mass import WARM, held
 
 Fmus = Mapping[str, Description]
 Hold = str | Mapping[str, str]
@@ -20,12 +20,7 @@ Hold = str | Mapping[str, str]
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
-    """Of inputs that are constant within a step, and of interpolated ones."""
-    constant, interpolating = (tmp_path_factory.mktemp(name) for name in ("constant", "within"))
-    return {
-        "constant": held(constant),
-        "interpolating": {name: native(interpolating, name) for name in ("one", "two")},
-    }
+    return held(tmp_path_factory.mktemp("masses"))
 
 
 OWN = {"two.F": "lead", "one.x": "foh-derivative", "one.v": "foh-derivative"}
@@ -42,32 +37,29 @@ def error(fmus: Fmus, rate: int, hold: Hold, substeps: int, **how: object) -> fl
 
 
 @pytest.mark.parametrize(
-    ("hold", "inputs", "substeps", "order", "coupling", "coarsest"),
+    ("hold", "substeps", "order", "coupling", "coarsest"),
     [
-        ("zoh", "constant", 1, 1, "jacobi", 200),
-        ("zoh", "constant", 4, 1, "gauss-seidel-plants", 200),
-        ("latest", "constant", 1, 1, "jacobi", 200),
-        ("lead", "constant", 1, 2, "jacobi", 200),
-        ("foh", "constant", 1, 2, "jacobi", 200),
-        ("foh", "constant", 4, 2, "jacobi", 200),
-        ("foh", "constant", 4, 2, "gauss-seidel-plants", 200),
-        ("foh", "interpolating", 1, 2, "jacobi", 200),
-        (OWN, "constant", 1, 2, "jacobi", 200),
-        ("second-order", "constant", 16, 3, "jacobi", 200),
-        ("second-order", "interpolating", 1, 3, "jacobi", 200),
-        ("delayed", "constant", 4, 1, "jacobi", 200),
-        ("delayed", "interpolating", 1, 1, "jacobi", 200),
-        ("smooth", "constant", 4, 1, "jacobi", 200),
-        ("mean", "constant", 1, 1, "jacobi", 200),
+        ("zoh", 1, 1, "jacobi", 200),
+        ("zoh", 4, 1, "gauss-seidel-plants", 200),
+        ("latest", 1, 1, "jacobi", 200),
+        ("lead", 1, 2, "jacobi", 200),
+        ("foh", 1, 2, "jacobi", 200),
+        ("foh", 4, 2, "jacobi", 200),
+        ("foh", 4, 2, "gauss-seidel-plants", 200),
+        (OWN, 1, 2, "jacobi", 200),
+        ("second-order", 16, 3, "jacobi", 200),
+        ("delayed", 4, 1, "jacobi", 200),
+        ("smooth", 4, 1, "jacobi", 200),
+        ("mean", 1, 1, "jacobi", 200),
         # These reach it at higher rates.
-        (PASSIVE, "constant", 1, 1, "jacobi", 400),
-        (NEPCE, "constant", 1, 1, "jacobi", 400),
-        (SLOPE, "constant", 1, 1, "jacobi", 400),
+        (PASSIVE, 1, 1, "jacobi", 400),
+        (NEPCE, 1, 1, "jacobi", 400),
+        (SLOPE, 1, 1, "jacobi", 400),
     ],
 )
-def test_order_of_a_hold(fmus, hold, inputs, substeps, order, coupling, coarsest):
+def test_order_of_a_hold(fmus, hold, substeps, order, coupling, coarsest):
     rates = [coarsest, 2 * coarsest, 4 * coarsest]
-    errors = [error(fmus[inputs], rate, hold, substeps, coupling=coupling) for rate in rates]
+    errors = [error(fmus, rate, hold, substeps, coupling=coupling) for rate in rates]
     within = 0.1 if coarsest == 200 else 0.15
     assert coupled.order(rates, errors) == pytest.approx(order, abs=within)
 
@@ -75,7 +67,7 @@ def test_order_of_a_hold(fmus, hold, inputs, substeps, order, coupling, coarsest
 def test_a_set_position_that_is_not_paid_for_has_no_order(fmus):
     """The motion that the other mass sends is refused in part, at any rate."""
     hold = {"two.F": "lead", "one.x": "pspm", "one.v": "pspm"}
-    coarse, fine = (error(fmus["constant"], rate, hold, 1) for rate in (800, 1600))
+    coarse, fine = (error(fmus, rate, hold, 1) for rate in (800, 1600))
     assert fine > 0.7 * coarse
 
 
@@ -88,10 +80,9 @@ def test_a_set_position_that_is_not_paid_for_has_no_order(fmus):
         ("lead", 1, 7.08e-3),
     ],
 )
-@pytest.mark.parametrize("inputs", ["constant", "interpolating"])
+@pytest.mark.parametrize("inputs", ["interpolating"])
 def test_largest_error_at_a_hundredth(fmus, inputs, hold, substeps, published):
-    substeps = 1 if inputs == "interpolating" else substeps
-    found = error(fmus[inputs], 100, hold, substeps)
+    found = error(fmus, 100, hold, substeps)
     assert found == pytest.approx(published, rel=0.02)
 
 
@@ -106,32 +97,26 @@ def growth(
 
 
 @pytest.mark.parametrize(
-    ("inputs", "hold", "substeps", "coupling", "get_after_set", "limit"),
+    ("hold", "substeps", "coupling", "get_after_set", "limit"),
     [
-        ("constant", "zoh", 1, "jacobi", ("two",), ".0404"),
-        ("constant", "zoh", 1, "jacobi", (), ".0250"),  # get all, set all, step all, as FMI has it
-        ("constant", "foh", 8, "jacobi", ("two",), ".0630"),
-        ("interpolating", "foh", 1, "jacobi", ("two",), ".0630"),
-        ("constant", "second-order", 16, "jacobi", ("two",), ".0765"),
-        ("interpolating", "second-order", 1, "jacobi", ("two",), ".0765"),
-        ("constant", "lead", 1, "jacobi", ("two",), ".0712"),
-        ("constant", "delayed", 8, "jacobi", ("two",), ".0198"),
-        ("interpolating", "delayed", 1, "jacobi", ("two",), ".0198"),
-        ("constant", "zoh", 1, "gauss-seidel-plants", ("two",), ".0402"),
-        ("constant", "foh", 8, "gauss-seidel-plants", ("two",), ".0763"),
-        ("interpolating", "foh", 1, "gauss-seidel-plants", ("two",), ".0763"),
-        ("constant", "second-order", 16, "gauss-seidel-plants", ("two",), ".0843"),
-        ("interpolating", "second-order", 1, "gauss-seidel-plants", ("two",), ".0843"),
+        ("zoh", 1, "jacobi", ("two",), ".0404"),
+        ("zoh", 1, "jacobi", (), ".0250"),  # get all, set all, step all, as FMI has it
+        ("foh", 8, "jacobi", ("two",), ".0630"),
+        ("second-order", 16, "jacobi", ("two",), ".0765"),
+        ("lead", 1, "jacobi", ("two",), ".0712"),
+        ("delayed", 8, "jacobi", ("two",), ".0198"),
+        ("zoh", 1, "gauss-seidel-plants", ("two",), ".0402"),
+        ("foh", 8, "gauss-seidel-plants", ("two",), ".0763"),
+        ("second-order", 16, "gauss-seidel-plants", ("two",), ".0843"),
         # `one.a` follows the force and is not connected: whatever the order of the file, `one`
         # steps first, with the limit of that order (.0569 the other way round).
-        ("reversed", "foh", 8, "gauss-seidel-plants", ("two",), ".0763"),
+        ("foh", 8, "gauss-seidel-plants (reversed)", ("two",), ".0763"),
     ],
 )
-def test_limit_of_stability_to_one_percent(
-    fmus, inputs, hold, substeps, coupling, get_after_set, limit
-):
-    pair = fmus.get(inputs) or dict(reversed(fmus["constant"].items()))
-    steps = 2000 if substeps == 1 and inputs == "constant" else 500
+def test_limit_of_stability_to_one_percent(fmus, hold, substeps, coupling, get_after_set, limit):
+    coupling, turned, _ = coupling.partition(" (reversed)")
+    pair = dict(reversed(fmus.items())) if turned else fmus
+    steps = 2000 if substeps == 1 else 500
     how = {"get_after_set": get_after_set, "coupling": coupling}
     below, above = (
         growth(pair, Fraction(limit) * part, hold, substeps, steps, **how)

@@ -105,7 +105,6 @@ def test_calls_out_of_order_are_refused(run: Run) -> None:
         ("enter_initialization", (1.0,)),
         ("connect", (["y"],)),
         ("connect", ([5],)),
-        ("connect_derivatives", (["u"], [-1])),
     ):
         assert run.call(call, *arguments).kind == "refused"
     for pending in ([[5, b""]], [[-1, bytes(8)]], [[0, bytes(16)]]):
