@@ -423,7 +423,7 @@ static int serve(Model *m, int code) {
     case STEPPED:
         at->op++;
         return took_its_last_step(m, op->a, at->status);
-    case FAILED: case UNSAVED: case UNRESTORED:
+    case FAILED: case UNRESTORED:
         fail(m, fmi2Error, "%s failed at t = %.17g s", members[fmu_members[op->a]].name, time);
         return 0;
     case GROW:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
-from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.simulation import Simulation
@@ -27,8 +26,6 @@ def of_scene(scene: Scene) -> None:
     reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]
     if scene.coupling == "iterated":
         reasons.append("coupling = 'iterated': steps are repeated by Python")
-    if scene.faults.discard == "retry":
-        reasons.append("faults.discard = 'retry': steps are repeated by Python")
     refuse(scene.title, reasons)
 
 
@@ -59,12 +56,6 @@ def of_simulation(simulation: Simulation, title: str) -> None:
     ]
     if why := too_long(simulation.system):
         reasons.append(why)
-    for name, instance in simulation.instances.items():
-        if name in simulation.isolated:
-            continue
-        assert isinstance(instance, InProcess)
-        if instance.retry:
-            reasons.append(f"{name} repeats steps, which a program does not")
     refuse(title, reasons)
 
 

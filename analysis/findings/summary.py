@@ -190,12 +190,10 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
 
 
 def _steps(record: RunRecord) -> Iterator[str]:
-    """Lines for outputs that were held, steps that were repeated, did not converge or were too
-    long, and what a run in real time was late with."""
+    """Lines for outputs that were held, steps that did not converge or were too long, and what a
+    run in real time was late with."""
     for fmu, count in record.held_outputs.items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
-    for fmu, count in record.smaller_steps.items():
-        yield f"{fmu}: {count} steps were discarded and repeated with smaller ones"
     if record.real_time:
         yield from _real_time(record.real_time)
     for fmu, exchange in record.network.items():

@@ -68,11 +68,7 @@ class SceneFault(InputFault):
 
 
 class FmuFault(Fault):
-    """A failed FMU call, or a value that cannot be used; names FMU, call and time.
-
-    passing: whether a smaller step from the previous state may succeed (a step that was discarded,
-    FMI 2.0.5 section 4.2.2; an output that is not finite).
-    """
+    """A failed FMU call, or a value that cannot be used; names FMU, call and time."""
 
     def __init__(
         self,
@@ -80,11 +76,10 @@ class FmuFault(Fault):
         what: str,
         time: float,
         messages: Sequence[str] = (),
-        passing: bool = False,
         repeatable: bool = False,
     ) -> None:
         self.fmu, self.what, self.time, self.messages = fmu, what, time, tuple(messages)
-        self.passing, self.repeatable = passing, repeatable
+        self.repeatable = repeatable
         logged = "".join(f"\n  {fmu} says: {m}" for m in messages)
         super().__init__(f"{fmu}: {what} at t = {time:.6g} s{logged}")
 

@@ -27,7 +27,7 @@ from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.load_library import loaded
-from hapticlink.orchestrator.fmi.retry import Retry, Saved
+from hapticlink.orchestrator.fmi.saved_state import Saved
 from hapticlink.orchestrator.fmi.setter import Setter, Setting
 from hapticlink.orchestrator.fmi.status import (
     DISCARD,
@@ -45,7 +45,7 @@ from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 
 class InProcess(Instance):
     """An FMU of FMI 2.0 whose library is loaded into this process. `slave` (of FMPy, None where it
-    is not loaded), `gets`, `fewer` and `retry` are for the compiled loop."""
+    is not loaded), `gets` and `fewer` are for the compiled loop."""
 
     _library: Callable[..., Any] = fmi2.FMU2Slave
 
@@ -55,7 +55,6 @@ class InProcess(Instance):
         self._status = 0
         self._saved: dict[int, Saved] = {}
         self._saved_time: dict[int, float] = {}
-        self.retry: Retry | None = None
         self._initialized = False
         self._setters = 0
         """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
@@ -94,9 +93,6 @@ class InProcess(Instance):
             return self._settled(status, time)
 
         self._advance: Callable[[float, float], int] = advance
-        if self.policy.discard == "retry" and not Retry.why_not(self.description):
-            self.retry = Retry(self.slave, self.description.fmi, self.place, advance)
-            self._advance = self.retry.step
 
     def _instantiate(self) -> Any:
         about = self.description
@@ -147,7 +143,7 @@ class InProcess(Instance):
         time, size = self.place.begin, self.place.size
         if not end >= time + (1 - SHARE) * size:  # or is no number
             what = f"asks to end the simulation at {end:.6g} s, within its step"
-            raise AsksToEnd(self.name, what, time, passing=True)
+            raise AsksToEnd(self.name, what, time)
         self.place.ended = 1
 
     def _transfers(self, verb: str, *what: Any) -> list[Transfer]:
@@ -163,9 +159,7 @@ class InProcess(Instance):
         set_all = partial(self._carry_out, counted="sets")
         return Setter(where, conversions, setting, set_all, self.place, self._setters)
 
-    def _carry_out(
-        self, transfers: Sequence[Transfer], counted: str, passing: bool = False
-    ) -> None:
+    def _carry_out(self, transfers: Sequence[Transfer], counted: str) -> None:
         try:
             for transfer in transfers:
                 setattr(self.place, counted, getattr(self.place, counted) + 1)
@@ -176,7 +170,7 @@ class InProcess(Instance):
         except SystemError as error:
             raise self.raised(transfer.name, error) from error
         except Unfit as why:
-            raise self._fault(str(why), self.time, passing, repeatable=True) from None
+            raise self._fault(str(why), self.time, repeatable=True) from None
 
     def _setting(self, scalars: Sequence[Scalar], start: bool = False) -> Setting:
         """`whole`, `into` and `transfers` of a Setter of `scalars`, sorted by type; start: with
@@ -223,11 +217,7 @@ class InProcess(Instance):
         return self.gets if self.due.value else self.fewer
 
     def read(self) -> None:
-        self._carry_out(self.asked, "gets", passing=True)
-
-    @property
-    def smaller_steps(self) -> int:
-        return self.retry.smaller if self.retry else 0
+        self._carry_out(self.asked, "gets")
 
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
         return derivatives(self.slave, self.description, outputs, inputs)
@@ -246,16 +236,12 @@ class InProcess(Instance):
     def stepped(self, status: int) -> None:
         """Ends a step that returned `status`."""
         if not succeeded(status):
-            raise self.failed(self.do_step, status, passing=status in (DISCARD, ERROR))
+            raise self.failed(self.do_step, status)
         self.place.time = self.place.end
 
     def after_step(self, status: int) -> None:
         """Ends a step whose doStep, called by the compiled loop, returned `status`."""
-        begin, size = self.place.begin, self.place.size
-        status = self._settled(status, begin)
-        if self.retry:
-            status = self.retry.after(status, begin, size)
-        self.stepped(status)
+        self.stepped(self._settled(status, self.place.begin))
 
     def finish(self) -> None:
         """Nothing to wait for: `step` returns after doStep."""
@@ -305,14 +291,10 @@ class InProcess(Instance):
 
     # --- ends -----------------------------------------------------------------------------
 
-    def failed(self, call: str, status: int, passing: bool = False) -> FmuFault:
+    def failed(self, call: str, status: int) -> FmuFault:
         self._status = worse(self._status, status)
         named = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
-        if status == DISCARD and self.policy.discard == "retry":
-            why = "in steps of 1/1024 too" if self.retry else Retry.why_not(self.description)
-            named += f" ({why})"
-        what = f"{call} returned {named}"
-        return self._fault(what, self.time, passing, repeatable=status == DISCARD)
+        return self._fault(f"{call} returned {named}", self.time, repeatable=status == DISCARD)
 
     def raised(self, call: str, error: SystemError) -> FmuFault:
         """The fault of a Python FMU whose library went on after an exception, which ctypes finds
@@ -337,8 +319,6 @@ class InProcess(Instance):
         fault = None
         try:
             if slave is not None and self._status < FATAL:
-                if self.retry is not None:
-                    self.retry.free()
                 for saved in self._saved.values():
                     saved.free()
                 if self._status < ERROR and self._initialized:

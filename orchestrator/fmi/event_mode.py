@@ -32,7 +32,7 @@ from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, Clock
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
-from hapticlink.orchestrator.fmi.status import DISCARD, SHARE, succeeded
+from hapticlink.orchestrator.fmi.status import SHARE, succeeded
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import Scalar
 
@@ -156,7 +156,7 @@ class InProcessWithEvents(InProcess3):
     def _in_parts(self, do_step: Callable[[float, float], int], time: float, size: float) -> int:
         """The status of a step from `time` over `size` (s), in parts that end at events."""
         end, near, now = time + size, SHARE * size, time
-        before, status, stuck = deepcopy(self.pending) if self.retry else self.pending, 0, 0
+        status, stuck = 0, 0
         if (due := self._due(time, near)) and self.event(time, due):
             self._end(time)
             return status
@@ -164,8 +164,6 @@ class InProcessWithEvents(InProcess3):
             until = self._until(now + near, end, near)
             status = do_step(now, size if (now, until) == (time, end) else until - now)
             if not succeeded(status):
-                if status == DISCARD:
-                    self.pending = before
                 return status
             event, ends, early = (flag.value for flag in self.step_flags)
             reached = self.reached.value
@@ -297,7 +295,7 @@ class InProcessWithEvents(InProcess3):
             values, outputs = np.zeros(len(places)), [self.description.outputs[i] for i in places]
             self._readings[active] = places, values, self._transfers("Get", outputs, values)
         places, values, transfers = self._readings[active]
-        self._carry_out(transfers, "gets", passing=True)
+        self._carry_out(transfers, "gets")
         self.pending.values[places] = values
 
     def read(self) -> None:

@@ -14,7 +14,5 @@ class Faults:
 
     nan: Literal["stop", "hold"] = "stop"
     """An output that is not finite ends the run, or keeps its last finite value."""
-    discard: Literal["stop", "retry"] = "stop"
-    """An fmi2Discard ends the run, or the step is taken again in smaller ones where the FMU can."""
     timeout: Annotated[float, Quantity("s", gt=0, le=86400)] = 60.0
     """How long an isolated FMU may take for one call."""

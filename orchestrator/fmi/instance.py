@@ -196,11 +196,6 @@ class Instance(ABC):
     def read(self) -> None:
         """Read all outputs without checking that they are finite."""
 
-    @property
-    @abstractmethod
-    def smaller_steps(self) -> int:
-        """Number of steps that were discarded and repeated in smaller steps."""
-
     @abstractmethod
     def step(self, time: float, end: float, size: float) -> None:
         """Begin a doStep from `time` over `size`, to `end` (s)."""
@@ -268,7 +263,7 @@ class Instance(ABC):
             beyond = f"output {name} is {self.outputs[first]:.3g}, beyond {bound:.3g}"
             remedy = "take a higher rate, a finer integrator, or weaker gains"
             message = f"{beyond}: the run has diverged ({remedy})"
-            raise Diverged(self.name, message, self.time, passing=True, repeatable=True)
+            raise Diverged(self.name, message, self.time, repeatable=True)
         if self.good is not None:
             self.good[:] = self.outputs
 
@@ -277,7 +272,7 @@ class Instance(ABC):
         for scalar, value in zip(self.description.outputs, self.outputs.tolist(), strict=True):
             if not np.isfinite(value):
                 what = f"output {scalar.name} is {value!r}"
-                raise self._fault(what, self.time, passing=True, repeatable=True)
+                raise self._fault(what, self.time, repeatable=True)
 
     def _start_loop(self) -> None:
         """Take the start values of the outputs as reference for their bounds, and count calls from
@@ -288,7 +283,5 @@ class Instance(ABC):
         if self.policy.nan == "hold":
             self.good = self.outputs.copy()
 
-    def _fault(
-        self, what: str, time: float, passing: bool = False, repeatable: bool = False
-    ) -> FmuFault:
-        return FmuFault(self.name, what, time, self._logged(), passing, repeatable)
+    def _fault(self, what: str, time: float, repeatable: bool = False) -> FmuFault:
+        return FmuFault(self.name, what, time, self._logged(), repeatable)

@@ -47,7 +47,6 @@ class Isolated(Instance):
     _process: Caller | None = None
     _fresh: bytes | FmuFault | None = None
     """Outputs that have come with a step and not been read, or why they could not be."""
-    _smaller = 0
     _dismissed = False
     _lost: FmuFault | None = None
     """How the process ended that was to close its FMU."""
@@ -72,7 +71,7 @@ class Isolated(Instance):
     def _send(self, call: str, *arguments: Any, allowed: float | None = None) -> None:
         assert self._process is not None
         if self._process.busy:
-            self._drop()
+            self._await_unneeded_step()
         self._fresh = None
         try:
             self._process.send((self._pending, call, arguments), allowed or self.policy.timeout)
@@ -96,13 +95,13 @@ class Isolated(Instance):
         self._send(call, *arguments)
         return self._answer()
 
-    def _drop(self) -> None:
+    def _await_unneeded_step(self) -> None:
         """Wait for a step whose result is not needed, because another FMU has failed at the same
-        communication point."""
+        communication point. Raises FmuFault if the process has died."""
         try:
             self._answer()
-        except FmuFault as fault:
-            if not fault.passing:
+        except FmuFault:
+            if self._process is None:
                 raise
 
     def _died(self, how: Died) -> FmuFault:
@@ -157,10 +156,6 @@ class Isolated(Instance):
             raise self._fresh
         self.outputs[:] = np.frombuffer(self._fresh)
 
-    @property
-    def smaller_steps(self) -> int:
-        return self._smaller
-
     def step(self, time: float, end: float, size: float) -> None:
         if self.ended:
             raise AsksToEnd(self.name, "has asked to end the simulation", time)
@@ -169,7 +164,7 @@ class Isolated(Instance):
 
     def finish(self) -> None:
         place = self.place
-        outputs, fault, place.ended, place.step_time, self._smaller = self._answer()
+        outputs, fault, place.ended, place.step_time = self._answer()
         self._fresh = outputs if fault is None else FmuFault(self.name, *fault)
         place.time = self._until
 

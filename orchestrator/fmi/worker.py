@@ -71,7 +71,7 @@ class Worker:
 
     def step(self, time: float, end: float, size: float) -> Any:
         """Returns (outputs, or the fault in reading them; whether the FMU has requested the end;
-        time spent in doStep (s); number of steps repeated in smaller ones)."""
+        time spent in doStep (s))."""
         outputs, fault = b"", None
         instance = self.instance
         instance.step(time, end, size)
@@ -79,7 +79,7 @@ class Worker:
             outputs = self.read()
         except FmuFault as failed:  # raised when somebody reads
             fault = fault_fields(failed)
-        return outputs, fault, instance.ended, instance.step_time, instance.smaller_steps
+        return outputs, fault, instance.ended, instance.step_time
 
     def close(self) -> dict[str, int]:
         """Returns the number of calls of the loop, by kind."""
@@ -93,7 +93,7 @@ class Worker:
 
 def fault_fields(fault: FmuFault) -> tuple[Any, ...]:
     """The arguments of a fault behind the name of its FMU, as plain data."""
-    return fault.what, float(fault.time), fault.messages, fault.passing, fault.repeatable
+    return fault.what, float(fault.time), fault.messages, fault.repeatable
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:

@@ -104,9 +104,9 @@ def answer_of(message: bytes, call: str, outputs: int) -> Answer:
     elif answer.kind != "answer":
         fits = _is_fault(content)
     elif call == "step":
-        form = isinstance(content, list) and len(content) == 5
+        form = isinstance(content, list) and len(content) == 4
         values, fault, *rest = content if form else (b"", 0)
-        fits = tuple(map(type, rest)) == (bool, float, int) and type(values) is bytes
+        fits = tuple(map(type, rest)) == (bool, float) and type(values) is bytes
         fits &= len(values) == size if fault is None else _is_fault(fault)
     elif call == "read":
         fits = isinstance(content, bytes) and len(content) == size
@@ -118,8 +118,8 @@ def answer_of(message: bytes, call: str, outputs: int) -> Answer:
 
 
 def _is_fault(content: Any) -> bool:
-    """What, when (s), messages, passing, repeatable (`FmuFault`)."""
-    types = (str, float, list, bool, bool)
+    """What, when (s), messages, repeatable (`FmuFault`)."""
+    types = (str, float, list, bool)
     form = isinstance(content, list) and tuple(map(type, content)) == types
     return form and all(isinstance(text, str) for text in content[2])
 

@@ -189,7 +189,6 @@ def _details(
         overdrawn=simulation.overdrawn(),
         isolated=simulation.isolated,
         held_outputs={name: i.held for name, i in instances.items() if i.held},
-        smaller_steps={name: i.smaller_steps for name, i in instances.items() if i.smaller_steps},
         in_python=loop.in_python,
         real_time=real_time.report() if real_time else None,
         network={name: remote.network() for name, remote in simulation.remote.items()},

@@ -147,6 +147,9 @@ _GONE: dict[Path, str] = {
     ("step_control",): (
         "steps are as long as their rate says: take it out, with a higher rate or `substeps`"
     ),
+    ("faults", "discard"): (
+        "a step that an FMU discards ends the run: take it out, with a higher rate or `substeps`"
+    ),
     ("device", "sensing"): "is a key of the scene: write `sensing` outside of [device]",
 }
 """Keys of earlier versions, with what to write instead."""

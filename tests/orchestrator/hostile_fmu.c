@@ -167,7 +167,6 @@ static int stepped(Model *m, double t, double h) {
     m->y = m->step + m->u;
     /* Whose bits depend on the rounding mode. */
     m->slope += h / 3.0;
-    if (!strcmp(m->place, "restore") && m->step == m->from) return 2; /* to be asked to */
     return acts(m, "step");
 }
 
@@ -223,9 +222,7 @@ int fmi2GetFMUstate(Model *m, Model **state) {
     return acts(m, "save");
 }
 int fmi2SetFMUstate(Model *m, Model *state) {
-    const int step = m->step;
     *m = *state;
-    if (!strcmp(m->place, "restore")) m->step = step;
     return acts(m, "restore");
 }
 int fmi2FreeFMUstate(Model *m, Model **state) { free(*state); *state = NULL; return acts(m, "forget"); }
@@ -267,9 +264,7 @@ int fmi3GetFMUState(Model *m, Model **state) {
     return acts(m, "save");
 }
 int fmi3SetFMUState(Model *m, Model *state) {
-    const int step = m->step;
     *m = *state;
-    if (!strcmp(m->place, "restore")) m->step = step;
     return acts(m, "restore");
 }
 int fmi3FreeFMUState(Model *m, Model **state) { free(*state); *state = NULL; return acts(m, "forget"); }

@@ -278,17 +278,11 @@ def test_a_run_that_diverges_names_the_output() -> None:
         fmu.start().step(0.0, 0.1)
 
 
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        (("coupling=iterated",), "steps are repeated by Python"),
-        (("faults.discard=retry",), "faults.discard = 'retry'"),
-    ],
-)
-def test_what_cannot_go_is_refused_with_the_reason(options, reason: str, tmp_path) -> None:
+def test_what_cannot_go_is_refused_with_the_reason(tmp_path) -> None:
+    scene = open_scene.load("closed-loop", ("coupling=iterated",))
     with pytest.raises(InputFault, match="cannot become one program") as refused:
-        build_program(open_scene.load("closed-loop", options), "closed-loop", out=tmp_path)
-    assert reason in str(refused.value)
+        build_program(scene, "closed-loop", out=tmp_path)
+    assert "steps are repeated by Python" in str(refused.value)
     with pytest.raises(InputFault, match="no block 'foot'"):
         build_program(open_scene.load("pendulum"), "pendulum", out=tmp_path, without="foot")
 

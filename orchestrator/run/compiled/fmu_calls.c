@@ -162,8 +162,6 @@ int fmu_step(Fmu *f, double time, double end, double size, At *at) {
     p->size = size;
     p->end = end;
     if (p->ended || p->waiting <= time) return CALL;
-    if (f->get_state && !fmu_succeeded(at->status = fmu_save(f, f->get_state, f->state)))
-        return UNSAVED;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
     const int64_t begin = timed ? now() : 0;
     at->what = -1;

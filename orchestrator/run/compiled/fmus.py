@@ -73,11 +73,6 @@ def of_instance(
     c.fill(instance, "place", "outputs", "due", "good", "forward", fmu=slave.component)
     c.fill(do_step=slave.dll[f"fmi{fmi}DoStep"], n_outputs=len(instance.outputs))
     c.kind.fill(fmi=int(fmi), python=instance.holds_python)
-    if instance.retry:
-        saved = instance.retry.saved[0]
-        c.fill(saved, "state", get_state=saved.get)
-        if saved.overwrites:
-            c.fill(saved, "free_state")
     if isinstance(instance, InProcess3):
         event, terminate, early = instance.step_flags
         c.fill(instance, "reached", event=event, terminate=terminate, early=early)

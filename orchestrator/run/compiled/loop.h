@@ -64,7 +64,6 @@ typedef struct {
     void *fmu, *do_step;
     Kind kind;
     int64_t forward;                      /* noSetFMUStatePriorToCurrentPoint */
-    void *get_state;                      /* before each step that may be repeated, or NULL */
     const Transfer *gets /* [n_gets] */;
     int64_t n_gets;
     double *outputs /* [n_outputs] */;
@@ -75,7 +74,6 @@ typedef struct {
     const int64_t *due;                   /* whether the next row is written; else `fewer` suffice */
     const Transfer *fewer /* [n_fewer] */;
     int64_t n_fewer;
-    void *state;                          /* saved by get_state */
     void *free_state;                     /* before a state is saved over, or NULL */
     uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
     double *reached;
@@ -306,7 +304,6 @@ enum {
     FAILED,      /* call number `what` of a get or set returned `status` */
     RAISED,      /* call `what`, -1 for doStep, has left a Python exception, which ctypes raises */
     STEPPED,     /* doStep returned `status`, asks to end or is cut short */
-    UNSAVED,     /* the state before a step could not be saved */
     UNRESTORED,  /* the state before a step that was checked could not be restored */
     DRAW,        /* latencies */
     STOP,        /* the condition to stop holds */

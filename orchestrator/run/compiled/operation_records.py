@@ -345,11 +345,9 @@ class Machine:
                 raise instance.failed(called, position.status)
             if code == structures.JUDGE:
                 instance.judge()
-            elif code == structures.STEPPED:
-                instance.after_step(position.status)
             else:
-                assert code == structures.UNSAVED
-                instance.stepped(position.status)
+                assert code == structures.STEPPED
+                instance.after_step(position.status)
         position.op += 1
 
     def _called(self, instruction: Instruction, number: int, instance: InProcess) -> str:

@@ -44,13 +44,13 @@ static void compare(Check *c, const double *outputs, double time, double end, do
 }
 
 /* A step, and before it, where it is due, the same in two halves: step_check.py, which does it
- * where there is no room left, or the FMU can be asked to repeat a step. */
+ * where there is no room left. */
 int fmu_checked_step(Fmu *f, double time, double end, double size, At *at) {
     Check *c = f->check;
     if (f->place->waiting <= time) return CALL;
     const int regular = (*c->steps + 1) % c->every == c->first, jumped = moved(c, f->outputs);
     const int due = regular || jumped;
-    if (due && (f->get_state || f->place->ended || *c->count == c->room)) return CALL;
+    if (due && (f->place->ended || *c->count == c->room)) return CALL;
     if (due && !fmu_succeeded(fmu_save(f, c->get_state, c->state))) return CALL;
     note_rates(c, f->outputs, jumped);
     ++*c->steps;

@@ -11,14 +11,17 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi.description import describe
+from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, RUN, hostile_scene, process
 from tests.orchestrator.hostile_slave import hostile_slave
 from tests.orchestrator.run.test_interrupt import children, waited_for
-from tests.shared_fixtures import LOOPS, sets, status
+from tests.shared_fixtures import LOOPS
 
 pytest.importorskip("resource")  # the FMU needs POSIX
 
@@ -51,11 +54,17 @@ def test_only_ok_and_warning_are_success(tmp_path, monkeypatch, fmi, loop, isola
 
 
 @pytest.mark.parametrize("place", ["save", "restore"])
-def test_a_state_that_is_saved_or_restored_in_part_is_none(tmp_path, loop, place):
-    hostile_fmu(tmp_path)
-    scene = hostile_scene(tmp_path, f"{place}_minus_5")
-    ended = simulate(scene, tmp_path / "out", ["faults.discard=retry"])
-    assert "returned status -1 at t = 0.0" in str(ended.outcome.fault)
+def test_a_state_that_is_saved_or_restored_in_part_is_none(tmp_path, place):
+    description = describe(hostile_fmu(tmp_path))
+    outputs = np.zeros(len(description.outputs))
+    with in_process(description)(f"{place}_minus_0", description, outputs) as instance:
+        instance.enter_initialization(1.0)
+        instance.exit_initialization()
+        if place == "restore":
+            instance.save()
+        call = instance.save if place == "save" else instance.rollback
+        with pytest.raises(FmuFault, match=r"FMUstate returned status -1 at t = 0 s"):
+            call()
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])
@@ -152,18 +161,6 @@ def test_a_step_that_ends_early_ends_the_run_at_the_last_whole_step(
     if act in ("finish", "middle"):
         assert outcome.asked == within.get(act, f"{name} has asked to end the simulation")
     assert sorted(log.read_text().split()) == ["free", "free", "terminate", "terminate"]
-
-
-def test_a_retried_step_that_asks_for_the_end_is_no_discard(tmp_path, capsys):
-    """The command says who asked."""
-    hostile_fmu(tmp_path)
-    path = hostile_scene(tmp_path, "step_finish_20")
-    options = ("--no-figures", "--out", tmp_path / "out", *sets(["faults.discard=retry"]))
-    assert status("run", path, *options) == 0
-    told = capsys.readouterr()
-    assert "scene: ended: step_finish_20 has asked to end the simulation, at 0.3125 s" in told.out
-    assert not told.err
-    assert read_results.load(tmp_path / "out").haptics["step_finish_20.slope"][-1] > 0
 
 
 def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path):

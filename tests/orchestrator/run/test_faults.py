@@ -86,24 +86,11 @@ def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path):
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_a_discarded_step_stops_or_is_taken_in_smaller_ones(tmp_path, isolate):
-    half = "if size > 0.005: return False\n        self.gain += size; self.y = self.gain"
-    python_fmu(tmp_path, "Stiff", half, canGetAndSetFMUstate=True)
-    one = fmu_table("one", "Stiff", isolate)
-    experiment, found = run(tmp_path, one)
+def test_a_discarded_step_stops(tmp_path, isolate):
+    python_fmu(tmp_path, "Stiff", "return False", canGetAndSetFMUstate=True)
+    experiment, found = run(tmp_path, fmu_table("one", "Stiff", isolate))
     assert "one: fmi2DoStep returned discard at t = 0 s" in str(experiment.outcome.fault)
     assert found.haptics["time"].tolist() == [0.0]
-    found = ran(tmp_path, one, "faults.discard=retry")
-    np.testing.assert_allclose(found.haptics["one.y"][1:], 1 + found.haptics["time"][1:], 1e-15)
-    assert found.haptics["one.steps"][-1] == 32 * 4  # quarters of 1/64 s are below 5 ms
-    assert found.run["smaller_steps"] == {"one": 32}
-
-
-def test_a_retry_that_cannot_be_says_why(tmp_path):
-    lacks = "not retried: the FMU lacks canGetAndSetFMUstate"
-    for able, why in ((False, lacks), (True, "in steps of 1/1024 too")):
-        python_fmu(tmp_path, "Stiff", "return False", canGetAndSetFMUstate=able)
-        assert why in fault(tmp_path, fmu_table("one", "Stiff"), "faults.discard=retry")
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])

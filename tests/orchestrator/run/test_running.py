@@ -64,7 +64,7 @@ def test_a_start_that_assembly_moves_far_is_told(tmp_path, capsys):
     assert "warning" not in capsys.readouterr().out
 
 
-def test_held_outputs_and_retried_steps_are_told(tmp_path):
+def test_held_outputs_and_what_did_not_go_well_are_told(tmp_path):
     python_fmu(tmp_path, "Lost", "self.y = float('nan') if self.steps > 3 else 1.0")
     _, found = run(tmp_path, 'faults.nan = "hold"\n' + fmu_table("one", "Lost"))
     held = found.run["held_outputs"]["one"]
@@ -74,13 +74,11 @@ def test_held_outputs_and_retried_steps_are_told(tmp_path):
     changed = found.run | {
         "links": {"a.y -> b.u": {"sent": 9, "lost": 2, "overtaken": 1}},
         "iterations": {"unconverged": 2, "steps": 5},
-        "smaller_steps": {"one": 7},
         "holds_that_did_not_fit": {
             f"{a}.y -> b.u": {"hold": "passive", "reason": "no power"} for a in "ac"
         },
     }
     assert list(summary.lines(replace(found, run=changed)))[1:] == [
-        "one: 7 steps were discarded and repeated with smaller ones",
         "warning: 2 of 5 iterated steps did not converge",
         "a.y -> b.u: 2 of 9 samples were lost, 1 overtaken",
         "zoh instead of the hold passive for b.u, b.u: no power",
