@@ -212,9 +212,10 @@ def _clear(root: Path) -> None:
 
 @lru_cache(64)
 def is_whole(path: Path, changed_ns: int, size: int) -> bool:
-    """Whether an FMU can be read to its end: asked once as long as the file does not change."""
+    """Whether an archive has entries that can be read to their ends: asked once as long as the file
+    does not change."""
     try:
         with zipfile.ZipFile(path) as archive:
-            return archive.testzip() is None and "modelDescription.xml" in archive.namelist()
+            return archive.testzip() is None and bool(archive.namelist())
     except (OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
         return False

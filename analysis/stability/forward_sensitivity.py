@@ -8,6 +8,8 @@ perturbations M, a column each, and their errors D follow (linear_period.py)
 
 J is that of central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
 difference of its slopes to both sides; copies and holds without a regime have one side and E = 0.
+Of the evaluations of a hold that is a polynomial in time, degree + 1 are differentiated, and the
+others follow from these; those of a hold that gives its samples are the same at every age.
 For a doStep and a get of an FMU with a graph, J
 is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
 have a slope in one way only, or another one to each side, keep those by differences. The graph is
@@ -18,8 +20,9 @@ operation is differentiated once.
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Container
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,6 +42,8 @@ from hapticlink.analysis.stability.state_vector import (
 )
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.holds.holds_of_samples import OfSamples, Transition
+from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
@@ -60,8 +65,6 @@ KINK = 1e-3
 SMALL = 1e-3
 """Columns of smaller slopes, in which the rounding of differences would pass for a kink, count as
 of this size."""
-NEARBY = 1e-2
-"""That of a hold on the way to an equilibrium: holds are linear, but for those on manifolds."""
 SAME = 1e-8
 """Largest difference of numbers, relative to max(1, |z|), at which slopes are the same."""
 
@@ -135,7 +138,7 @@ class ForwardSensitivity:
             call(tick)
             return None
         of_fmu = isinstance(operation, Get | Set | Step)
-        ages = () if of_fmu else reach.state.ages(lambda kept: _ages(kept, tick))
+        ages = () if of_fmu else reach.state.ages(lambda kept: self._ages(operation, kept, tick))
         found = reach.applied.get(ages)
         if found and of_fmu:  # at rest it would change nothing
             return found
@@ -145,8 +148,7 @@ class ForwardSensitivity:
             return found
         owners = tuple(o for o in reach.state.owners if o != SIGNALS)
         before = reach.state.sizes()
-        same = SAME if of_fmu else NEARBY
-        slopes, after = self._slopes(tick, operation, call, reach, same)
+        slopes, after = self._slopes(tick, operation, call, reach)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
         reach.applied[ages] = made = Applied(
             operation, owners, counts, tuple(after), reach.reads, reach.writes, slopes.J, slopes.E
@@ -159,6 +161,19 @@ class ForwardSensitivity:
             return isinstance(operation, Set | Push)
         hold = self._simulation.system.connection[operation.connection].hold
         return HOLDS[hold or ""].needs not in ("power", "spring")
+
+    def _gives_sample(self, operation: Instruction) -> bool:
+        """Whether it is the evaluation of a hold whose value is one of its samples, unchanged: its
+        slopes depend on neither their ages nor their numbers."""
+        if not isinstance(operation, Evaluate):
+            return False
+        hold = HOLDS[self._simulation.system.connection[operation.connection].hold or ""]
+        return hold.gives_samples and hold.needs is None
+
+    def _ages(self, operation: Instruction, kept: Any, tick: int) -> Any:
+        """What the slopes of an operation depend on, of the whole numbers of holds: the ages of
+        samples, or only which of them have arrived."""
+        return _whole_numbers(kept, tick, arrived_only=self._gives_sample(operation))
 
     def _alone(self, operation: Instruction, call: Call) -> Call:
         """The call of an operation that can be repeated from a state that was restored."""
@@ -190,7 +205,7 @@ class ForwardSensitivity:
         return call
 
     def _slopes(
-        self, tick: int, operation: Instruction, call: Call, reach: Reach, same: float
+        self, tick: int, operation: Instruction, call: Call, reach: Reach
     ) -> tuple[Slopes, list[int]]:
         """Slopes of an operation that is carried out, and the numbers of each owner after it."""
         state = reach.state
@@ -201,12 +216,24 @@ class ForwardSensitivity:
         image, (_, written) = state.numbers(after), self._places(reach, after)
         own = zip(state.owners, state.parts(after), strict=True)
         sizes = [len(part) for owner, part in own if owner != SIGNALS]
-        key = operation, len(z), len(image), _ages(template.holds, tick)
+        key = operation, len(z), len(image), self._ages(operation, template.holds, tick)
         known = self._known.setdefault(key, [])
-        wide = same * np.maximum(1.0, np.abs(z[read]))
+        wide = SAME * np.maximum(1.0, np.abs(z[read]))
+        anywhere = isinstance(operation, Set) or self._gives_sample(operation)
         for slopes in known:
-            if isinstance(operation, Set) or (np.abs(z[read] - slopes.at) <= wide).all():
+            if anywhere or (np.abs(z[read] - slopes.at) <= wide).all():
                 return slopes, sizes
+        if nodes := self._nodes(operation, tick):
+            J, E = np.zeros((2, len(written), len(read)))
+            for node in nodes:
+                others = [other for other in nodes if other != node]
+                weight = math.prod((tick - other) / (node - other) for other in others)
+                state.restore(template)
+                there, _ = self._slopes(node, operation, call, reach)
+                J, E = J + weight * there.J, E + abs(weight) * np.abs(there.E)
+            state.restore(after)
+            known.insert(0, Slopes(z[read], J, E))
+            return known[0], sizes
         inert = np.zeros(len(read), bool)
         if known:  # what nothing reads, as outputs, has the slopes that it has anywhere
             coordinates = self._coordinates(key, state, template)
@@ -242,6 +269,23 @@ class ForwardSensitivity:
             J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
         known.insert(0, Slopes(z[read], J, E))
         return known[0], sizes
+
+    def _nodes(self, operation: Instruction, tick: int) -> Sequence[int]:
+        """The ticks from whose slopes those of an evaluation at `tick` follow, by Lagrange's
+        formula: where all samples are equal, those of a hold that is a polynomial in time are
+        polynomials of its degree. None where they are found at the tick itself."""
+        if not isinstance(operation, Evaluate):
+            return ()
+        hold = self._simulation.holds[operation.connection]
+        while isinstance(hold, Projector | Semidefinite | Unwrapped):
+            hold = hold.hold
+        if not isinstance(hold, OfSamples) or isinstance(hold, Transition):
+            return ()
+        if hold.needs or not hold.degree or len(hold.samples) < 2:
+            return ()
+        newest, period = hold.samples[-1][0], hold.samples.period(-1)
+        nodes = [newest + k * period for k in range(hold.degree + 1)]
+        return nodes if tick not in nodes else ()
 
     def _in_graph(
         self, operation: Instruction, before: Template, own: Matrix
@@ -345,17 +389,18 @@ def decided(exact: Matrix, slope: Matrix, error: Matrix) -> tuple[Matrix, Matrix
     return np.where(differ, slope, exact), np.where(wider, gap, error)
 
 
-def _ages(value: Any, tick: int) -> Any:
+def _whole_numbers(value: Any, tick: int, arrived_only: bool) -> Any:
     """The whole numbers in the attributes of holds: stamps of samples relative to the tick, sizes,
-    which are far smaller, as they are. What is no whole number is left out."""
+    which are far smaller, as they are; of either, or with `arrived_only`, whether they are behind
+    it. What is no whole number is left out."""
     if isinstance(value, bool):
         return value
     if isinstance(value, int):
-        return tick - value if 8 * value > tick else value
+        return value <= tick if arrived_only else tick - value if 8 * value > tick else value
     if isinstance(value, dict):
-        return tuple(_ages(v, tick) for v in value.values())
+        return tuple(_whole_numbers(v, tick, arrived_only) for v in value.values())
     if isinstance(value, np.ndarray | float | str | type) or callable(value) or value is None:
         return None
     if isinstance(value, list | tuple | deque):
-        return tuple(_ages(v, tick) for v in value)
-    return _ages(vars(value), tick) if hasattr(value, "__dict__") else None
+        return tuple(_whole_numbers(v, tick, arrived_only) for v in value)
+    return _whole_numbers(vars(value), tick, arrived_only) if hasattr(value, "__dict__") else None

@@ -85,10 +85,11 @@ class InHands:
 
     def __init__(self, place: RestingScene, scales: Scales | None = None, late: int = 0) -> None:
         period = place.period(scales or {})
-        self._period = period.delayed(CONTROLLER, late) if late else period
+        period = period.delayed(CONTROLLER, late) if late else period
         self._T, self._seconds = place.T, place.map.period
         names = (f.name for f in place.map.system.fmus)
         self._users = [name for name in names if user_of_block(name, HAND) is not None]
+        self._period = period.fused(self._users)
 
     def worst(self, hands: Mapping[str, Hand | None], bounds: Bounds) -> float:
         """The largest growth rate (1/s) in all hands, or the first one that is positive;

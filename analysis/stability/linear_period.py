@@ -8,16 +8,18 @@ same operations are one matrix, and the period is their product
 
 over those coordinates alone that are read before they are overwritten, in this period or a later
 one. What a hand is, linear and with a wrench that the equilibrium needs, changes nothing but the
-matrices of its own doStep and get: one recorded period serves every hand.
+matrices of its own doStep and get: one recorded period serves every hand, and what comes between
+these is multiplied once for all hands.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import chain, groupby, pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +43,11 @@ class Act:
     of: Rows
     J: Matrix
     E: Matrix
+
+    @cached_property
+    def exact(self) -> bool:
+        """Whether J has no error."""
+        return not self.E.any()
 
     @cached_property
     def depends(self) -> NDArray[np.bool_]:
@@ -79,6 +86,50 @@ class LinearPeriod:
     """The first row of an FMU, and of the signals."""
     order: Rows
     """The row of each coordinate of the map."""
+
+    def fused(self, fmus: Container[str]) -> LinearPeriod:
+        """The same period in which acts that follow each other are one, but for the doSteps and
+        gets of FMUs in whose place hands can be put."""
+        ports = {
+            act for act, (kind, owner) in self.sources.items() if owner in fmus and kind is not Set
+        }
+        live, made = self._live(ports), dict[tuple[Any, ...], Act]()
+
+        def fuse(event: Sequence[Act], live: NDArray[np.bool_]) -> Iterator[Act]:
+            """Acts in the place of those of an event, the last one first."""
+            for at_port, acts in groupby(reversed(event), ports.__contains__):
+                run = [*acts][::-1]
+                if at_port:
+                    yield from reversed(run)
+                else:
+                    key = *run, live.tobytes()
+                    if key not in made:
+                        made[key] = self._as_one(run, live)
+                    yield made[key]
+                live = _before(run, live, ports)
+
+        known: dict[tuple[int, bytes], tuple[Act, ...]] = {}
+        equal: dict[tuple[Act, ...], tuple[Act, ...]] = {}
+        for event, after in zip(self.events, live[1:], strict=True):
+            if (id(event), after) not in known:
+                acts = [act for act in fuse(event, np.frombuffer(after, bool)) if len(act.into)]
+                fused = tuple(reversed(acts))
+                known[id(event), after] = equal.setdefault(fused, fused)
+        events = (
+            known[id(event), after] for event, after in zip(self.events, live[1:], strict=True)
+        )
+        sources = {act: self.sources[act] for act in ports}
+        return replace(self, events=tuple(events), sources=sources)
+
+    def _as_one(self, acts: Sequence[Act], live: NDArray[np.bool_]) -> Act:
+        """Acts that follow each other as one, which writes what is read behind them."""
+        written = np.zeros(self.rows, dtype=bool)
+        for act in acts:
+            written[act.into] = True
+        needed = written & live
+        into, of = np.flatnonzero(needed), np.flatnonzero(_before(acts, needed))
+        step = self._step(acts, of, into)
+        return Act(into, of, step.C, step.E)
 
     def held(self, hands: Mapping[str, HandSlopes]) -> LinearPeriod:
         """The same period with other hands, by the FMUs in whose place they are."""
@@ -197,21 +248,24 @@ class LinearPeriod:
         X, D = np.zeros((2, self.rows, len(start)))
         X[start, np.arange(len(start))] = 1.0
         for act in event:
-            x, d = X[act.of], D[act.of]
-            X[act.into], D[act.into] = act.J @ x, act.J @ d + act.E @ x
+            x, d = X[act.of], act.J @ D[act.of]
+            X[act.into], D[act.into] = act.J @ x, d if act.exact else d + act.E @ x
         return _Step(start, X[end], D[end])
 
-    def _live(self) -> list[bytes]:
+    def _live(self, readers_of_all: Container[Act] = ()) -> list[bytes]:
         """Which rows are read before they are overwritten, from the start of each event on, and
-        behind the last one."""
+        behind the last one. `readers_of_all` read each of their rows, whatever J they have."""
         known: dict[tuple[int, bytes], bytes] = {}
-        live = np.ones(self.rows, dtype=bool)
+        live = np.zeros(self.rows, dtype=bool)
+        for act in chain.from_iterable({id(event): event for event in self.events}.values()):
+            live[act.of] = True
         while True:
             starts = [live.tobytes()]
             for event in reversed(self.events):
                 key = id(event), starts[-1]
                 if key not in known:
-                    known[key] = _before(event, np.frombuffer(starts[-1], bool)).tobytes()
+                    after = np.frombuffer(starts[-1], bool)
+                    known[key] = _before(event, after, readers_of_all).tobytes()
                 starts.append(known[key])
             if starts[-1] == starts[0]:
                 return starts[::-1]
@@ -234,10 +288,13 @@ def _product(steps: Sequence[_Step]) -> _Step:
     return steps[0]
 
 
-def _before(event: Sequence[Act], live: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _before(
+    event: Sequence[Act], live: NDArray[np.bool_], readers_of_all: Container[Act] = ()
+) -> NDArray[np.bool_]:
+    """Which rows are read from the start of an event on, of those `live` behind it."""
     live = live.copy()
     for act in reversed(event):
-        read = act.depends[live[act.into]].any(axis=0)
+        read = act in readers_of_all or act.depends[live[act.into]].any(axis=0)
         live[act.into] = False
         live[act.of] |= read
     return live
@@ -254,23 +311,28 @@ def linear_period(map_: LiftedMap, point: Vector) -> LinearPeriod:
     places = np.concatenate([[0], np.cumsum(list(sizes.values()))])
     first = dict(zip(sizes, places.tolist(), strict=False))
     made: dict[int, Act] = {}
+    equal_acts: dict[tuple[Any, ...], Act] = {}
+    equal_events: dict[tuple[Act, ...], tuple[Act, ...]] = {}
     sources: dict[Act, tuple[type, str]] = {}
 
     def act(applied: Applied) -> Act:
         if id(applied) not in made:
-            into, of = (
-                _rows(applied, first, counts, signals)
-                for counts, signals in (
-                    (applied.after, applied.writes),
-                    (applied.before, applied.reads),
-                )
-            )
-            made[id(applied)] = new = Act(into, of, applied.J, applied.E)
-            if isinstance(applied.operation, Step | Get | Set):
-                sources[new] = type(applied.operation), applied.operation.fmu
+            operation, source = applied.operation, None
+            if isinstance(operation, Step | Get | Set):
+                source = type(operation), operation.fmu
+            into = _rows(applied, first, applied.after, applied.writes)
+            of = _rows(applied, first, applied.before, applied.reads)
+            parts = into, of, applied.J, applied.E
+            key = source, *(part.tobytes() for part in parts)
+            made[id(applied)] = new = equal_acts.setdefault(key, Act(*parts))
+            if source:
+                sources[new] = source
         return made[id(applied)]
 
-    acts = {k: tuple(map(act, event)) for k, event in kinds.items()}
+    acts = {}
+    for k, event in kinds.items():
+        each = tuple(map(act, event))
+        acts[k] = equal_events.setdefault(each, each)
     order = np.concatenate(
         [np.arange(first[owner], first[owner] + n) for owner, n in map_.sizes().items()]
     ).astype(np.intp)

@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 import time
+import zipfile
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
@@ -54,6 +55,20 @@ def test_built_once(place, room):
     assert first == second
     assert first.is_relative_to(place)
     assert files(place) == ["gain.fmu"]
+
+
+def test_an_archive_without_a_model_is_built_once(place, room):
+    """As that of a page's program."""
+    calls = []
+
+    def build(folder: Path) -> Path:
+        calls.append(folder)
+        with zipfile.ZipFile(folder / "page.fmu", "w") as archive:
+            archive.writestr("page.wasm", b"module")
+        return folder / "page.fmu"
+
+    assert cached(MATERIAL, build, room) == cached(MATERIAL, build, room)
+    assert len(calls) == 1
 
 
 def test_order_of_keys_does_not_matter_but_values_do():

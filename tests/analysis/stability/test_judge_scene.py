@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.stability import forward_sensitivity
+from hapticlink.analysis.stability.forward_sensitivity import ForwardSensitivity
 from hapticlink.analysis.stability.hand_cases import InHands, in_poses
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
@@ -20,7 +22,7 @@ from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.margin_and_remedy import SAFE, improvements
 from hapticlink.analysis.stability.modes import DRIFT, kind, modes
-from hapticlink.analysis.stability.poses import evenly_spaced, simulated
+from hapticlink.analysis.stability.poses import evenly_spaced, settled, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
 from hapticlink.components.specs.hand import ArmHand, SpringHand
@@ -51,6 +53,35 @@ def test_events_that_repeat_have_the_map_that_is_carried_through_the_period(
     whole = linearised(place.map, period.point)
     expected = [mode.z for mode in modes(whole, place.map.period)[:LEADING]]
     assert leading(period) == pytest.approx(expected, abs=1e-6)
+
+
+def test_acts_that_are_joined_for_all_hands_have_the_modes_of_each_hand(
+    place: RestingScene,
+) -> None:
+    period = place.period({})
+    fused = period.fused(["hand"])
+    assert leading(fused) == pytest.approx(leading(period), rel=1e-9)
+    for hand in HANDS.values():
+        slopes = {"hand": hand_slopes(hand, place.T)}
+        held = leading(period.held(slopes))
+        assert leading(fused.held(slopes)) == pytest.approx(held, rel=1e-9)
+
+
+def test_slopes_that_are_taken_over_stay_within_what_a_growth_rate_is_uncertain(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Against slopes that are found anew at each of the numbers and at each age: those of holds on
+    manifolds change on the way to the equilibrium."""
+    read = hl.scene("closed-loop", {"hold": "foh", "graphics.rate": 128})
+    assert read.linkage is not None
+    poses = settled(read, read.linkage)[:1]
+    taken_over, _ = in_poses(read, poses, HANDS, DRIFT)
+    monkeypatch.setattr(forward_sensitivity, "SAME", 1e-13)
+    monkeypatch.setattr(ForwardSensitivity, "_nodes", lambda *_: ())
+    anew, _ = in_poses(read, poses, HANDS, DRIFT)
+    assert [case.growth for case in taken_over] == [
+        pytest.approx(case.growth, abs=0.1 * case.uncertainty) for case in anew
+    ]
 
 
 @pytest.mark.parametrize("scene", ["geared-five-bar", "closed-loop-direct"])
