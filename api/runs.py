@@ -20,7 +20,11 @@ from hapticlink.orchestrator.network.served_part import NOWHERE, Servers
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders
-from hapticlink.orchestrator.results.read_results import Results
+from hapticlink.orchestrator.results.read_results import (
+    Results,
+    read_into_memory,
+    without_rows,
+)
 from hapticlink.orchestrator.results.read_results import load as read_tables
 from hapticlink.orchestrator.results.run_record import content
 from hapticlink.orchestrator.run.real_time import RealTimeRun
@@ -106,7 +110,7 @@ def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
         ended = simulated(folder, csv=False)
         if not tables:
             return Run(None, ended.run, {})
-        results = read_tables(folder, binary=True) if ended.outcome.published else ended.results
+        results = read_into_memory(ended.results)
     measures = Measures(results)
     return _run(None, ended.run | _findings(results, measures), results, measures)
 
@@ -119,7 +123,7 @@ def _findings(results: Results, measures: Measures) -> dict[str, Any]:
 
 def _run(folder: Path | None, run: dict[str, Any], results: Results, measures: Measures) -> Run:
     numbers = tuple(summary.numbers(results, measures))
-    return Run(folder, run, results.tables, numbers=numbers)
+    return Run(folder, run, without_rows(results), numbers=numbers)
 
 
 def _in_folder(simulated: Callable[..., Experiment], folder: Path, figures: bool) -> Run:

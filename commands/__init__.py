@@ -31,7 +31,6 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "report": "Write a page of a run, or of several beside each other.",
         "build": "Build the FMUs of a scene.",
         "export": "Write a scene as an SSP: its FMUs, connections, rates and holds.",
-        "export-results": "Write the results of a run as Parquet tables, or as MCAP for Foxglove.",
         "info": "Describe a scene, or list the shipped scenes.",
         "schema": "Print the keys of a scene, as a JSON schema or as a page.",
         "stability": "Analyse the stability of a scene by its linearised map over a period.",
@@ -51,6 +50,12 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
 """For each command, the help of a function in the file of that name, which is imported when it is
 called; or a function itself. Its arguments and docstring define the command, and it returns the
 exit status."""
+
+GONE = {
+    "export-results": "a table of a run writes itself in Python: "
+    'hl.load("runs/closed-loop").frame("haptics").to_parquet("haptics.parquet")'
+}
+"""Commands of earlier versions, with what does their work now."""
 
 Plugin = Annotated[
     list[str] | None,
@@ -83,6 +88,8 @@ def _commands(arguments: Sequence[str]) -> None:
         elif not each.startswith("-"):
             words.append(each)
     plugins.load(filter(None, named))
+    if words and (remedy := GONE.get(words[0])):
+        raise InputFault(f"there is no command {words[0]} any more: {remedy}")
     if not words or words[0] not in COMMANDS:
         _register_completion()
     if words and words[0] not in COMMANDS:

@@ -21,8 +21,7 @@ def recover(folder: Folder, /) -> int:
 
     tables = recover(folder)
     for name, table in tables.items():
-        lost = f"{table.lost or 'none'} lost"
-        say(f"{folder / name}.csv: {table.rows} rows to {table.time:.6g} s, {lost}")
+        say(f"{folder / name}.csv: {table.rows} rows to {table.time:.6g} s")
     if not tables:
         say(f"{folder}: there is nothing to recover")
     return 0

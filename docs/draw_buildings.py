@@ -54,7 +54,6 @@ BUILDINGS = {
         "standalone",
         "replay",
         "compare",
-        "export",
     ),
     "api": (".",),
     "commands": (".",),

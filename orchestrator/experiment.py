@@ -20,11 +20,16 @@ from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
-from hapticlink.orchestrator.results.read_results import Results, Table, described
+from hapticlink.orchestrator.results.read_results import (
+    IN_MEMORY,
+    Results,
+    Table,
+    load,
+    with_record,
+)
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.results.windows import WINDOW_BYTES, opened
 from hapticlink.orchestrator.results.write_files import remove_rows
 from hapticlink.orchestrator.run import crash_monitor
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
@@ -70,8 +75,8 @@ class Experiment:
         if self.outcome.published:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
-                return opened(self.folder, record)
-            return described(Results(None, self.run, self.memory.tables()), record)
+                return load(self.folder, from_rows=True, record=record)
+            return with_record(Results(None, self.run, self.memory.tables()), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:
@@ -98,11 +103,11 @@ def _left_out(every: System, system: System) -> list[str]:
     return [*dict.fromkeys(left_out)]
 
 
-def _fits_a_window(system: System, columns: Mapping[str, Sequence[str]]) -> bool:
-    """Whether the rows of a run are no more than a window."""
+def _fits_in_memory(system: System, columns: Mapping[str, Sequence[str]]) -> bool:
+    """Whether the rows of a run may be kept in memory."""
     counts = {c.name: len(c.starts) for c in system.timeline.clocks}
     written = sum(counts[clock] * (1 + len(names)) for clock, names in columns.items())
-    return 8 * written <= WINDOW_BYTES
+    return 8 * written <= IN_MEMORY
 
 
 @interrupt.held()
@@ -124,8 +129,8 @@ def simulate(
     results up to then are kept. Results of an earlier run in `folder` are removed once the first
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
     writes them, with `keep_rows` beside the CSVs, until `remove_rows`. `in_memory`: nothing is
-    written, unless the tables are more than a window (`results.windows`) or an FMU of others, which
-    may crash the process, runs in it. remote: the FMUs that run on other computers.
+    written, unless the tables are too long (`IN_MEMORY`) or an FMU of others, which may crash the
+    process, runs in it. remote: the FMUs that run on other computers.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
     read = open_scene.load(scene, options)
@@ -145,7 +150,7 @@ def simulate(
         before = setup(read, plan, tables, _left_out(every, system))
         alone = isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
-        if in_memory and not foreign and _fits_a_window(system, tables):
+        if in_memory and not foreign and _fits_in_memory(system, tables):
             memory = RunResults()
             with interpreter_state.restored():
                 outcome = run(plan, memory, progress, real_time)

@@ -17,7 +17,6 @@ from hapticlink.analysis.tune.tune_gains import Tuned as Tuned
 from hapticlink.analysis.tune.tune_gains import tune as tune
 from hapticlink.api.compare import Comparison as Comparison
 from hapticlink.api.compare import compare as compare
-from hapticlink.api.export_results import export_results as export_results
 from hapticlink.api.files import build as build
 from hapticlink.api.files import export as export
 from hapticlink.api.maps import stability_map as stability_map

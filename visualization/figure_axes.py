@@ -18,7 +18,7 @@ import numpy as np
 from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import shortened
-from hapticlink.orchestrator.results.numbers import last_time, short
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
         said = stopped_by(results.record.stop_when)
         if reason == "stop_when" and said.startswith("the device"):
             why = said
-        title += f", until {why} at {short(last_time(results))} s"
+        title += f", until {why} at {short(results.last_time)} s"
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
     framed(figure)
     every = figure.subplots(len(y), 1, sharex=True, squeeze=False)[:, 0]
@@ -96,7 +96,7 @@ def _events(axes: Axes, results: Results) -> None:
     """A line at each time at which something happens in the scene, with its text."""
     texts: dict[float, list[str]] = {}
     events = results.run.get("events", ())
-    end = last_time(results) if events else 0.0
+    end = results.last_time if events else 0.0
     for time, text in events:
         if time <= end:
             texts.setdefault(time, []).append(shortened(text, 60))

@@ -4,7 +4,6 @@ rendered."""
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -36,15 +35,15 @@ def lines(results: Results) -> Iterator[str]:
     """A line for the deepest contact beyond the middle of a shape, and for the stiffest
     pair that pushes or sticks."""
     record, scene = results.record, results.record.scene
-    table = of_block(next(results.windows()), CONTACT_GAP)
+    table = of_block(results, CONTACT_GAP)
     if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
         return
-    yield from _unrendered(results)
+    yield from _unrendered(results, table)
     linkage = scene_part(results, "linkage", Linkage)
     contacts = scene_part(results, "contacts", Contacts)
     if JOINT_COORDINATES in table:  # both are recorded
         yield from pressed(linkage, contacts, table[JOINT_COORDINATES][0])
-        yield from _deep(results, linkage, contacts)
+        yield from _deep(table, linkage, contacts)
     mechanism = scene_part(results, "mechanism", Mechanism)
     method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
     if method.bounded_by and len(table["time"]) > 1:
@@ -64,50 +63,37 @@ def pressed(linkage: Linkage, contacts: Contacts, q: Sequence[float] | Vector) -
         )
 
 
-def _tables(results: Results) -> Iterator[tuple[Vector, Table]]:
-    """The times (s) and the rows of each window."""
-    for window in results.windows():
-        if table := of_block(window, CONTACT_GAP):
-            rows = window.within(table["time"])
-            if len(time := table["time"][rows]):
-                yield time, replace(table, rows=table.rows[rows])
-
-
-def _unrendered(results: Results) -> Iterator[str]:
+def _unrendered(results: Results, table: Table) -> Iterator[str]:
     """A line where contacts act on the mechanism and its own controller does not pass them on."""
     record = results.record
     sent = any(name.startswith(f"{ENVIRONMENT_WRENCH} -> ") for name in record.connections)
     if sent or not record.scene["controller"] or CONTROLLER in record.replaced:
         return
-    closed = (time[table[CONTACT_GAP] < 0] for time, table in _tables(results))
-    first = next((times[0] for times in closed if len(times)), None)
-    if first is None:
+    closed = table["time"][table[CONTACT_GAP] < 0]
+    if not len(closed):
         return
     yield (
-        f"warning: contacts act on the mechanism from {first:.4g} s on and are not rendered to "
+        f"warning: contacts act on the mechanism from {closed[0]:.4g} s on and are not rendered to "
         "the hand: the handle is led to where the mechanism cannot follow; take "
         "controller.contact = true"
     )
 
 
-def _deep(results: Results, linkage: Linkage, contacts: Contacts) -> Iterator[str]:
+def _deep(table: Table, linkage: Linkage, contacts: Contacts) -> Iterator[str]:
     most = {pair: middle(linkage, contacts, pair) for pair in near(linkage, contacts)}
-    bound = -min(most.values())
-    number = sum(int((table[CONTACT_GAP] < bound).sum()) for _, table in _tables(results))
-    chosen = np.linspace(0, number - 1, min(number, ROWS)).astype(int)
-    found, before = [], 0
-    for time, table in _tables(results):
-        q = table[JOINT_COORDINATES]
-        found += [(pair, depth, time) for pair, depth in overlaps(linkage, contacts, q)]
-        deep = np.flatnonzero(table[CONTACT_GAP] < bound)
-        rows = deep[chosen[slice(*np.searchsorted(chosen, (before, before + len(deep))))] - before]
-        if len(rows):
-            found += [(*item, time[rows]) for item in depths(linkage, contacts, q[rows])]
-        before += len(deep)
-        found = [max(found, key=lambda item: _beyond(item, most))] if found else []
+    deep = np.flatnonzero(table[CONTACT_GAP] < -min(most.values()))
+    rows = deep[np.linspace(0, len(deep) - 1, min(len(deep), ROWS)).astype(int)]
+    found = [
+        (*item, block["time"])
+        for block in table.blocks()
+        for item in overlaps(linkage, contacts, block[JOINT_COORDINATES])
+    ]
+    if len(rows):
+        q, times = table[JOINT_COORDINATES][rows], table["time"][rows]
+        found += [(*item, times) for item in depths(linkage, contacts, q)]
     if not found:
         return
-    ((pair, depth, times),) = found
+    pair, depth, times = max(found, key=lambda item: _beyond(item, most))
     if (worst := float(depth.max())) > most[pair]:
         yield (
             f"warning: at {times[depth.argmax()]:.4g} s {pair.body} is {short(worst * 1e3)} mm "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,26 +30,17 @@ WRENCHES = {
 """By signal, what it is called; each is (N, N, N.m)."""
 
 
-def wrenches(results: Results, user: str = "") -> dict[str, tuple[Vector, Vector, Vector]]:
-    """By name: times (s), force (N) and moment (N.m) of each wrench of a user that the run has."""
-    wrenches_by_name = {}
-    for signal, name in WRENCHES.items():
-        signal = signal_of_user(signal, user)
-        if (table := of_block(results, signal, 3)) and len(table["time"]):
-            rows = results.within(table["time"])
-            F = table[signal][rows]
-            wrenches_by_name[name] = table["time"][rows], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
-    return wrenches_by_name
-
-
-def all_wrenches(results: Results) -> dict[str, tuple[Vector, Vector, Vector]]:
-    """As `wrenches`, of all users; those of further ones have their point's name first."""
-    users = ["", *further_users(results)]
-    return {
-        f"{user}: {name}" if user else name: found
-        for user in users
-        for name, found in wrenches(results, user).items()
-    }
+def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
+    """Name, times (s), force (N) and moment (N.m) of each wrench that a run has; names of further
+    users' wrenches have their point first."""
+    for user in ("", *further_users(results)):
+        for signal, name in WRENCHES.items():
+            signal = signal_of_user(signal, user)
+            if (table := of_block(results, signal, 3)) and len(table["time"]):
+                force, moment = table.by_row(
+                    lambda F: np.stack([np.hypot(F[:, 0], F[:, 1]), F[:, 2]]), signal
+                )
+                yield f"{user}: {name}" if user else name, table["time"], force, moment
 
 
 def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:
@@ -56,16 +49,18 @@ def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:
     force, gap = of_block(results, ENVIRONMENT_WRENCH, 3), of_block(results, CONTACT_GAP)
     if not (force and gap):
         return None
-    rows = results.within(force["time"])
-    pushes = (force[ENVIRONMENT_WRENCH] != 0).any(axis=1) & (gap[CONTACT_GAP] < 0)
-    return force["time"][rows], pushes[rows]
+    largest = force.by_row(lambda F: np.abs(F).max(axis=1), ENVIRONMENT_WRENCH)
+    return force["time"], (largest != 0) & (gap[CONTACT_GAP] < 0)
 
 
 def torques(
-    results: Results, device: Device | None, user: str = ""
+    results: Results,
+    device: Device | None,
+    user: str = "",
+    of_motors: Callable[[Vector], Vector] = np.transpose,
 ) -> tuple[Vector, Vector] | None:
-    """Times (s) and torques (N.m) of the four motors of a user's device, None without one that is
-    driven."""
+    """Times (s) and torques (N.m) of the four motors of a user's device, (4, n), or what a function
+    gives of those at a number of times, (n, 4); None without a device that is driven."""
     # casadi, which the terminal's lines, of the same module, can do without
     from hapticlink.components.device.numeric_torques import motor_torques
 
@@ -75,5 +70,12 @@ def torques(
         return None
     if not len(table["time"]):
         return None
-    rows = results.within(table["time"])
-    return table["time"][rows], motor_torques(device, table[motor][rows], table[handle][rows])
+    return table["time"], table.by_row(
+        lambda F, x: of_motors(motor_torques(device, F, x)), motor, handle
+    )
+
+
+def largest_torque(of_motors: Vector) -> Vector:
+    """Of the torques of motors, (n, 4), the largest of each time."""
+    largest: Vector = np.abs(of_motors).max(axis=1)
+    return largest

@@ -29,16 +29,10 @@ def coarse(results: Results) -> Iterator[str]:
     if not linkage or not speeds:
         return
     units = [(j["name"], unit) for j in linkage["joint"] for unit in COORDINATE_UNITS[j["type"]]]
-    smallest = [speeds.get(name, 0.0) for name, _ in units]
-    largest, turns = np.zeros(len(units)), [Turns(speed) for speed in smallest]
-    for window in results.windows():
-        if table := of_block(window, JOINT_RATES, len(units)):
-            rates = table[JOINT_RATES][window.within(table["time"])]
-            largest = np.maximum(largest, np.abs(rates).max(axis=0, initial=0.0))
-            for joint, rate in zip(turns, rates.T, strict=True):
-                joint.add(rate)
-    for (name, unit), speed, most, turned in zip(units, smallest, largest, turns, strict=True):
-        if (error := turned.count * speed) > BOUND * most:
+    table = of_block(results, JOINT_RATES, len(units))
+    for (name, unit), rate in zip(units, table[JOINT_RATES].T if table else (), strict=False):
+        speed, most = speeds.get(name, 0.0), float(np.abs(rate).max(initial=0.0))
+        if (error := turns(rate, speed) * speed) > BOUND * most:
             yield (
                 f"warning: friction of {name} is Coulomb's beyond {speed:.2g} {unit}/s only, and "
                 f"its rate of up to {most:.2g} {unit}/s may be off by about {error / most:.0%} "
@@ -46,14 +40,7 @@ def coarse(results: Results) -> Iterator[str]:
             )
 
 
-class Turns:
+def turns(rate: Vector, smallest: float) -> int:
     """How often a rate changes its sign, counted once it is beyond `smallest`."""
-
-    def __init__(self, smallest: float) -> None:
-        self._smallest, self._last, self.count = smallest, np.zeros(0), 0
-
-    def add(self, rate: Vector) -> None:
-        """The samples that follow."""
-        signs = np.concatenate([self._last, np.sign(rate[np.abs(rate) > self._smallest])])
-        self.count += int(np.count_nonzero(signs[1:] != signs[:-1]))
-        self._last = signs[-1:]
+    signs = np.sign(rate[np.abs(rate) > smallest])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.base.signal_names import (
     user_of_block,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.read_results import Results, Table
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.recorded_scene import all_devices
 
 
@@ -102,10 +102,8 @@ def _outside(results: Results) -> Iterator[str]:
             )
     for user in _laws(record.scene):
         left = signal_of_user(PASSIVITY_ENERGY, user)
-        least = min(
-            (float(t[left].min()) for t in _tables(results, left) if t and len(t["time"])),
-            default=0.0,
-        )
+        table = of_block(results, left)
+        least = float(table[left].min()) if table and len(table["time"]) else 0.0
         if -least > matters:
             yield (
                 f"warning: the motors of {block_of_user(CONTROLLER, user)} gave "
@@ -138,15 +136,13 @@ def _counts(results: Results) -> Iterator[str]:
     from hapticlink.components.device.encoder_count import count_energies  # casadi
 
     record, devices = results.record, all_devices(results)
-    first = next(results.windows())
     for user, law in _laws(record.scene).items():
         handle = signal_of_user(MEASURED_HANDLE_POSE, user)
-        table, device = of_block(first, handle, 3), devices.get(user)
+        table, device = of_block(results, handle, 3), devices.get(user)
         if table is None or device is None or not len(table["time"]):
             continue
-        damping = signal_of_user(PASSIVITY_DAMPING, user)
-        acted = (t is None or t[damping].any() for t in _tables(results, damping))
-        if not any(acted):
+        damped = of_block(results, damping := signal_of_user(PASSIVITY_DAMPING, user))
+        if damped and not damped[damping].any():
             continue
         period = record.clocks[record.fmus[handle.partition(".")[0]].rate].longest
         count = float(count_energies(device, table[handle][0], period).max())
@@ -158,10 +154,6 @@ def _counts(results: Results) -> Iterator[str]:
                 f"no energy; fewer of them, and with a looser bound, from {key}.passivity.noise="
                 f"{1.1 * count:.2g}"
             )
-
-
-def _tables(results: Results, signal: str) -> Iterator[Table | None]:
-    return (of_block(window, signal) for window in results.windows())
 
 
 def _controller(saturated: Episode) -> str:

@@ -58,13 +58,13 @@ def needed(results: Results, users: Iterable[str]) -> set[str]:
 
 
 def by_block(
-    results: Results, works: Works, time: Vector, stored: Vector, put_in: Mapping[str, Vector]
+    results: Results, works: Works, stored: Vector, put_in: Mapping[str, Vector]
 ) -> dict[str, Vector]:
-    """The energy (J) that each block has generated at the times (s) of a window, those of all
-    users' blocks added up. stored: E - E(0) less the work of hands without a device; put_in: the
+    """The energy (J) that each block has generated at the times of the works, those of all users'
+    blocks added up. stored: E - E(0) less the work of hands without a device; put_in: the
     work of each user's hand on the handle, by the user's name."""
     blocks: dict[str, Vector] = {}
-    shaping, mechanism = np.zeros(len(time)), stored.copy()
+    shaping, mechanism = np.zeros(len(stored)), stored.copy()
 
     def add(name: str, energy: Vector) -> None:
         blocks[name] = blocks.get(name, 0.0) + energy
@@ -72,7 +72,7 @@ def by_block(
     def on(signal: str, position: str) -> tuple[Vector, Vector] | None:
         if of_block(results, signal, 3) is None or of_block(results, position, 3) is None:
             return None
-        return works.of(results, signal, position, time)
+        return works.of(signal, position)
 
     for user, done in put_in.items():
         point, handle = poses(user)
@@ -93,7 +93,7 @@ def by_block(
                 continue
             sign = -1.0 if target.endswith("F_drift") else 1.0
             name = f"{source} -> {target}"
-            held, ideal = works.of(results, source, point, time, sign, name)
+            held, ideal = works.of(source, point, sign, name)
             mechanism = mechanism - held
             if source == signal_of_user(DRIFT_WRENCH, user):
                 add("drift", ideal)

@@ -37,7 +37,6 @@ from hapticlink.orchestrator.base.signal_names import (
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import TABLES, Results
 from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
-from hapticlink.orchestrator.results.windows import last
 from hapticlink.orchestrator.scene.start_pose import outside
 from hapticlink.orchestrator.system.system import Replacement
 
@@ -116,8 +115,8 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
 
 
 def _left(results: Results, margin: str) -> bool:
-    tables = (of_block(window, margin) for window in results.windows())
-    return any(bool((table[margin] < 0).any()) for table in tables if table)
+    table = of_block(results, margin)
+    return table is not None and bool((table[margin] < 0).any())
 
 
 def _tracking(user: str, error: TrackingError) -> str:
@@ -226,7 +225,7 @@ def _passivity(results: Results, measures: Measures) -> Iterator[str]:
 def _stopped(results: Results) -> Iterator[str]:
     """A line if the passive midpoint method had to stop the mechanism, and one if contacts change
     its energy between steps."""
-    table = of_block(last(results), MECHANISM_STOPS)
+    table = of_block(results, MECHANISM_STOPS)
     if table and (results.record.scene["contacts"] or {}).get("detection") == "graphics":
         method = results.record.scene["mechanism"]["integrator"]
         yield (
@@ -375,16 +374,15 @@ LACKED = {
 
 def _lacking(results: Results) -> Iterator[str]:
     """A line for each such output that an FMU in the place of a block does not have."""
-    record, window = results.record, next(results.windows())
+    record = results.record
     for signal, what in LACKED.items():
         name, _, output = signal.partition(".")
-        there = signal in record.not_recorded or of_block(window, signal)
+        there = signal in record.not_recorded or of_block(results, signal)
         if name in record.replaced and not there:
             yield f"{name} has no {output}: {what}"
 
 
-def _start(run: Results) -> Iterator[str]:
-    results = next(run.windows())
+def _start(results: Results) -> Iterator[str]:
     device = of_block(results, WORKSPACE_MARGIN)
     if (
         device

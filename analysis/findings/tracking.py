@@ -3,7 +3,6 @@ graphics copy is folded."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +30,7 @@ class Tracking(NamedTuple):
 def further_users(results: Results) -> list[str]:
     """The points at which users beside the first one hold a device."""
     users = [u for name in results.record.fmus if (u := user_of_block(name, DEVICE))]
-    first = next(results.windows()) if users else results
-    return [u for u in users if all(of_block(first, signal, 3) for signal in poses(u))]
+    return [u for u in users if has_tracking(results, u)]
 
 
 def poses(user: str = "") -> tuple[str, str]:
@@ -61,33 +59,34 @@ def of_any_shape(results: Results, signal: str) -> Table | None:
     return table_of(results, signal)
 
 
-def has_tracking(results: Results) -> bool:
-    return all(of_block(results, signal, 3) for signal in (POINT_POSE, HANDLE_POSE))
+def has_tracking(results: Results, user: str = "") -> bool:
+    """Whether there are the poses of a user's point and handle."""
+    return all(of_block(results, signal, 3) for signal in poses(user))
 
 
 def pose_error(results: Results, user: str = "") -> Tracking:
-    """Tracking error of a user at the mechanism's samples up to the device's last one, those of a
-    window; the handle's pose is interpolated linearly where its clock differs. Raises KeyError
-    without these signals."""
+    """Tracking error of a user at the mechanism's samples up to the device's last one; the handle's
+    pose is interpolated linearly where its clock differs. Raises KeyError without these signals."""
     point, handle = poses(user)
     mechanism, device = of_block(results, point, 3), of_block(results, handle, 3)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {point} and {handle}")
     if not len(device["time"]):  # a fault before the first row
         return Tracking(*np.zeros((3, 0)))
-    rows = until_last(results.within(mechanism["time"]), mechanism, device)
-    time = mechanism["time"][rows]
-    x, y, theta = (
-        mechanism[point][rows, i] - np.interp(time, device["time"], device[handle][:, i])
-        for i in range(3)
-    )
-    return Tracking(time, np.hypot(x, y) * 1e3, np.abs(theta))
+    times, known = device["time"], device[handle]
+
+    def error(time: Vector, place: Vector) -> Vector:
+        x, y, theta = (place[:, i] - np.interp(time, times, known[:, i]) for i in range(3))
+        return np.stack([np.hypot(x, y) * 1e3, np.abs(theta)])
+
+    rows = rows_until(mechanism, times[-1])
+    distance, angle = mechanism.by_row(error, "time", point)
+    return Tracking(mechanism["time"][rows], distance[rows], angle[rows])
 
 
-def until_last(rows: slice, table: Table, other: Table) -> slice:
-    """Rows of a table up to the last one of another."""
-    last = int(np.searchsorted(table["time"], other["time"][-1], "right"))
-    return slice(rows.start, max(rows.start, min(rows.stop, last)))
+def rows_until(table: Table, time: float) -> slice:
+    """The rows of a table up to a time (s)."""
+    return slice(0, int(np.searchsorted(table["time"], time, "right")))
 
 
 def tracking(results: Results) -> tuple[Vector, Vector]:
@@ -97,33 +96,24 @@ def tracking(results: Results) -> tuple[Vector, Vector]:
     return time, distance
 
 
-def constrained(results: Results) -> tuple[Table, str] | None:
-    """The table with the number of constrained directions, at the rate of the block that the
-    controller gets it from, and the signal's name; None where there is none."""
+def constrained(results: Results) -> tuple[Vector, Vector] | None:
+    """Times (s) and numbers of constrained directions, at the rate of the block that the controller
+    gets them from; None where there are none."""
     for signal in CONSTRAINT_COUNTS:
         if table := of_block(results, signal):
-            return table, signal
+            return table["time"], table[signal]
     return None
 
 
-def constraint_counts(windows: Iterable[Results]) -> dict[float, int]:
+def constraint_counts(numbers: Vector) -> dict[float, int]:
     """The samples with each number of constrained directions, by number."""
-    found: dict[float, int] = {}
-    for window in windows:
-        if counted := constrained(window):
-            table, signal = counted
-            numbers = table[signal][window.within(table["time"])]
-            for number, samples in zip(*np.unique(numbers, return_counts=True), strict=True):
-                found[float(number)] = found.get(float(number), 0) + int(samples)
-    return dict(sorted(found.items()))
+    found = zip(*np.unique(numbers, return_counts=True), strict=True)
+    return {float(number): int(samples) for number, samples in found}
 
 
 def folded(results: Results) -> tuple[int, int]:
     """Number of frames in which the graphics copy is on another assembly of its loops than the
     mechanism, and number of all frames; (0, 0) if the run has no such output."""
-    off = frames = 0
-    for window in results.windows():
-        if (table := of_block(window, COPY_BRANCH_OK)) is not None:
-            kept = table[COPY_BRANCH_OK][window.within(table["time"])]
-            off, frames = off + int((kept == 0).sum()), frames + len(kept)
-    return off, frames
+    table = of_block(results, COPY_BRANCH_OK)
+    kept = table[COPY_BRANCH_OK] if table else np.zeros(0)
+    return int((kept == 0).sum()), len(kept)

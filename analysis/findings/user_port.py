@@ -19,9 +19,6 @@ mobility modulates power. It needs the mechanism's own (`mechanism.directions`) 
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,10 +27,16 @@ from hapticlink.analysis.findings.port_blocks import by_block, needed
 from hapticlink.analysis.findings.tracking import (
     further_users,
     of_block,
+    rows_until,
     table_of,
-    until_last,
 )
-from hapticlink.analysis.findings.work_of_wrenches import Works
+from hapticlink.analysis.findings.work_of_wrenches import (
+    Works,
+    absolute_work,
+    last,
+    work_as_held,
+    work_of_source,
+)
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     DEVICE,
@@ -46,6 +49,7 @@ from hapticlink.orchestrator.base.signal_names import (
     MECHANISM_ENERGY,
     MOBILITIES,
     MOTOR_WRENCH,
+    POINT_POSE,
     TOPOLOGY_WRENCH,
     block_of_user,
     signal_of_user,
@@ -90,22 +94,6 @@ class UserPort(NamedTuple):
         )
 
 
-def user_port(results: Results) -> UserPort | None:
-    """The energy at the user's port in the whole run, as `ports`."""
-    found = [port for port in ports(results) if port]
-    if len(found) < 2:
-        return found[0] if found else None
-    *_, last = found
-    return UserPort(
-        np.concatenate([port.time_s for port in found]),
-        np.concatenate([port.put_in_J for port in found]),
-        np.concatenate([port.generated_J for port in found]),
-        {name: np.concatenate([p.blocks_J[name] for p in found]) for name in last.blocks_J},
-        last.works,
-        last.hand_work_J,
-    )
-
-
 def allowed(hand_work: float) -> float:
     """The energy (J) that a rendering may generate where the hand works so much (J)."""
     return max(NOTICEABLE_J, SHARE * hand_work)
@@ -122,8 +110,13 @@ def allowance(hand_work: float) -> str:
 def hand_work(results: Results) -> float:
     """The work (J) of the hands on their handles, its absolute values summed; none of a user whose
     pose or wrench is missing, or has another rate."""
-    works = Works()
-    return deque((_hand_work(window, works) for window in results.windows()), maxlen=1).pop()
+    total = 0.0
+    for user in ("", *further_users(results)):
+        pose, wrench = signal_of_user(HANDLE_POSE, user), signal_of_user(HAND_WRENCH, user)
+        moved = of_block(results, pose, 3)
+        if moved and wrench in moved:
+            total += absolute_work(results, wrench, pose)
+    return total
 
 
 def tolerated(results: Results) -> float:
@@ -131,100 +124,46 @@ def tolerated(results: Results) -> float:
     return allowed(hand_work(results))
 
 
-def _hand_work(window: Results, works: Works) -> float:
-    """The same until the end of a window."""
-    total = 0.0
-    for user in ("", *further_users(window)):
-        pose, wrench = signal_of_user(HANDLE_POSE, user), signal_of_user(HAND_WRENCH, user)
-        moved = of_block(window, pose, 3)
-        if moved and wrench in moved:
-            total += works.absolute(window, wrench, pose)
-    return total
-
-
-def measured(windows: Iterable[UserPort | None]) -> PortEnergy | None:
-    """What run.json says of the energy at the user's port, of the windows of a run."""
-    found: PortEnergy | None = None
-    for port in windows:
-        if port and len(port.time_s):
-            now = port.measured
-            found = now if found is None else _later(found, now)
-    return found
-
-
-def _later(before: PortEnergy, now: PortEnergy) -> PortEnergy:
-    """Of two windows that follow each other."""
-    highest = max(before, now, key=lambda each: each.peak)
-    return replace(
-        now,
-        peak=highest.peak,
-        time_of_peak=highest.time_of_peak,
-        blocks={
-            name: replace(block, peak=max(block.peak, before.blocks[name].peak))
-            for name, block in now.blocks.items()
-        },
-    )
-
-
-def ports(results: Results) -> Iterator[UserPort | None]:
-    """The energy at the user's port, window by window; None without hand, handle and mechanism,
-    where something else than its hand pushes a handle, or where the work of another hand is not
-    recorded. Without all signals that its blocks need there are none."""
-    if results.number == 1:
-        yield _port(results, Works(whole=True), _energy_at_start(results))
-        return
-    works, start = Works(), 0.0
-    for i, window in enumerate(results.windows()):
-        start = _energy_at_start(window) if i == 0 else start
-        if _port(window, works, start) is None:
-            yield from (None for _ in results.windows())
-            return
-    works.again()
-    for window in results.windows():
-        yield _port(window, works, start)
-
-
-def _energy_at_start(window: Results) -> float:
-    mechanism = of_block(window, MECHANISM_ENERGY)
-    energies = mechanism[MECHANISM_ENERGY] if mechanism else np.zeros(0)
-    return float(energies[0]) if len(energies) else 0.0
-
-
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
-def _port(window: Results, works: Works, start: float) -> UserPort | None:
-    mechanism, device = of_block(window, MECHANISM_ENERGY), of_block(window, HANDLE_POSE, 3)
-    if mechanism is None or device is None or of_block(window, HAND_WRENCH, 3) is None:
+def user_port(results: Results) -> UserPort | None:
+    """The energy at the user's port; None without hand, handle and mechanism, where something else
+    than its hand pushes a handle, or where the work of another hand is not recorded. Without all
+    signals that its blocks need there are none."""
+    mechanism, device = of_block(results, MECHANISM_ENERGY), of_block(results, HANDLE_POSE, 3)
+    if mechanism is None or device is None or of_block(results, HAND_WRENCH, 3) is None:
         return None
-    if pushed_by_others(window) or not (len(device["time"]) and len(mechanism["time"])):
+    if pushed_by_others(results) or not (len(device["time"]) and len(mechanism["time"])):
         return None
-    rows = until_last(window.within(mechanism["time"]), mechanism, device)
+    rows = rows_until(mechanism, device["time"][-1])
     time = mechanism["time"][rows]
-    stored = mechanism[MECHANISM_ENERGY][rows] - start
-    put_in = {"": works.of(window, HAND_WRENCH, HANDLE_POSE, time)[0]}
+    works = Works(results, time)
+    stored = mechanism[MECHANISM_ENERGY][rows]
+    stored = stored - float(mechanism[MECHANISM_ENERGY][0])
+    put_in = {"": works.of(HAND_WRENCH, HANDLE_POSE)[0]}
     further = np.zeros(len(time))
-    for name in window.record.connections:
+    for name in results.record.connections:
         hand, _, target = name.partition(" -> ")
         point = target.removesuffix(".F_hand").removeprefix(f"{MECHANISM}.")
         if target != f"{MECHANISM}.{point}.F_hand":
             continue
-        if with_device := block_of_user(DEVICE, point) in window.record.fmus:
+        if with_device := block_of_user(DEVICE, point) in results.record.fmus:
             hand, position = signal_of_user(HAND_WRENCH, point), signal_of_user(HANDLE_POSE, point)
         else:
             position = f"{MECHANISM}.{point}.x"
-        moved, pushing = of_block(window, position, 3), table_of(window, hand)
-        if moved is None or pushing is None or pushing[hand].shape[1:] != (3,):
+        moved, pushing = of_block(results, position, 3), table_of(results, hand)
+        if moved is None or pushing is None or pushing.shape(hand) != (3,):
             return None
-        done = works.of(window, hand, position, time)[0]
+        done = works.of(hand, position)[0]
         if with_device:
             put_in[point] = done
         else:
             further += done
     generated = stored - further - sum(put_in.values())
-    lacks = needed(window, put_in) & {*window.record.not_recorded}
-    blocks = {} if lacks else by_block(window, works, time, stored - further, put_in)
+    lacks = needed(results, put_in) & {*results.record.not_recorded}
+    blocks = {} if lacks else by_block(results, works, stored - further, put_in)
     hands = further + sum(put_in.values())
-    single = _works(window, works, device, time)
-    return UserPort(time, hands, generated, blocks, single, _hand_work(window, works))
+    single = _works(results, works, device, time)
+    return UserPort(time, hands, generated, blocks, single, hand_work(results))
 
 
 def pushed_by_others(results: Results) -> list[str]:
@@ -239,8 +178,8 @@ def pushed_by_others(results: Results) -> list[str]:
 
 
 def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[str, float]:
-    """The works (J) of single wrenches on the handles at the last of the times of a window, those
-    of further users named by their points, and of contacts on the mechanism."""
+    """The works (J) of single wrenches on the handles at the last of some times, those of further
+    users named by their points, and of contacts on the mechanism."""
     signals = {
         "hand": HAND_WRENCH,
         "motors": MOTOR_WRENCH,
@@ -248,21 +187,20 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
         "F_env": ENVIRONMENT_WRENCH,
     }
     found = {
-        f"{user}: {name}" if user else name: _last(works.of(results, signal_name, handle, time)[0])
+        f"{user}: {name}" if user else name: works.last(signal_name, handle)
         for user in ("", *further_users(results))
         for name, signal in signals.items()
         if of_block(results, signal_name := signal_of_user(signal, user), 3)
         and of_block(results, handle := signal_of_user(HANDLE_POSE, user), 3)
     }
     if contact := of_block(results, ENVIRONMENT_WRENCH, 3):
-        found["F_env on the mechanism"] = _last(works.ideal(results, contact, time))
+        force = contact[ENVIRONMENT_WRENCH]
+        done = work_of_source(time, contact, force, contact, POINT_POSE)
+        found["F_env on the mechanism"] = last(done)
     if (added := _held_mobility(results, device)) is not None:
-        found["held mobility"] = _last(works.added(results, added, device, time))
+        done = work_as_held(time, added, device["time"], device, HANDLE_POSE)
+        found["held mobility"] = last(done)
     return found
-
-
-def _last(work: Vector) -> float:
-    return float(work[-1]) if len(work) else 0.0
 
 
 def _held_mobility(results: Results, device: Table) -> Vector | None:
@@ -272,10 +210,14 @@ def _held_mobility(results: Results, device: Table) -> Vector | None:
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
     if not held or own is not device or results.record.holds.get(crossing) != "zoh":
         return None
-    rows = np.searchsorted(held["time"], device["time"] + 1e-12, "right") - 1
-    change = held[MOBILITIES[0]][rows] - device[MOBILITIES[1]]
-    wrench = device[HAND_WRENCH]
-    for signal in (DRIFT_WRENCH, ENVIRONMENT_WRENCH):
-        wrench = wrench + device[signal] if signal in device else wrench
-    added: Vector = np.einsum("kij,kjl,kl->ki", device[HANDLE_INERTIA], change, wrench)
-    return added
+    times, mobility = held["time"], held[MOBILITIES[0]]
+    signals = [s for s in (DRIFT_WRENCH, ENVIRONMENT_WRENCH) if s in device]
+
+    def added(time: Vector, own: Vector, inertia: Vector, hand: Vector, *others: Vector) -> Vector:
+        change = mobility[np.searchsorted(times, time + 1e-12, "right") - 1] - own
+        wrench = sum(others, start=hand)
+        force: Vector = np.einsum("kij,kjl,kl->ki", inertia, change, wrench)
+        return force.T
+
+    asked = "time", MOBILITIES[1], HANDLE_INERTIA, HAND_WRENCH, *signals
+    return np.ascontiguousarray(device.by_row(added, *asked).T)

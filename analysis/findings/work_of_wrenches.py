@@ -1,42 +1,32 @@
-"""The work of wrenches at positions, as they act and as their sources have them, window by window.
-
-Each is a sum over the steps of a run, which goes on in the next window where it was left.
-"""
+"""The work of wrenches at positions over time, as they act and as their sources have them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH, HANDLE_POSE, POINT_POSE
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
-from hapticlink.orchestrator.results.run_record import Energy, RunRecord
+from hapticlink.orchestrator.results.run_record import RunRecord
 from hapticlink.orchestrator.system.latency_and_loss import Link
 
 
-class Arrivals:
-    """When the samples of a connection's source, the rows of a table, were known to its target.
+def arrivals(record: RunRecord, connection: str, table: Table, same_clock: bool) -> Vector:
+    """The times (s) from which the samples of a connection's source, the rows of a table, were
+    known to its target; infinite for lost ones.
 
     The recorded latency, with its seed, gives that of all samples that the link counted as sent.
     Without a link, or where its counts are not those of the samples (rows that are left out, steps
     that are repeated), and in the order of Jacobi, the largest age on one clock is taken for that
-    of each sample.
+    of each sample. same_clock: whether the rows are those of the FMU's clock.
     """
-
-    def __init__(self, record: RunRecord, connection: str, samples: int, same_clock: bool) -> None:
-        """same_clock: whether the rows are those of the FMU's clock."""
-        self._late = _drawn(record, connection, samples)
-        age = record.delays.get(connection) if same_clock else None
-        self._age = age.max if age else 0.0
-
-    def known(self, stamps: Vector, first: int) -> Vector:
-        """The times (s) from which samples, the `first` and those that follow, stamped `stamps`
-        were known; infinite for lost ones."""
-        if self._late is None:
-            return stamps + self._age
-        return stamps + self._late[first : first + len(stamps)]
+    stamps = table["time"]
+    if (late := _drawn(record, connection, len(stamps))) is not None:
+        return stamps + late
+    age = record.delays.get(connection) if same_clock else None
+    return stamps + age.max if age and age.max else stamps
 
 
 def _drawn(record: RunRecord, connection: str, samples: int) -> Vector | None:
@@ -55,241 +45,123 @@ def _drawn(record: RunRecord, connection: str, samples: int) -> Vector | None:
     return np.concatenate([[0.0], late])
 
 
-class Held:
-    """The work (J) of the newest of the forces (n, 3), known from some times on, over the steps of
-    a position. A force that comes after a newer one does not act."""
-
-    def __init__(self) -> None:
-        self._force, self._known = np.zeros((0, 3)), np.zeros(0)
-        self._taken = self._reached = -np.inf
-        self._done: float | None = None
-
-    def at(
-        self,
-        times: Vector,
-        force: Vector,
-        known: Vector,
-        stamps: Vector,
-        path: tuple[Vector, Vector],
-        end: float,
-    ) -> Vector:
-        """The work until the times of a window that ends at `end` (s), along times and places."""
-        new = stamps > self._taken
-        self._force = np.concatenate([self._force, force[new]])
-        self._known = np.concatenate([self._known, known[new]])
-        self._taken = max(self._taken, stamps[-1])
-        time, x = (each[path[0] >= self._reached] for each in path)
-        order = np.argsort(self._known, kind="stable")
-        newest = np.maximum.accumulate(order)
-        rows = np.searchsorted(self._known[order], time + 1e-12, "right") - 1
-        held = self._force[newest[np.maximum(rows[:-1], 0)]]
-        done = _running(self._done, (held * np.diff(x, axis=0)).sum(axis=1))
-        last = max(int(np.searchsorted(time, end, "right")) - 1, 0)
-        self._reached, self._done = time[last], float(done[last])
-        if rows[last] >= 0:
-            acting = newest[rows[last]]
-            self._force, self._known = self._force[acting:], self._known[acting:]
-        return np.interp(times, time, done)
+def _sums(rows: int, steps: Callable[[Table], Vector], table: Table) -> Vector:
+    """The sums of a table's steps between rows up to each of these."""
+    sums, done = np.zeros(rows), 0
+    for block in table.blocks(more=1):
+        found = steps(block)
+        sums[done + 1 : done + 1 + len(found)] = found
+        done += len(found)
+    np.cumsum(sums[1:], out=sums[1:])
+    return sums
 
 
-class Ideal:
-    """The work (J) of forces (n, 3) that are linear in the displacement between their stamps."""
+def work_as_held(
+    times: Vector, force: Vector, known: Vector, moved: Table, position: str
+) -> Vector:
+    """The work (J), until some times (s), of the newest of the forces (n, 3), which are known from
+    some times on, over the steps of a position. A force that comes after a newer one does not
+    act."""
+    order = np.argsort(known, kind="stable")
+    newest = np.maximum.accumulate(order)
+    known = known[order]
 
-    def __init__(self) -> None:
-        self._reached = -np.inf
-        self._done: float | None = None
+    def steps(block: Table) -> Vector:
+        rows = np.searchsorted(known, block["time"][:-1] + 1e-12, "right") - 1
+        held = force[newest[np.maximum(rows, 0)]]
+        work: Vector = (held * np.diff(block[position], axis=0)).sum(axis=1)
+        return work
 
-    def at(
-        self,
-        times: Vector,
-        force: Vector,
-        stamps: Vector,
-        path: tuple[Vector, Vector],
-        end: float,
-    ) -> Vector:
-        """The work until the times of a window that ends at `end` (s), along times and places."""
-        from_here = stamps >= self._reached
-        stamps, force = stamps[from_here], force[from_here]
-        at_stamps = np.stack([np.interp(stamps, path[0], x) for x in path[1].T], axis=1)
-        mean = (force[:-1] + force[1:]) / 2
-        done = _running(self._done, (mean * np.diff(at_stamps, axis=0)).sum(axis=1))
-        last = max(int(np.searchsorted(stamps, end, "right")) - 1, 0)
-        self._reached, self._done = stamps[last], float(done[last])
-        return np.interp(times, stamps, done)
+    return np.interp(times, moved["time"], _sums(len(moved.rows), steps, moved))
 
 
-def _running(before: float | None, steps: Vector) -> Vector:
-    """The sums up to each step; `before`: that of earlier windows."""
-    if before is None:
-        return np.concatenate([[0.0], steps.cumsum()])
-    return np.concatenate([[before], steps]).cumsum()
+def work_of_source(
+    times: Vector, wrench: Table, force: Vector, moved: Table, position: str
+) -> Vector:
+    """The work (J), until some times (s), of forces (n, 3) that are linear in the displacement
+    between their stamps."""
+    path, place = moved["time"], moved[position]
+    stamps, first = wrench["time"], 0
+
+    def steps(block: Table) -> Vector:
+        nonlocal first
+        span = slice(first, first + len(block.rows))
+        first = span.stop - 1
+        at_stamps = np.stack([np.interp(stamps[span], path, x) for x in place.T], axis=1)
+        mean = (force[span][:-1] + force[span][1:]) / 2
+        work: Vector = (mean * np.diff(at_stamps, axis=0)).sum(axis=1)
+        return work
+
+    return np.interp(times, stamps, _sums(len(stamps), steps, wrench))
 
 
-class Passing:
-    """A series changed in proportion to its own path so that it passes `value` at the time `until`,
-    which takes two passes over the windows."""
+def absolute_work(results: Results, signal: str, position: str) -> float:
+    """The absolute values (J) of a wrench's work in the steps of a position of the same rate,
+    summed."""
+    moved = table_of(results, position)
+    assert moved
 
-    def __init__(self, until: float, value: float) -> None:
-        self._until, self._value = until, value
-        self._to, self._reached, self._begin = 0.0, 0.0, 0.0
-        self._before: tuple[float, float] | None = None
+    def steps(block: Table) -> Vector:
+        return np.abs((block[signal][:-1] * np.diff(block[position], axis=0)).sum(axis=1))
 
-    def again(self) -> None:
-        """The second pass begins."""
-        self._before = None
-
-    def path(self, series: Vector, times: Vector) -> Vector:
-        """The path of the series up to the times of a window, among which `until` is."""
-        if self._before is None:
-            self._begin = float(times[0]) if len(times) else 0.0
-            path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
-        else:
-            walked, value = self._before
-            steps = np.abs(np.diff(np.concatenate([[value], series])))
-            path = np.concatenate([[walked], steps]).cumsum()[1:]
-        if len(path):
-            self._before = float(path[-1]), float(series[-1])
-        at = np.flatnonzero(times == self._until)
-        if len(at):
-            self._to, self._reached = float(path[at[0]]), float(series[at[0]])
-        return path
-
-    def changed(self, series: Vector, times: Vector) -> Vector:
-        """The changed series, in the second pass."""
-        path, to = self.path(series, times), self._to
-        if not to:
-            path, to = times - self._begin, max(self._until - self._begin, 1e-300)
-        found: Vector = series + (self._value - self._reached) * path / to
-        return found
+    sums = _sums(len(moved.rows), steps, moved)
+    return float(sums[-1]) if len(sums) else 0.0
 
 
-class Work:
-    """The work (J) of a wrench at a position: as it acts, and that of its source."""
-
-    def __init__(self, arrivals: Arrivals | None, meter: Energy | None, whole: bool) -> None:
-        """whole: the run is one window, so that both passes are made of it."""
-        self._arrivals, self.until = arrivals, meter.until if meter else None
-        ends = (meter.held, meter.ideal) if meter else ()
-        self._passing = [Passing(meter.until, end) for end in ends] if meter else []
-        self._whole = whole
-        self.again(final=False)
-
-    def again(self, final: bool = True) -> None:
-        """The second pass begins."""
-        self._held, self._ideal, self._final = Held(), Ideal(), final
-        for passing in self._passing:
-            passing.again()
-
-    def at(
-        self, times: Vector, force: Vector, table: Table, path: tuple[Vector, Vector], end: float
-    ) -> tuple[Vector, ...]:
-        """Both until the times, which have `until`, of a window that ends at `end` (s)."""
-        stamps = table["time"]
-        known = self._arrivals.known(stamps, table.first) if self._arrivals else stamps
-        both = (
-            self._held.at(times, force, known, stamps, path, end),
-            self._ideal.at(times, force, stamps, path, end),
-        )
-        if not self._passing:
-            return both
-        pairs = [*zip(self._passing, both, strict=True)]
-        if not self._final:
-            for passing, series in pairs:
-                passing.path(series, times)
-            if not self._whole:
-                return both
-            for passing in self._passing:
-                passing.again()
-        return tuple(passing.changed(series, times) for passing, series in pairs)
-
-
-Key = tuple[str, str, float, str | None]
+def _passing(series: Vector, times: Vector, until: float, value: float) -> Vector:
+    """A series changed in proportion to its own path so that it passes `value` at a time that is
+    among its times."""
+    path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
+    at = int(np.searchsorted(times, until))
+    to = float(path[at])
+    if not to:
+        path, to = times - times[0], max(until - float(times[0]), 1e-300)
+    changed: Vector = series + (value - float(series[at])) * path / to
+    return changed
 
 
 class Works:
-    """The works of a run, in two passes over its windows: those of the first, as far as a meter has
-    them, are not those of the meter yet. One pass suffices where the `whole` run is one window."""
+    """The works of a run. `last`: those of wrenches as they act at the last of the times, by signal
+    and position."""
 
-    def __init__(self, whole: bool = False) -> None:
-        self._whole = whole
-        self._of: dict[Key, Work] = {}
-        self._window: Results | None = None
-        self._found: dict[Key, tuple[Vector, Vector]] = {}
-        """Of the window, which several ask for."""
-        self._begin()
-
-    def _begin(self) -> None:
-        self._added, self._contacts = Held(), Ideal()
-        self._absolute: dict[str, float] = {}
-
-    def again(self) -> None:
-        """The second pass begins."""
-        self._window = None
-        self._begin()
-        for each in self._of.values():
-            each.again()
+    def __init__(self, results: Results, times: Vector) -> None:
+        self._results, self._times = results, times
+        self._last: dict[tuple[str, str], float] = {}
 
     def of(
-        self,
-        window: Results,
-        signal: str,
-        position: str,
-        times: Vector,
-        sign: float = 1.0,
-        connection: str | None = None,
+        self, signal: str, position: str, sign: float = 1.0, connection: str | None = None
     ) -> tuple[Vector, Vector]:
-        """The work (J) of a wrench at a position until the times of a window: as it acts, and that
-        of its source. `connection` is that with which it acts; by default one from the signal to
-        the FMU of the position, without which the newest sample acts."""
-        table, moved = table_of(window, signal), table_of(window, position)
+        """The work (J) of a wrench at a position until the times: as it acts, and that of its
+        source. `connection` is that with which it acts; by default one from the signal to the FMU
+        of the position, without which the newest sample acts."""
+        results, times = self._results, self._times
+        table, moved = table_of(results, signal), table_of(results, position)
         if not (table and moved):
             raise KeyError(f"work needs the signals {signal} and {position}")
-        key = signal, position, sign, connection
-        if self._window is not window:
-            self._window, self._found = window, {}
-        if key in self._found:
-            return self._found[key]
-        if (work := self._of.get(key)) is None:
-            work = self._of[key] = _metered(window, key, table, moved, self._whole)
-        until, to = work.until, times
-        if until is not None and window.begin < until <= window.end:
-            # Where the meter stops may be beside or after the times.
-            to, _ = np.unique(np.append(times, until), return_index=True)
-        path = moved["time"], moved[position]
-        found = work.at(to, sign * table[signal], table, path, window.end)
-        acts, source = (each[np.searchsorted(to, times)] for each in found)
-        self._found[key] = acts, source
+        meters, start = results.record.meters, f"{signal} -> {position.partition('.')[0]}."
+        name = connection or next((each for each in meters if each.startswith(start)), None)
+        meter = meters[name] if name else None
+        force = sign * table[signal]
+        known = arrivals(results.record, name, table, table is moved) if name else table["time"]
+        if meter:  # where the meter stops may be between or after the times
+            times = np.unique(np.append(times, meter.until))
+        acts = work_as_held(times, force, known, moved, position)
+        source = work_of_source(times, table, force, moved, position)
+        if meter:
+            asked = np.searchsorted(times, self._times)
+            acts = _passing(acts, times, meter.until, meter.held)[asked]
+            source = _passing(source, times, meter.until, meter.ideal)[asked]
+        if connection is None:
+            self._last[signal, position] = last(acts)
         return acts, source
 
-    def absolute(self, window: Results, signal: str, position: str) -> float:
-        """The absolute values (J) of a wrench's work in the steps of a position of the same rate,
-        summed until the end of a window."""
-        moved = table_of(window, position)
-        assert moved
-        work = (moved[signal][:-1] * np.diff(moved[position], axis=0)).sum(axis=1)
-        steps = np.abs(work[window.within(moved["time"][1:])])
-        total = float(_running(self._absolute.get(signal, 0.0), steps)[-1])
-        self._absolute[signal] = total
-        return total
-
-    def added(self, window: Results, force: Vector, device: Table, times: Vector) -> Vector:
-        """The work (J) of forces at the rows of the device on its handle, without a meter."""
-        stamps = device["time"]
-        path = stamps, device[HANDLE_POSE]
-        return self._added.at(times, force, stamps, stamps, path, window.end)
-
-    def ideal(self, window: Results, contact: Table, times: Vector) -> Vector:
-        """The work (J) of contacts on the operational point, linear in its displacement."""
-        stamps = contact["time"]
-        path = stamps, contact[POINT_POSE]
-        return self._contacts.at(times, contact[ENVIRONMENT_WRENCH], stamps, path, window.end)
+    def last(self, signal: str, position: str) -> float:
+        """The work (J) of a wrench, as it acts, at the last of the times."""
+        if (signal, position) not in self._last:
+            self.of(signal, position)
+        return self._last[signal, position]
 
 
-def _metered(window: Results, key: Key, table: Table, moved: Table, whole: bool) -> Work:
-    signal, position, _, connection = key
-    meters, start = window.record.meters, f"{signal} -> {position.partition('.')[0]}."
-    name = connection or next((each for each in meters if each.startswith(start)), None)
-    if name is None:
-        return Work(None, None, whole)
-    arrivals = Arrivals(window.record, name, table.total, table is moved)
-    return Work(arrivals, meters[name], whole)
+def last(work: Vector) -> float:
+    """The last of a series, 0 of an empty one."""
+    return float(work[-1]) if len(work) else 0.0

@@ -31,7 +31,7 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results.read_results import Results, Table, load
+from hapticlink.orchestrator.results.read_results import Results, Table, read_into_memory
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.timeline import timeline
@@ -114,7 +114,7 @@ def simulated(scene: str | Path | Scene, options: Options = ()) -> Results:
         experiment = simulate(scene, room, options, csv=False)
         if not experiment.outcome.published:
             raise InputFault(f"the scene's own run fails: {experiment.outcome.fault}")
-        return load(room, binary=True)
+        return read_into_memory(experiment.results)
 
 
 def fault_of(run: Results) -> str:

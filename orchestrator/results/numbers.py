@@ -1,17 +1,8 @@
-"""Numbers of a run as messages, tables and figures write them."""
+"""Numbers as messages, tables and figures write them."""
 
 from __future__ import annotations
 
 import numpy as np
-
-from hapticlink.orchestrator.results.read_results import Results
-from hapticlink.orchestrator.results.windows import last
-
-
-def last_time(results: Results) -> float:
-    """The time (s) of the last row of the first table that has any."""
-    rows = (table["time"] for table in last(results).tables.values())
-    return next((float(times[-1]) for times in rows if len(times)), 0.0)
 
 
 def short(value: float) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -18,11 +18,16 @@ from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.results import binary_rows, run_record
+from hapticlink.orchestrator.results import rows_file, run_record
+from hapticlink.orchestrator.results.rows_file import RowsFile
 from hapticlink.orchestrator.results.run_record import RunRecord
 
-TABLES = (".csv", binary_rows.SUFFIX)
+TABLES = (".csv", rows_file.SUFFIX)
 """Endings of the names of tables."""
+IN_MEMORY = 1 << 24
+"""Bytes of the rows of a table, above which they stay in their file."""
+BLOCK = 1 << 15
+"""Rows of a long run that are in memory at a time."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -31,24 +36,50 @@ class Table(Mapping[str, Vector]):
     `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m), by their indices,
     whichever column comes first; entries with gaps between them into (rows, k). The full name of a
     column gives that column, (rows,). Raises KeyError for an unknown name. `others` are the tables
-    of the same run, for that message. Rows of a window begin with the `first` of `of` in all.
+    of the same run, for that message. `rows` of a long run are in their file.
     """
 
     columns: tuple[str, ...]
-    rows: Vector
+    rows: Vector | RowsFile
     others: Mapping[str, Table] = field(default_factory=dict)
-    first: int = 0
-    of: int | None = None
 
     def __getitem__(self, name: str) -> Vector:
         if (place := self._places.get(name)) is not None:
-            return self.rows[:, place]
+            return self._read(place) if place else self._time
         if name not in self._arrays:
             there = [other for other, table in self.others.items() if name in table]
             hint = f"; it is in tables[{there[0]!r}]" if there else ""
             raise KeyError(f"no signal {name!r}{hint}; there are {', '.join(self.columns)}")
         places, shape = self._arrays[name]
-        return self.rows[:, places].reshape(-1, *shape)
+        return self._read(places).reshape(-1, *shape)
+
+    @cached_property
+    def _time(self) -> Vector:
+        return self._read(0)
+
+    def _read(self, places: int | Sequence[int]) -> Vector:
+        """Columns; of a file copies, which take less memory than the rows that are mapped."""
+        if not isinstance(self.rows, RowsFile):
+            return self.rows[:, places]
+        found = np.empty((*np.shape(places), len(self.rows))).T
+        for first in range(0, len(found), BLOCK):
+            span = slice(first, first + BLOCK)
+            found[span] = self.rows[span][:, places]
+        return found
+
+    def blocks(self, more: int = 0) -> Iterator[Table]:
+        """The table, or that of a long run in blocks of rows, each with `more` rows of the next."""
+        if not isinstance(self.rows, RowsFile):
+            yield self
+            return
+        for first in range(0, len(self.rows) - more, BLOCK):
+            yield Table(self.columns, self.rows[first : first + BLOCK + more])
+
+    def by_row(self, of_rows: Callable[..., Vector], *names: str) -> Vector:
+        """What a function gives for the rows of signals, (k, ...) -> (k,) or (n, k). Of a long run
+        only the result is in memory."""
+        parts = [of_rows(*(block[name] for name in names)) for block in self.blocks()]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
 
     def shape(self, name: str) -> tuple[int, ...]:
         """The shape of a sample of a signal, which is here."""
@@ -78,11 +109,6 @@ class Table(Mapping[str, Vector]):
     def __len__(self) -> int:
         return len(self.columns)
 
-    @property
-    def total(self) -> int:
-        """The number of rows of the whole run."""
-        return len(self.rows) if self.of is None else self.of
-
     def __repr__(self) -> str:
         return fill(f"{len(self.rows)} rows of {', '.join(self.signals)}", 100)
 
@@ -105,31 +131,16 @@ def _shape(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
 @dataclass(frozen=True, eq=False)
 class Results:
     """The results of a run: `run` is run.json, `tables` the CSVs by rate; `folder` is None if it
-    was run in memory. Where they are a window of the run, the rows of `begin` < time <= `end` (s)
-    are meant, and those beside them are for interpolation."""
+    was run in memory."""
 
     folder: Path | None
     run: dict[str, Any]
     tables: Mapping[str, Table]
-    begin: float = -math.inf
-    end: float = math.inf
 
     @property
-    def number(self) -> int:
-        """The number of `windows`."""
-        return 1
-
-    def windows(self) -> Iterator[Results]:
-        """The windows of time that follow each other, of which these results consist: themselves,
-        but of a run that is too long to be read at once."""
-        yield self
-
-    def within(self, times: Vector) -> slice:
-        """The rows of ordered times (s) that are meant."""
-        return slice(
-            int(np.searchsorted(times, self.begin, "right")),
-            int(np.searchsorted(times, self.end, "right")),
-        )
+    def last_time(self) -> float:
+        """The time (s) of the last row of the first table that has any."""
+        return next((float(t["time"][-1]) for t in self.tables.values() if len(t.rows)), 0.0)
 
     def has_rows_of(self, other: Results) -> bool:
         """Whether both recorded the same signals with the same numbers."""
@@ -156,60 +167,63 @@ class Results:
         return self.tables["graphics"]
 
 
-def described(results: Results, record: RunRecord) -> Results:
+def with_record(results: Results, record: RunRecord) -> Results:
     """Results whose `record` is known without reading it from `run`."""
     vars(results)["record"] = record
     return results
 
 
-def size(folder: Path, run: Mapping[str, Any], binary: bool = False) -> int:
-    """Bytes of a run's tables, `binary` where they are there so."""
-    tables = (folder / name for name in run["files"] if name.endswith(TABLES))
-    return sum(_place(path, binary).stat().st_size for path in tables)
-
-
-def _place(path: Path, binary: bool = False) -> Path:
-    """Where a table is: a CSV, or what it is made of where the run was killed, or where that is
-    wanted (`binary`) and still there."""
-    left = path.with_suffix(binary_rows.SUFFIX)
-    return left if left.exists() and (binary or not path.exists()) else path
-
-
 class FolderTables(Mapping[str, Table]):
-    """The tables of a run's folder by rate, each read when it is asked for and kept then. `binary`:
-    from the rows where they are still there."""
+    """The tables of a run's folder by rate, each read when it is asked for and kept then."""
 
-    def __init__(
-        self, folder: Path, rates: Sequence[str], files: Sequence[str], binary: bool = False
-    ) -> None:
-        self._folder, self._rates, self._files, self._binary = folder, rates, files, binary
+    def __init__(self, folder: Path, record: RunRecord, from_rows: bool = False) -> None:
+        """from_rows: from the rows where they are still there, long ones without reading them."""
+        self._folder, self._record, self._from_rows = folder, record, from_rows
         self._read: dict[str, Table] = {}
 
     def __getitem__(self, rate: str) -> Table:
-        if rate not in self._rates:
+        if rate not in self._record.rates:
             raise KeyError(rate)
         if rate not in self._read:
-            there = recorded(rate, self._files)
+            there = any(rate + suffix in self._record.files for suffix in TABLES)
             path = self._folder / f"{rate}.csv"
-            self._read[rate] = read_table(path, self, self._binary) if there else empty(self)
+            read = read_table(path, self, self._from_rows) if there else None
+            self._read[rate] = read or Table(("time",), np.zeros((0, 1)), self)
         return self._read[rate]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._rates)
+        return iter(self._record.rates)
 
     def __len__(self) -> int:
-        return len(self._rates)
+        return len(self._record.rates)
 
 
-def load(folder: Path | str, binary: bool = False, record: RunRecord | None = None) -> Results:
-    """Reads a run's folder; `binary`: from the rows where they are still there. record: the content
-    of its run.json, where it is known. Raises InputFault if it contains no run, one of another
-    version, or one that was changed."""
+def load(folder: Path | str, from_rows: bool = False, record: RunRecord | None = None) -> Results:
+    """Reads a run's folder; `from_rows`: from the rows where they are still there. record: the
+    content of its run.json, where it is known. Raises InputFault if it contains no run, one of
+    another version, or one that was changed."""
     folder = Path(folder)
     run = run_json(folder)
     record = record or run_record.read(run, folder)
-    tables = FolderTables(folder, record.rates, record.files, binary)
-    return described(Results(folder, run, dict(tables)), record)
+    tables = FolderTables(folder, record, from_rows)
+    return with_record(Results(folder, run, dict(tables)), record)
+
+
+def read_into_memory(results: Results) -> Results:
+    """Results whose files are no longer needed."""
+    tables = {
+        name: replace(table, rows=table.rows.read()) if isinstance(table.rows, RowsFile) else table
+        for name, table in results.tables.items()
+    }
+    return with_record(replace(results, tables=tables), results.record)
+
+
+def without_rows(results: Results) -> Mapping[str, Table]:
+    """The tables of results whose rows are removed: those in memory, of a long run its CSVs."""
+    if any(isinstance(table.rows, RowsFile) for table in results.tables.values()):
+        assert results.folder
+        return FolderTables(results.folder, results.record)
+    return results.tables
 
 
 def run_json(folder: Path) -> dict[str, Any]:
@@ -221,62 +235,48 @@ def run_json(folder: Path) -> dict[str, Any]:
     return content
 
 
-def recorded(rate: str, files: Sequence[str]) -> bool:
-    """Whether a rate has a table among the files of a run."""
-    return any(rate + suffix in files for suffix in TABLES)
-
-
-def empty(others: Mapping[str, Table]) -> Table:
-    """The table of a rate of which nothing is recorded."""
-    return Table(("time",), np.zeros((0, 1)), others)
-
-
 def read_table(
-    path: Path, others: Mapping[str, Table] | None = None, binary: bool = False
+    path: Path, others: Mapping[str, Table] | None = None, from_rows: bool = False
 ) -> Table:
-    """Reads one CSV of a run, or its rows where the run was killed; `others` are the run's other
-    tables. Raises InputFault for a table that is not as a run writes it."""
-    if (place := _place(path, binary)) != path:
-        _require_file(place)
-        written = binary_rows.Written(place)
-        return Table(written.columns, written[:], {} if others is None else others)
-    (columns, values), *_ = csv_parts(path)
-    return Table(columns, values, {} if others is None else others)
+    """Reads one CSV of a run, or its rows where the run was killed, or where these are wanted and
+    there; `others` are the run's other tables. Raises InputFault for a table that is not as a run
+    writes it."""
+    others = {} if others is None else others
+    rows = path.with_suffix(rows_file.SUFFIX)
+    if not rows.exists() or (path.exists() and not from_rows):
+        return Table(*_read_csv(path), others)
+    _require_file(rows)
+    written = RowsFile(rows)
+    return Table(written.columns, written if written.size > IN_MEMORY else written.read(), others)
 
 
-def csv_parts(path: Path, most: int | None = None) -> Iterator[tuple[tuple[str, ...], Vector]]:
-    """The columns of a CSV of a run, with its rows, or with those of about `most` bytes as doubles
-    at a time. Raises InputFault for a table that is not as a run writes it."""
+def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector]:
+    """The columns of a CSV of a run, and its rows."""
     _require_file(path)
-    line, last = 2, -math.inf
     try:
         with path.open(encoding="utf-8", newline="") as file:
             columns = tuple(next(csv.reader([file.readline()])))
             if columns[:1] != ("time",):
                 why = f"its first column is {columns[0] if columns else ''!r}, not 'time'"
                 raise InputFault(f"{path}: line 1: {why}: run the scene again")
-            count = most and max(most // (8 * len(columns)), 1)
-            while first := file.readline():
-                # The text of all lines would take twice what they take.
-                lines = chain([first], islice(file, count and count - 1))
-                values = np.loadtxt(lines, delimiter=",", ndmin=2)
-                if values.shape[1] != len(columns):
-                    raise ValueError
-                ordered = np.diff(values[:, 0], prepend=last) >= 0
-                if not ordered.all():
-                    late = int(ordered.argmin())
-                    why = f"time = {values[late, 0]:g} s is before that of the line above"
-                    raise InputFault(f"{path}: line {line + late}: {why}: run the scene again")
-                yield columns, values
-                line, last = line + len(values), values[-1, 0]
-            if line == 2:
-                yield columns, np.zeros((0, len(columns)))
+            if not (first := file.readline()):
+                return columns, np.zeros((0, len(columns)))
+            # The text of all lines would take twice what they take.
+            values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2)
+        if values.shape[1] != len(columns):
+            raise ValueError
     except OSError as error:
         raise InputFault(f"{path}: {error.strerror}: run the scene again") from error
     except csv.Error as error:  # a line without end
         raise InputFault(f"{path}: {error}: run the scene again") from error
     except ValueError as error:
         raise InputFault(f"{path}: {_malformed(path) or error}: run the scene again") from error
+    ordered = np.diff(values[:, 0], prepend=-math.inf) >= 0
+    if not ordered.all():
+        late = int(ordered.argmin())
+        why = f"time = {values[late, 0]:g} s is before that of the line above"
+        raise InputFault(f"{path}: line {late + 2}: {why}: run the scene again")
+    return columns, values
 
 
 def _require_file(path: Path) -> None:

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 from hapticlink.orchestrator.base import temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.results import binary_rows, folder_lock
-from hapticlink.orchestrator.results.numbers import last_time
+from hapticlink.orchestrator.results import folder_lock, rows_file
 from hapticlink.orchestrator.results.read_results import load
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.write_files import make_csv, remove_rows, write_json
@@ -19,11 +18,10 @@ KILLED = "the process of the run was killed"
 
 
 class Recovered(NamedTuple):
-    """Rows of a table, the time of the last one (s), and rows that were written in part only."""
+    """Rows of a table, and the time of the last one (s)."""
 
     rows: int
     time: float
-    lost: int
 
 
 def recover(
@@ -44,14 +42,13 @@ def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
     recovered = {}
     for name in record.rates:
         table = folder / f"{name}.csv"
-        if (source := table.with_suffix(binary_rows.SUFFIX)).is_file():
-            written = binary_rows.Written(source)
-            count, last = make_csv(table), written.time(len(written) - 1)
-            recovered[name] = Recovered(count, last, int(written.torn))
+        if table.with_suffix(rows_file.SUFFIX).is_file():
+            rows = make_csv(table)
+            recovered[name] = Recovered(len(rows), float(rows[len(rows) - 1 :][0, 0]))
             remove_rows(table)
     changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
     if record.end.process is not None:
-        last = last_time(load(folder))  # its tables may be whole: an FMU may crash at its end
+        last = load(folder).last_time  # its tables may be whole: an FMU may crash at its end
         changes["end"] = {"reason": "fault", "time": last}
         changes["fault"] = {"kind": kind, "time": last, "message": message}
     if recovered or record.end.process is not None:

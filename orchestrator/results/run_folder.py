@@ -12,7 +12,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt, text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
-from hapticlink.orchestrator.results import binary_rows
+from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_record import (
     End,
     RecordedFault,
@@ -89,9 +89,9 @@ class RunFolder(RunResults):
         OSError if the disk is full."""
         if not self.published and not _has_rows(self.folder):
             for clock, names in columns.items():
-                name = f"{clock}.csv" if self._csv else f"{clock}{binary_rows.SUFFIX}"
-                with atomic_file(self.folder / name) as empty:
-                    empty.write_bytes(binary_rows.header(("time", *names)))
+                suffix = ".csv" if self._csv else rows_file.SUFFIX
+                with atomic_file(self.folder / f"{clock}{suffix}") as empty:
+                    rows_file.write_empty(empty, ("time", *names), self._csv)
             self.published = True
         if self.published:
             write_json(self.folder / RUN, self._setup | content(ending))
@@ -108,8 +108,6 @@ class RunFolder(RunResults):
     def _interrupted(self) -> None:
         self._broken_off("interrupted", Interrupted(self.last))
         for recorder in self._recorders.values():
-            with suppress(OSError):
-                recorder.flush()
             recorder.__exit__()
 
     def _broken_off(self, reason: str, error: BaseException) -> None:
@@ -127,7 +125,7 @@ class RunFolder(RunResults):
 def _has_rows(folder: Path) -> bool:
     """Whether an earlier run in `folder` has a row behind the header of a table."""
     for name in _listed(folder):
-        if name.endswith((".csv", binary_rows.SUFFIX)):
+        if name.endswith((".csv", rows_file.SUFFIX)):
             path = folder / name
             with suppress(OSError):
                 if path.is_file() and _is_longer_than_a_line(path):
@@ -142,19 +140,13 @@ def _is_longer_than_a_line(path: Path) -> bool:
 
 def _listed(folder: Path) -> set[str]:
     """The files that the run.json of an earlier run lists, without paths outside of `folder`, and
-    the rows and blocks that a run leaves that was killed."""
+    the rows that a run leaves that was killed."""
     try:
         names = text_files.read_json(folder / RUN).get("files", ())
         texts = (n for n in names if isinstance(n, str) and "\0" not in n)
         files = {n for n in texts if n != ".." and Path(n).name == n}
     except (InputFault, AttributeError, TypeError):
         return set()
-    tables = (folder / n for n in files if n.endswith((".csv", binary_rows.SUFFIX)))
+    rows = {Path(n).with_suffix(rows_file.SUFFIX).name for n in files if n.endswith(".csv")}
     files = {n for n in files if not (folder / n).is_dir() or (folder / n).is_symlink()}
-    left = [
-        f
-        for t in tables
-        for f in (t.with_suffix(binary_rows.SUFFIX), *binary_rows.blocks(t))
-        if f.exists()
-    ]
-    return files | {f.name for f in left}
+    return files | {name for name in rows if (folder / name).exists()}

@@ -9,20 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.results import binary_rows
 from hapticlink.orchestrator.results.read_results import Table
 
 
 class Recorder:
     """Records rows of a table: `time` and those `values` whose places the columns `recorded` name,
-    at every `every`-th call of `row`, and at the one numbered `end`, from 0 on; where `recorded` is
-    None there is no table, and rows are counted only. `first` is called after the first row. A
-    context manager.
+    at every `every`-th call of `row`, and at the one numbered `end`, the last one, from 0 on; where
+    `recorded` is None there is no table, and rows are counted only. `first` is called after the
+    first row. A context manager.
 
-    block: the newest rows, which `flush` moves to `parts`. `view` is `values` at `places` where
-    these are side by side, else None. `due`: whether the next row is written. `room`: of the block,
-    0 until the first row is. `count`: rows so far, written or not. `reached`: time of the newest
-    (s). They are shared with the compiled loop.
+    rows: of the whole run, of which `filled` are written. `view` is `values` at `places` where
+    these are side by side, else None. `due`: whether the next row is written. `room`: the rows that
+    may be filled, 0 until the first row is. `count`: rows so far, written or not. `reached`: time
+    of the newest (s). They are shared with the compiled loop.
     """
 
     files: tuple[str, ...] = ()
@@ -35,18 +34,21 @@ class Recorder:
         first: Callable[[], object],
         every: int = 1,
         end: int = 0,
-        block: binary_rows.Block | None = None,
     ) -> None:
         places = [*(recorded or {}).values()]
         self.values, self.places = values, np.array(places, np.int64)
         self.every, self.end = every, end
-        self.columns, self.parts = ("time", *(recorded or ())), list[Vector]()
+        self.columns = ("time", *(recorded or ()))
         span = slice(places[0], places[-1] + 1) if places else slice(0)
         self.view = values[span] if places == [*range(len(values))[span]] else None
         self._first = first
         self.due, self.room, self.count = (ctypes.c_int64(n) for n in (1, 0, 0))
         self.reached = ctypes.c_double()
-        self.block = block
+        self.rows, self.filled = self._new_rows(recorded is not None, end // every + 2)
+
+    def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
+        """Room for the rows of the whole run, and the number of those that are written."""
+        return np.empty((most, len(self.columns))) if recorded else None, ctypes.c_int64()
 
     @property
     def last(self) -> float | None:
@@ -55,25 +57,21 @@ class Recorder:
 
     def row(self, time: float) -> None:
         """Write a row at `time` (s). Raises OSError, as on a full disk."""
-        if self.due.value and self.block:
-            filled, rows = self.block.filled, self.block.rows
-            if filled.value == len(rows):
-                self.flush()
-            row = rows[filled.value]
+        if self.due.value and self.rows is not None:
+            self._make_room()
+            row = self.rows[self.filled.value]
             row[0], row[1:] = time, self.values[self.places] if self.view is None else self.view
-            filled.value += 1
+            self.filled.value += 1
         self.reached.value = time
         self.count.value += 1
         self.due.value = self.count.value % self.every == 0 or self.count.value == self.end
         if self.count.value == 1:
             self._first()
-            self.room.value = len(self.block.rows) if self.block else 1
+            self.room.value = self._make_room()
 
-    def flush(self) -> None:
-        """Make room in the block for further rows."""
-        if self.block and self.block.filled.value:
-            self.parts.append(self.block.rows[: self.block.filled.value].copy())
-            self.block.filled.value = 0
+    def _make_room(self) -> int:
+        """The number of rows that may be filled, more than are."""
+        return 1 if self.rows is None else len(self.rows)
 
     def publish(self) -> None:
         """Replace the table of an earlier run by this one."""
@@ -111,13 +109,7 @@ class RunResults:
     def _new(
         self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int, end: int
     ) -> Recorder:
-        block = None if recorded is None else binary_rows.Block(1 + len(recorded))
-        return Recorder(recorded, values, self._publish, every, end, block)
-
-    def flush(self) -> None:
-        """Move the rows of all clocks out of their blocks. Raises OSError, as on a full disk."""
-        for recorder in self._recorders.values():
-            recorder.flush()
+        return Recorder(recorded, values, self._publish, every, end)
 
     def finish(self) -> None:
         """Make the CSVs of all clocks. Raises OSError, as on a full disk; the rows can be read
@@ -139,8 +131,9 @@ class RunResults:
 
     def tables(self) -> dict[str, Table]:
         """The tables by clock."""
-        self.flush()
         return {
-            clock: Table(r.columns, np.concatenate([np.zeros((0, len(r.columns))), *r.parts]))
+            clock: Table(
+                r.columns, np.zeros((0, 1)) if r.rows is None else r.rows[: r.filled.value]
+            )
             for clock, r in self._recorders.items()
         }

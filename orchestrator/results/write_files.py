@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.results import binary_rows
+from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_results import Recorder
 
 
 class FileRecorder(Recorder):
-    """Writes a table to files: rows are kept in a block, which a crash of the process leaves
-    (`binary_rows.FileBlock`), and go to a file of doubles beside it, of which `finish` makes the
-    CSV.
-    `first` has to call `publish`, which moves that file to its place, `target`.
+    """Writes a table to a file of rows, of which `finish` makes the CSV `path`. `first` has to call
+    `publish`, which moves that file to its place, `target`.
+
+    Raises OSError, as on a full disk.
     """
 
     def __init__(
@@ -31,86 +31,64 @@ class FileRecorder(Recorder):
         every: int = 1,
         end: int = 0,
     ) -> None:
-        super().__init__(recorded, values, first, every, end)
-        self.path, self.target = path, path.with_suffix(binary_rows.SUFFIX)
-        self._full: float | None = None
-        self._file: BinaryIO | None = None
-        if recorded is None:
-            return
-        self.block: binary_rows.FileBlock = binary_rows.FileBlock(path, len(self.columns))
-        self.files = (self.target.name, self.block.path.name)
+        self.path, self.target = path, path.with_suffix(rows_file.SUFFIX)
         self._unfinished = path.with_name(f".{self.target.name}.{os.getpid()}")
+        self._file: rows_file.RowsBeingWritten | None = None
+        self._full = False
+        super().__init__(recorded, values, first, every, end)
+
+    def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
+        if not recorded:
+            return super()._new_rows(recorded, most)
+        self.files = (self.target.name,)
         self._unfinished.unlink(missing_ok=True)
-        self._file = self._unfinished.open("xb", buffering=0)  # never through a link
-        try:
-            self._write(binary_rows.header(self.columns))
-        except OSError:
-            self.__exit__()
-            raise
+        self._file = rows_file.RowsBeingWritten(self._unfinished, self.columns, most)
+        return self._file.rows, self._file.filled
 
     @property
     def last(self) -> float | None:
-        """As of all recorders, of the last row on the disk where that is full."""
-        return super().last if self._full is None else self._full
+        """As of all recorders, of the last row in the file where the disk is full."""
+        if self._full and self.rows is not None and self.filled.value:
+            return float(self.rows[self.filled.value - 1, 0])
+        return super().last
 
-    def flush(self) -> None:
-        """Write the rows of the block. Raises OSError, as on a full disk, after those that fit."""
-        if not self._file or not (filled := self.block.filled.value):
-            return
-        kept = self.block.rows[:filled]
-        try:
-            self._write(kept.data.cast("B"))
-        except OSError:
-            for row in kept:
-                self._write(row.tobytes())
-                self._full = float(row[0])
-        finally:
-            self.block.filled.value = 0
+    def _make_room(self) -> int:
+        if self._file is None:
+            return super()._make_room()
+        if self.filled.value == self._file.reserved:
+            self._full = True
+            self._file.reserve()
+            self._full = False
+        if self.room.value:
+            self.room.value = self._file.reserved
+        return self._file.reserved
 
     def publish(self) -> None:
         if self._file:
-            self._file.close()  # Windows moves no open file
             os.replace(self._unfinished, self.target)
-            self._file = self.target.open("ab", buffering=0)
 
     def finish(self) -> None:
         if self._file and self.last is not None:
-            self._file.close()
             make_csv(self.path)
-
-    def _write(self, content: bytes | memoryview) -> None:
-        """Write all of `content`; or nothing, raising OSError, where the disk is full."""
-        assert self._file
-        whole = os.fstat(self._file.fileno()).st_size
-        try:
-            left = memoryview(content)
-            while left:
-                left = left[self._file.write(left) :]
-        except OSError:
-            with suppress(OSError):  # a device, such as /dev/full, has no length
-                self._file.truncate(whole)
-            raise
 
     def __exit__(self, *_: object) -> None:
         if self._file:
             self._file.close()
             self._unfinished.unlink(missing_ok=True)
-            self.block.close()
 
 
-def make_csv(path: Path) -> int:
-    """Make the CSV `path` of its rows, which stay; their number. Raises OSError, as on a full
+def make_csv(path: Path) -> rows_file.RowsFile:
+    """Make the CSV `path` of its rows, which stay and are returned. Raises OSError, as on a full
     disk."""
-    source = path.with_suffix(binary_rows.SUFFIX)
+    table = rows_file.RowsFile(path.with_suffix(rows_file.SUFFIX))
     with atomic_file(path) as unfinished, unfinished.open("xb") as file:
-        count = binary_rows.write_csv(source, file)
-    return count
+        rows_file.write_csv(table, file)
+    return table
 
 
 def remove_rows(path: Path) -> None:
     """Remove the rows of which the CSV `path` was made."""
-    for left in (path.with_suffix(binary_rows.SUFFIX), *binary_rows.blocks(path)):
-        left.unlink(missing_ok=True)
+    path.with_suffix(rows_file.SUFFIX).unlink(missing_ok=True)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

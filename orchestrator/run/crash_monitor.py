@@ -56,7 +56,6 @@ def _guard() -> Callable[[int], object]:
 def record_crash(folder: Path, process: int) -> None:
     """Records in run.json that the run with the given process ID has crashed, and removes its
     temporary folders. Without a row of that run, only prints a message."""
-    from hapticlink.orchestrator.results.numbers import last_time
     from hapticlink.orchestrator.results.read_results import load
     from hapticlink.orchestrator.results.recover import recover
 
@@ -68,12 +67,10 @@ def record_crash(folder: Path, process: int) -> None:
         "the run names the one that crashes"
     )
     if _process(folder) != process:  # the crashed run has written no row
-        for block in folder.glob(f".*.{process}.block"):
-            block.unlink()
         print(f"hapticlink: the process ended before its first row; {remedy}", file=sys.stderr)
         return
     results = load(folder)
-    message = f"the process of the run ended after t = {last_time(results)!r} s; {remedy}"
+    message = f"the process of the run ended after t = {results.last_time!r} s; {remedy}"
     recover(folder, "Crash", message, ended=True)
     print(f"hapticlink: {message}; results are in {folder}", file=sys.stderr)
 

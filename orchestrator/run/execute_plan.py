@@ -166,7 +166,6 @@ def _run_events(
         with interpreter_state.restored():  # tables are written with all the depth that there is
             loop.run(turn)
     finally:
-        results.flush()
         outcome.wall_time = perf_counter() - begin
         results.finish()
         outcome.table_time = perf_counter() - begin - outcome.wall_time

@@ -96,14 +96,15 @@ class Simulation(LoadedFmus):
                 if fmu.clock == clock.name:
                     self.instances[fmu.name].due = recorder.due
         for side in self.sides:
-            self.arrivals[side] = self._beside(f"{side}_{SAMPLES}", COLUMNS)
+            self.arrivals[side] = self._beside(side, f"{side}_{SAMPLES}", COLUMNS)
         for name in self.remote if self.pace else ():
-            self.frames[name] = self._beside(f"{name}_{FRAMES}", FRAME)
+            self.frames[name] = self._beside(self.beside[name], f"{name}_{FRAMES}", FRAME)
 
-    def _beside(self, name: str, columns: Sequence[str]) -> Recorder:
+    def _beside(self, clock: str, name: str, columns: Sequence[str]) -> Recorder:
         """A table of what runs beside the loop; its row of t = 0 is there at once."""
         recorded = {column: i for i, column in enumerate(columns)}
-        recorder = self._results.recorder(name, recorded, np.zeros(len(columns)))
+        most = self.system.timeline.points(self.system.timeline.clock(clock))
+        recorder = self._results.recorder(name, recorded, np.zeros(len(columns)), end=most)
         self._stack.enter_context(recorder)
         recorder.row(0.0)
         return recorder

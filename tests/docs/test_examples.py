@@ -64,7 +64,6 @@ NOT_RUN = {
     "hapticlink bench stress": "is long; its short form: tests/reference/test_stress.py",
     "hapticlink fit shaken.csv": "of a log of one's own; tests/analysis/fit",
     "hapticlink report runs/closed-loop": "of a run that is shorter here, elsewhere; replay.md",
-    "hapticlink export-results runs/closed-loop --to parquet": "as its report; export-results.md",
     "hapticlink compare runs/closed-loop "
     "runs/closed-loop,graphics.rate=10,controller.topology=false": "as its runs; replay.md",
     "hapticlink stability held.toml --equilibrium "

@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.base.terminal_output import aligned
-from hapticlink.orchestrator.results.numbers import last_time, short
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.compare.settings import one_mechanism
 
@@ -35,7 +35,7 @@ class Row(NamedTuple):
 def sections(runs: Sequence[Results]) -> dict[str, list[Row]]:
     """Rows by the question that they answer. Paths and forces are compared until the first end of
     the runs."""
-    ends = {last_time(run) for run in runs}
+    ends = {run.last_time for run in runs}
     until = min(ends)
     performance = f"{PERFORMANCE}, all until {short(until)} s" if len(ends) > 1 else PERFORMANCE
     measures = [Measures(run, until) for run in runs]
@@ -136,7 +136,7 @@ def _timing(run: Results) -> Numbers:
     record = run.record
     if wall_time := record.timings.run:
         yield "run time (s)", short(wall_time)
-        yield "times real time", short(last_time(run) / wall_time)
+        yield "times real time", short(run.last_time / wall_time)
     for name, age in record.delays.items():
         if age.max > 0:
             ages = f"{short(1e3 * age.min)} to {short(1e3 * age.max)}"

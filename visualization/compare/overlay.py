@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.analysis.findings.forces import all_wrenches
+from hapticlink.analysis.findings.forces import wrenches
 from hapticlink.analysis.findings.tracking import (
     constrained,
     has_tracking,
@@ -53,7 +53,7 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
         "constraints": (
             "At most {} constrained directions",
             "constrained directions",
-            {n: (c[0]["time"], c[0][c[1]]) for n, r in runs.items() if (c := constrained(r))},
+            {n: counted for n, r in runs.items() if (counted := constrained(r))},
         ),
     }
     made = {
@@ -75,7 +75,7 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
 
 def _force(run: Results) -> tuple[Vector, Vector] | None:
     """The largest force (N) of a kind at each time (s) of the most frequent ones."""
-    forces = [(time, force) for time, force, _ in all_wrenches(run).values()]
+    forces = [(time, force) for _, time, force, _ in wrenches(run)]
     if not forces:
         return None
     times = max((time for time, _ in forces), key=len)

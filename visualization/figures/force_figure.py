@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hapticlink.analysis.findings.forces import WRENCHES, all_wrenches, torques
+from hapticlink.analysis.findings.forces import WRENCHES, torques, wrenches
 from hapticlink.analysis.findings.tracking import further_users
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.figure_axes import legend_above_curves, titled
-from hapticlink.visualization.figures.curves import Curve, curve
+from hapticlink.visualization.figures.curves import curve
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,31 +25,31 @@ STYLES = ("-", "--", ":", "-.")
 def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     """Forces, moments and, against their limits, motor torques of a run that has wrenches.
     devices: of each user by point; the first one's name is empty. Further users are dashed."""
-    first = next(results.windows())
-    wrenches = {name: curve(results, partial(_wrench, name=name)) for name in all_wrenches(first)}
+    drawn = {name: curve(*each) for name, *each in wrenches(results)}
     driven = {
-        user: curve(results, partial(_torques, device=device, user=user))
+        user: curve(time, *tau)
         for user, device in devices.items()
-        if torques(first, device, user)
+        for time, tau in [torques(results, device, user) or (None, ())]
+        if time is not None
     }
-    largest, (_, force, _) = max(wrenches.items(), key=lambda item: item[1][1].max())
+    largest, (_, force, _) = max(drawn.items(), key=lambda item: item[1][1].max())
     title = f"The largest force is that of the {largest}: {short(force.max())} N"
     labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]
     limits = {user: device.torque_limit for user, device in devices.items()}
     if driven:
-        share = 100 * max(np.abs(tau).max() / limits[user] for user, (_, tau) in driven.items())
+        share = 100 * max(np.abs(tau).max() / limits[user] for user, (_, *tau) in driven.items())
         title += f"; motors reach {short(share)} % of their torque limit"
     figure, axes = titled(results, title, "time (s)", *labels)
     styles = dict(zip(["", *further_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
-    for name, (time, force, moment) in wrenches.items():
+    for name, (time, force, moment) in drawn.items():
         user, _, kind = name.rpartition(": ")
         look = {"lw": 1, "color": f"C{names.index(kind)}", "ls": styles[user]}
         axes[0].plot(time, force, label=name, **look)
         axes[1].plot(time, moment, **look)
     legend_above_curves(axes[0], columns=2)
-    for user, (time, tau) in driven.items():
-        for i, each in enumerate(tau.T):
+    for user, (time, *tau) in driven.items():
+        for i, each in enumerate(tau):
             label = None if user else f"motor {i + 1}"
             axes[2].plot(time, each, lw=1, color=f"C{i}", ls=styles[user], label=label)
         for sign in (-1, 1):
@@ -59,13 +58,3 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     if driven:
         legend_above_curves(axes[2], columns=5)
     return figure
-
-
-def _wrench(window: Results, name: str) -> Curve:
-    return all_wrenches(window)[name]
-
-
-def _torques(window: Results, device: Device, user: str) -> Curve:
-    found = torques(window, device, user)
-    assert found is not None
-    return found

@@ -5,7 +5,7 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -24,7 +24,7 @@ from hapticlink.analysis.findings.tracking import (
     of_block,
     pose_error,
 )
-from hapticlink.analysis.findings.user_port import UserPort, allowance, allowed
+from hapticlink.analysis.findings.user_port import UserPort, allowance, allowed, user_port
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
@@ -36,12 +36,12 @@ from hapticlink.orchestrator.base.signal_names import (
     POINT_POSE,
     signal_of_user,
 )
-from hapticlink.orchestrator.results.numbers import last_time, short
-from hapticlink.orchestrator.results.read_results import Results, Vector
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
 from hapticlink.orchestrator.results.recorded_scene import all_devices, scene_part
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figure_axes import framed, plain, png, titled
-from hapticlink.visualization.figures.curves import Curve, curve, port_curve
+from hapticlink.visualization.figures.curves import curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
 from hapticlink.visualization.mechanism import drawing, marks
@@ -73,45 +73,36 @@ def figures(results: Results) -> dict[str, Figure]:
 def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     """By name, what draws each figure of a run."""
     drawn_by: dict[str, Callable[[], Figure]] = {}
-    if not last_time(results):
+    if not results.last_time:
         return drawn_by
-    first = next(results.windows())
-    with_rows = {name: table for name, table in first.tables.items() if len(table["time"])}
-    first = replace(first, tables=with_rows)
+    with_rows = {name: table for name, table in results.tables.items() if len(table.rows)}
+    results = with_record(replace(results, tables=with_rows), results.record)
     linkage = scene_part(
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
     size = len(coordinate_units(linkage)) if linkage else 0
-    if linkage and of_block(first, JOINT_COORDINATES, size):
-        ends = [q for window in results.windows() for q in _finite(window, size)]
-        if ends:
+    if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
+        q = table[JOINT_COORDINATES]
+        if len(ends := q[np.isfinite(q).all(axis=1)][[0, -1]]):
             drawn_by["mechanism"] = partial(_mechanism, results, linkage, ends)
-    if of_block(first, POINT_POSE, 3):
+    if of_block(results, POINT_POSE, 3):
         if "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
-        if of_block(first, HANDLE_POSE, 3):
+        if of_block(results, HANDLE_POSE, 3):
             drawn_by["distance"] = partial(_distance, results)
-    if wrenches(first):
+    if any(True for _ in wrenches(results)):
         drawn_by["forces"] = partial(forces, results, all_devices(results))
-    if touching(first):
+    if touching(results):
         drawn_by["contact"] = partial(_contact, results)
-    if constrained(first):
+    if constrained(results):
         drawn_by["constraints"] = partial(_constraints, results)
-    if port := port_curve(results):
-        drawn_by["user_port"] = partial(_port, results, port)
+    if port := user_port(results):
+        drawn_by["user_port"] = partial(_port, results, port_curve(port))
     if generated := _generated(results):
         drawn_by["energies"] = partial(_energies, results, generated)
     if (paced := results.record.real_time) and paced["ticks"]:
         drawn_by["real_time"] = partial(real_time, results)
     return drawn_by
-
-
-def _finite(window: Results, size: int) -> Vector:
-    """The first and the last joint coordinates of a window that are finite."""
-    table = of_block(window, JOINT_COORDINATES, size)
-    q = table[JOINT_COORDINATES] if table else np.zeros((0, size))
-    q = q[np.isfinite(q).all(axis=1)]
-    return q[[0, -1]] if len(q) else q
 
 
 def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
@@ -120,7 +111,7 @@ def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
         yield name, png(draw())
 
 
-def _mechanism(results: Results, linkage: Linkage, q: Sequence[Vector]) -> Figure:
+def _mechanism(results: Results, linkage: Linkage, q: Vector) -> Figure:
     figure, axes = titled(results, _finding(results), "x (mm)", "y (mm)")
     contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
     ends: list[Vector] = []
@@ -151,16 +142,15 @@ def _mechanism(results: Results, linkage: Linkage, q: Sequence[Vector]) -> Figur
 def _finding(results: Results) -> str:
     """How far the operational point was led, how far the handle was from it, where the linkage gave
     way in fewer directions, and what the rendering gave back."""
-    first = next(results.windows())
     parts = [f"The operational point was led up to {_with('mm', _reach(results))} from its start"]
-    if of_block(first, HANDLE_POSE, 3):
-        time, apart, _ = curve(results, pose_error)
+    if of_block(results, HANDLE_POSE, 3):
+        time, apart, _ = pose_error(results)
         at = _with("s", float(time[apart.argmax()]))
         parts.append(f"the handle was at most {_with('mm', apart.max())} off it, at {at}")
     if unusual := [e for e in episodes(results) if e.kind == "constraints"]:
         times = f"{len(unusual)} times" if len(unusual) > 1 else "once"
         parts.append(f"{times} the linkage constrained more or fewer directions than usual")
-    if (port := port_curve(results)) and (found := port.measured).peak > allowed(found.hand_work):
+    if (port := user_port(results)) and (found := port.measured).peak > allowed(found.hand_work):
         by = _with("s", found.time_of_peak)
         parts.append(f"{_with('mJ', 1e3 * found.peak)} generated by {by}")
     return "; ".join(parts)
@@ -168,13 +158,9 @@ def _finding(results: Results) -> str:
 
 def _reach(results: Results) -> float:
     """How far (mm) the operational point, or the handle without it, was from its start."""
-    signal = POINT_POSE if of_block(next(results.windows()), POINT_POSE, 3) else HANDLE_POSE
-    start, reach = None, 0.0
-    for window in results.windows():
-        _, path = _place(window, signal)
-        start = path[0] if start is None else start
-        reach = max(reach, float(np.linalg.norm(path - start, axis=1).max(initial=0.0)))
-    return reach
+    signal = POINT_POSE if of_block(results, POINT_POSE, 3) else HANDLE_POSE
+    _, path = _place(results, signal)
+    return float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0))
 
 
 def _with(unit: str, value: float) -> str:
@@ -184,8 +170,7 @@ def _with(unit: str, value: float) -> str:
 
 def _arrow(results: Results, axes: Axes) -> None:
     """The largest force of the hand, where it acted."""
-    by_window = (most for window in results.windows() if (most := _largest(window)))
-    largest = max(by_window, key=lambda most: most[0], default=None)
+    largest = _largest(results)
     if largest is None or not largest[0] > 0:
         return
     size, time, force, pose = largest
@@ -196,16 +181,13 @@ def _arrow(results: Results, axes: Axes) -> None:
     drawing.paint(axes, [arrow], {where: pose, "F_hand": force.tolist()}, zorder=6)
 
 
-def _largest(window: Results) -> tuple[float, float, Vector, Vector] | None:
+def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
     """The largest force of the hand (N), when (s), its components and where it acted (m)."""
-    force, handle = of_block(window, HAND_WRENCH, 3), of_block(window, HANDLE_POSE, 3)
-    handle = handle or of_block(window, POINT_POSE, 3)
+    force, handle = of_block(results, HAND_WRENCH, 3), of_block(results, HANDLE_POSE, 3)
+    handle = handle or of_block(results, POINT_POSE, 3)
     if not (force and handle):
         return None
-    rows = window.within(force["time"])
-    F, times = force[HAND_WRENCH][rows, :2], force["time"][rows]
-    if not len(F):
-        return None
+    F, times = force[HAND_WRENCH][:, :2], force["time"]
     most = np.hypot(*F.T)
     k = int(most.argmax())
     row = int(np.searchsorted(handle["time"], times[k] + 1e-12, "right")) - 1
@@ -215,9 +197,9 @@ def _largest(window: Results) -> tuple[float, float, Vector, Vector] | None:
 
 def _mark(results: Results, axes: Axes) -> None:
     """The episodes of a run, along the path of the operational point."""
-    if of_block(next(results.windows()), POINT_POSE, 3) is None:
+    if of_block(results, POINT_POSE, 3) is None:
         return
-    time, path = curve(results, partial(_place, signal=POINT_POSE))
+    time, path = curve(*_place(results, POINT_POSE))
     marked = [*episodes(results)]
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
         color, label = marks.KINDS[kind]
@@ -230,12 +212,11 @@ def _mark(results: Results, axes: Axes) -> None:
         )  # fmt: skip
 
 
-def _place(window: Results, signal: str) -> Curve:
+def _place(results: Results, signal: str) -> tuple[Vector, Vector]:
     """Times (s) and places (mm) of a pose."""
-    table = of_block(window, signal, 3)
+    table = of_block(results, signal, 3)
     assert table is not None
-    rows = window.within(table["time"])
-    return table["time"][rows], table[signal][rows, :2] * 1e3
+    return table["time"], table[signal][:, :2] * 1e3
 
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
@@ -245,22 +226,21 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
         (signal_of_user(POINT_POSE, point["name"]), f"point {point['name']}", "-.")
         for point in linkage.get("point", ())
     ]
-    first = next(results.windows())
     return [
-        (label, style, curve(results, partial(_place, signal=signal))[1])
+        (label, style, curve(*_place(results, signal))[1])
         for signal, label, style in (
             (POINT_POSE, "operational point x_S", "-"),
             (HANDLE_POSE, "handle x_D", "--"),
             *further,
         )
-        if of_block(first, signal, 3)
+        if of_block(results, signal, 3)
     ]
 
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if of_block(next(results.windows()), HANDLE_POSE, 3):
-        apart = short(curve(results, pose_error)[1].max())
+    if of_block(results, HANDLE_POSE, 3):
+        apart = short(pose_error(results).distance_mm.max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:
         title = f"The operational point moves up to {short(_reach(results))} mm from its start"
@@ -276,10 +256,7 @@ def _trajectories(results: Results) -> Figure:
 
 
 def _distance(results: Results) -> Figure:
-    users = {
-        user: curve(results, partial(pose_error, user=user))
-        for user in ("", *further_users(results))
-    }
+    users = {user: curve(*pose_error(results, user)) for user in ("", *further_users(results))}
     largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
     at = int(gap.argmax())
     title = (
@@ -299,10 +276,13 @@ def _point(user: str) -> str:
 
 
 def _contact(results: Results) -> Figure:
-    time, force, pushing = curve(results, _pushing)
-    pushes = (touched[1] for window in results.windows() if (touched := touching(window)))
-    pushed, samples = np.sum([(each.sum(), len(each)) for each in pushes], axis=0)
-    share = 100 * float(pushed / samples)
+    table, touched = of_block(results, ENVIRONMENT_WRENCH, 3), touching(results)
+    assert table is not None
+    assert touched is not None
+    pushes = touched[1]
+    share = 100 * float(pushes.sum() / len(pushes))
+    size = table.by_row(lambda F: np.linalg.norm(F[:, :2], axis=1), ENVIRONMENT_WRENCH)
+    time, force, pushing = curve(touched[0], size, pushes)
     most = short(force[pushing].max(initial=0.0))
     title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
     figure, axes = titled(
@@ -312,28 +292,12 @@ def _contact(results: Results) -> Figure:
     return figure
 
 
-def _pushing(window: Results) -> Curve:
-    """Times (s), |F_env| (N), and whether contacts push."""
-    table, touched = of_block(window, ENVIRONMENT_WRENCH, 3), touching(window)
-    assert table is not None
-    assert touched is not None
-    time, pushing = touched
-    force = table[ENVIRONMENT_WRENCH][window.within(table["time"]), :2]
-    return time, np.linalg.norm(force, axis=1), pushing
-
-
-def _counts(window: Results) -> Curve:
-    """Times (s) and numbers of constrained directions."""
-    counted = constrained(window)
-    assert counted is not None
-    table, name = counted
-    rows = window.within(table["time"])
-    return table["time"][rows], table[name][rows]
-
-
 def _constraints(results: Results) -> Figure:
-    time, count = curve(results, _counts)
-    most, samples = int(count.max()), constraint_counts(results.windows())
+    counted = constrained(results)
+    assert counted is not None
+    samples = constraint_counts(counted[1])
+    time, count = curve(*counted)
+    most = int(count.max())
     share = 100 * (samples[max(samples)] / sum(samples.values()))
     title = f"{most} constrained directions in {share:.3g} % of the samples"
     figure, axes = titled(results, title, "time (s)", "constrained directions")

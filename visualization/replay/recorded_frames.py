@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.tracking import further_users, of_any_shape, of_block, table_of
-from hapticlink.analysis.findings.user_port import UserPort, tolerated, user_port
+from hapticlink.analysis.findings.user_port import tolerated, user_port
 from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
@@ -38,14 +38,13 @@ SIGNIFICANT_DIGITS = 7
 
 
 class Recorded:
-    """A run of a linkage, or a window of one, as frames: `times` (s), `frames`, `every` (samples to
-    a frame, so that the whole run has `most` of them, or MAX_FRAMES), `missing`, the signals that
-    the drawing would show and that are not recorded, and `left_out`, the number of frames whose
-    poses are not finite.
+    """A run of a linkage as frames: `times` (s), `frames`, `every` (samples to a frame, so that
+    there are MAX_FRAMES at most), `missing`, the signals that the drawing would show and that are
+    not recorded, and `left_out`, the number of frames whose poses are not finite.
 
     Raises InputFault for a folder without a run of a linkage, or without its poses."""
 
-    def __init__(self, run: Results | Path | str, most: int | None = None) -> None:
+    def __init__(self, run: Results | Path | str) -> None:
         self.results = results = run if isinstance(run, Results) else load(run)
         self.name = folder = str(results.folder or results.record.scene["title"])
         linkage: Linkage | None = scene_part(results, "linkage", Linkage)
@@ -64,10 +63,9 @@ class Recorded:
                 raise InputFault(f"{folder}: the run ended before its first row")
         self.signals, self.missing = _shown(results)
         tables = [t for s in self.signals.values() if (t := table_of(results, s))]
-        fastest = max(tables, key=lambda table: table.total)
-        rows = np.arange(len(fastest["time"]))[results.within(fastest["time"])]
-        self.every = -(-fastest.total // (most or MAX_FRAMES))
-        self.times: Vector = fastest["time"][rows[(fastest.first + rows) % self.every == 0]]
+        fastest = max(tables, key=lambda table: len(table.rows))
+        self.every = -(-len(fastest.rows) // MAX_FRAMES)
+        self.times: Vector = fastest["time"][:: self.every]
         places = [v for k, v in self.values().items() if k.rpartition(".")[2] in PLACES]
         drawn = np.all([np.isfinite(v).all(axis=1) for v in places], axis=0)
         if not drawn.any():
@@ -94,14 +92,9 @@ class Recorded:
                 values[key] = table[signal][rows].reshape(len(rows), -1)
         return values
 
-    def frames(
-        self, port: UserPort | None = None, most: float | None = None
-    ) -> list[dict[str, Any]]:
-        """The frames as the live page gets them, without their time and what is not finite. port:
-        the energy at the user's port, which in a window began before it; most: what is tolerated
-        of it (J) in the whole run."""
-        values, port = self.values(), port or user_port(self.results)
-        most = tolerated(self.results) if most is None else most
+    def frames(self) -> list[dict[str, Any]]:
+        """The frames as the live page gets them, without their time and what is not finite."""
+        values, port, most = self.values(), user_port(self.results), tolerated(self.results)
         energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
         made = []
         for i in range(len(self.times)):

@@ -293,8 +293,8 @@ class Machine:
 
         def make(index: int) -> object:
             c = self._tables[index]
-            if recorder.block:
-                c.fill(block=recorder.block.rows, rows=recorder.block.filled)
+            if recorder.rows is not None:
+                c.fill(block=recorder.rows, rows=recorder.filled)
             c.fill(recorder, "room", "due", "count", "reached", "every", "end", "view")
             where = recorder.places if recorder.view is None else None
             c.fill(n=len(recorder.places), where=where)

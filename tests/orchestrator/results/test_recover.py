@@ -10,8 +10,9 @@ import pytest
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import binary_rows, read_results
+from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.results.recover import Recovered, recover
+from hapticlink.orchestrator.results.rows_file import RowsFile
 from hapticlink.orchestrator.results.write_files import FileRecorder
 from tests.orchestrator.c_fmus import hostile_fmu
 from tests.orchestrator.foreign_fmus import python_fmu
@@ -29,7 +30,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path):
     path, out = scene(tmp_path, fmu_table("one", "Hangs", ISOLATED), duration=5), tmp_path / "out"
     with subprocess.Popen([*RUN, path, "--out", out], stderr=subprocess.DEVNULL) as running:
         while not (table := out / "haptics.rows").exists() or (
-            len(binary_rows.Written(table)) < LAST * 64 + 1
+            len(RowsFile(table)) < LAST * 64 + 1
         ):
             assert running.poll() is None
         with pytest.raises(InputFault, match=f"its run goes on, in process {running.pid}"):
@@ -37,7 +38,7 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path):
         running.send_signal(signal.SIGKILL)
     assert subprocess.run([*COMMAND, "recover", out], check=True, capture_output=True)
     run = json.loads((out / "run.json").read_text())
-    assert run["recovered"] == {"haptics": {"rows": LAST * 64 + 1, "time": LAST, "lost": 0}}
+    assert run["recovered"] == {"haptics": {"rows": LAST * 64 + 1, "time": LAST}}
     assert run["end"] == {"reason": "fault", "time": LAST}
     assert run["fault"]["kind"] == "Killed"
     assert {p.name for p in out.iterdir()} == {"run.json", "haptics.csv"}
@@ -45,25 +46,25 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path):
     np.testing.assert_array_equal(table["time"], np.arange(LAST * 64 + 1) / 64)
 
 
-def test_a_row_that_is_in_part_or_twice_on_the_disk(tmp_path):
-    """The process is killed while it writes a block: rows that the table has already are left out,
-    one that it has in part is whole in the block, or is counted as lost."""
+def test_a_row_that_is_in_part_on_the_disk(tmp_path):
+    """The process is killed while it writes a row, or the machine fails before all are written."""
     values = np.zeros(2)
-    recorder = FileRecorder(tmp_path / "haptics.csv", {"a": 0, "b": 1}, values, lambda: None)
+    recorder = FileRecorder(tmp_path / "haptics.csv", {"a": 0, "b": 1}, values, lambda: None, end=9)
     recorder.publish()
     for k in range(5):
         values[:] = k, -k
         recorder.row(k / 8)
-    block = recorder.block.rows[:5].copy()
-    with recorder.target.open("ab") as file:
-        file.write(block.tobytes()[: 2 * 24 + 7])
+    recorder.rows[5, 0] = 5 / 8
     expected = [[k / 8, k, -k] for k in range(5)]
-    assert binary_rows.Written(recorder.target)[:].tolist() == expected
-    recorder.block.filled.value = 0
-    assert binary_rows.Written(recorder.target)[:].tolist() == expected[:2]
+    assert RowsFile(recorder.target)[:].tolist() == expected
+    recorder.__exit__()
+    assert recorder.target.stat().st_size == 24 + 5 * 24
+    with recorder.target.open("rb+") as file:
+        file.truncate(24 + 2 * 24 + 7)
+    assert RowsFile(recorder.target)[:].tolist() == expected[:2]
     run = run_json(rates=["haptics"], files=["haptics.csv"])
     (tmp_path / "run.json").write_text(json.dumps(run))
-    assert recover(tmp_path) == {"haptics": Recovered(2, 1 / 8, 1)}
+    assert recover(tmp_path) == {"haptics": Recovered(2, 1 / 8)}
     assert recover(tmp_path) == {}
 
 

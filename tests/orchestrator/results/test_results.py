@@ -16,7 +16,7 @@ from hapticlink.orchestrator.results.write_files import FileRecorder, text, writ
 def recorder_of(path: Path, columns: list[str], view: Any) -> FileRecorder:
     """One whose file is in its place from the first row on."""
     made = FileRecorder(
-        path, {name: i for i, name in enumerate(columns)}, view, lambda: made.publish()
+        path, {name: i for i, name in enumerate(columns)}, view, lambda: made.publish(), end=9
     )
     return made
 

@@ -15,7 +15,8 @@ import pytest
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.results import binary_rows, read_results
+from hapticlink.orchestrator.results import read_results
+from hapticlink.orchestrator.results.rows_file import RowsFile
 from tests.orchestrator.c_fmus import hostile_fmu
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, RUN, fmu_table, scene
@@ -98,7 +99,7 @@ def test_a_signal_while_isolated_fmus_load_is_no_fault_of_theirs(tmp_path):
 def rows_of(folder: Path) -> int:
     """The number of rows of a run that goes on."""
     table = folder / "haptics.rows"
-    return len(binary_rows.Written(table)[:]) if table.exists() else 0
+    return len(RowsFile(table)) if table.exists() else 0
 
 
 @pytest.mark.parametrize(

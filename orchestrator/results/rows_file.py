@@ -1,0 +1,164 @@
+"""A table as an array in a file, `<rate>.rows`: the header of its CSV, a line; the number of its
+rows, 8 bytes at the next multiple of 8; then the rows, doubles of this machine.
+
+A run writes its rows through a map of the file: whatever ends its process, the file has them all.
+"""
+
+from __future__ import annotations
+
+import csv
+import ctypes
+import mmap
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import to_json
+
+from hapticlink.orchestrator.base.errors import InputFault
+
+SUFFIX = ".rows"
+AT_A_TIME = 1 << 16
+"""Bytes of rows that are made text at a time."""
+RESERVED = 1 << 18
+"""Bytes that a file grows by: fewer calls of Python and of the file system than with 64 kB."""
+COUNT = 8
+"""Bytes of the number of rows."""
+Rows = NDArray[np.float64]
+
+
+class RowsFile:
+    """The rows of a table in a file, of which those that are asked for are mapped.
+
+    Raises InputFault for a file whose header names no columns.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with path.open("rb") as file:
+            line = file.readline()
+            self.columns = _columns(line, path)
+            self._begin = _data(line)
+            file.seek(self._begin - COUNT)
+            count = int.from_bytes(file.read(COUNT), "little", signed=True)
+            whole = (os.fstat(file.fileno()).st_size - self._begin) // (8 * len(self.columns))
+        self._count = max(min(count, whole), 0)
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def size(self) -> int:
+        """Bytes of the rows."""
+        return 8 * self._count * len(self.columns)
+
+    def __array__(self, *_: object, **how: object) -> Rows:
+        return self[:]
+
+    def __getitem__(self, span: slice) -> Rows:
+        first, last, _ = span.indices(self._count)
+        shape = max(last - first, 0), len(self.columns)
+        if not shape[0]:
+            return np.zeros(shape)
+        begin = self._begin + 8 * first * shape[1]
+        return np.memmap(self._path, np.float64, "r", begin, shape)
+
+    def read(self) -> Rows:
+        """All rows, in memory."""
+        count = self._count * len(self.columns)
+        return np.fromfile(self._path, count=count, offset=self._begin).reshape(self._count, -1)
+
+
+class RowsBeingWritten:
+    """A file of up to `most` rows, into which a run writes: `rows` are all of them, of which the
+    first `filled` are written and the first `reserved` have their place on the disk.
+
+    Raises OSError, as on a full disk, and where there is a file already.
+    """
+
+    def __init__(self, path: Path, columns: tuple[str, ...], most: int) -> None:
+        line = header(columns)
+        self._begin, self._row = _data(line), 8 * len(columns)
+        self._file = path.open("xb+", buffering=0)  # never through a link
+        self.reserved = 0
+        try:
+            self._file.write(line.ljust(self._begin - COUNT, b"\n") + bytes(COUNT))
+            self._file.truncate(size := self._begin + max(most, 1) * self._row)
+            self._memory = mmap.mmap(self._file.fileno(), size)
+            self.reserve()
+        except OSError:
+            self._file.close()
+            path.unlink()
+            raise
+        self.filled = ctypes.c_int64.from_buffer(self._memory, self._begin - COUNT)
+        flat = np.frombuffer(self._memory, np.float64, offset=self._begin)
+        self.rows: Rows = flat.reshape(-1, len(columns))
+
+    def reserve(self) -> None:
+        """Have a place on the disk for further rows. Raises OSError where not one more fits."""
+        begin = self._begin + self.reserved * self._row
+        self._file.seek(begin)
+        left = memoryview(bytes(min(max(RESERVED, self._row), len(self._memory) - begin)))
+        with suppress(OSError):
+            while left:
+                left = left[self._file.write(left) :]
+        if (more := (self._file.tell() - begin) // self._row) == 0:
+            self._file.write(left)  # which says why
+        self.reserved += more
+        with suppress(AttributeError, OSError):  # not on Windows, nor where memory is locked
+            self._memory.madvise(mmap.MADV_DONTNEED)  # rows that are written need no memory
+
+    def close(self) -> None:
+        """Close the file, which then ends with its last row."""
+        with suppress(OSError):  # Windows shortens no file that is mapped
+            self._file.truncate(self._begin + self.filled.value * self._row)
+        self._file.close()
+
+
+def text(rows: Rows) -> bytes:
+    """Rows as CSV, each number as the shortest text that reads back to the same float."""
+    # pydantic's JSON, [[1.0,2.0],[3.0,4.0]], writes floats ten times faster than repr, and
+    # round-trips too.
+    lines = to_json(rows.tolist(), inf_nan_mode="constants").split(b"]")[:-2]
+    return b"\n".join([line[2:] for line in lines]) + b"\n"
+
+
+def header(columns: tuple[str, ...]) -> bytes:
+    """The first line of a table, also of its CSV."""
+    return ",".join(map(_quoted, columns)).encode() + b"\n"
+
+
+def write_csv(table: RowsFile, target: BinaryIO) -> None:
+    """Write a table as CSV to `target`."""
+    target.write(header(table.columns))
+    step = max(AT_A_TIME // (8 * len(table.columns)), 1)
+    for first in range(0, len(table), step):
+        target.write(text(table[first : first + step]))
+
+
+def write_empty(path: Path, columns: tuple[str, ...], as_csv: bool) -> None:
+    """Write a table without rows, as a CSV or as a file of rows."""
+    line = header(columns)
+    path.write_bytes(line if as_csv else line.ljust(_data(line) - COUNT, b"\n") + bytes(COUNT))
+
+
+def _data(line: bytes) -> int:
+    """Where the rows begin behind a header, the number of rows in between."""
+    return -(-len(line) // COUNT) * COUNT + COUNT
+
+
+def _columns(line: bytes, path: Path) -> tuple[str, ...]:
+    try:
+        return tuple(next(csv.reader([line.decode()])))
+    except (csv.Error, UnicodeDecodeError, StopIteration) as error:
+        raise InputFault(f"{path}: its header names no columns: {error}") from error
+
+
+def _quoted(name: str) -> str:
+    """A column name in CSV (RFC 4180): names of matrix entries contain a comma, those of FMUs
+    any printable character."""
+    doubled = name.replace('"', '""')
+    return f'"{doubled}"' if "," in name or '"' in name else name

@@ -1,1 +1,0 @@
-"""Results in the files of other tools."""
