@@ -37,8 +37,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
-from hapticlink.programs.changes import CLOCK, LEAST_RATE, NONE, Changes, changes
 from hapticlink.programs.foreign import Foreign
+from hapticlink.programs.prepared_changes import CLOCK, LEAST_RATE, NONE, Changes, changes
 
 NO_END = 2**61
 """The end (ticks) of a program's timeline: as far as its times are exact it has none."""

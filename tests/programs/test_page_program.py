@@ -95,7 +95,7 @@ def changed_run(scene: Scene, apply: Callable[[LiveRun, Any], None]) -> np.ndarr
         simulation.start()
         live = LiveRun(scene)
         vars(live).update(
-            _simulation=simulation, _loop=loop, _settings={}, _connections={}, _places={},
+            _simulation=simulation, _loop=loop, _setters={}, _connections={}, _places={},
             _run=SimpleNamespace(changes=[]),
         )  # fmt: skip
         haptic = system.timeline.clocks[0].longest

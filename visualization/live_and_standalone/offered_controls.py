@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings import labels
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.live_changes import choices_of_slower
+from hapticlink.orchestrator.system.changes import choices_of_slower
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
-from hapticlink.orchestrator.system.live_changes import held_by
+from hapticlink.orchestrator.system.changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.run.instructions import instructions
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.live_changes import (
+from hapticlink.orchestrator.system.changes import (
     choices_of_slower,
     held_by,
     require_other_rate,
