@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -15,7 +13,6 @@ from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
-from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.apply_changes import InputSetter
@@ -34,10 +31,9 @@ from hapticlink.orchestrator.system.changes import (
 )
 from hapticlink.orchestrator.system.ports import names, scalars_of
 from hapticlink.orchestrator.system.system import Connection, InputChange, System
+from hapticlink.orchestrator.system.timeline import changed_period
 
 Result = TypeVar("Result")
-SLOWEST = 1e-3
-"""Rate (Hz) below which a clock would not tick within a session."""
 
 
 class LiveRun:
@@ -175,14 +171,13 @@ class LiveRun:
         rate = require(f"rate of {clock}", rate, Annotated[float, Quantity("Hz", gt=0)])
         jitter = require(f"jitter of {clock}", jitter, Annotated[float, Quantity("1", ge=0)])
         seed = int(require("seed", seed, Seed))
-        period = 1 / (exact(rate) * timeline.base) if SLOWEST <= rate < math.inf else Fraction(0)
-        if period < haptics.longest:
-            limits = f"from {SLOWEST:g} Hz up to that of the haptics"
-            raise InputFault(f"rate of {clock} = {rate} Hz: give a rate {limits}")
+        try:
+            period = changed_period(rate, timeline.base, haptics.longest)
+        except ValueError as error:
+            raise InputFault(f"rate of {clock}: {error}") from error
         most = float(1 - haptics.longest / period)
         if not 0 <= jitter <= most:
             raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
-
         self._loop.events.change_rate(clock, period, jitter, seed)
         drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
         self._note(f"rate of {clock}: {rate:g} Hz{drawn}")

@@ -26,7 +26,7 @@ REPLACED = ("platform.c", "process_state.c")
 """Files of the loop in whose place a program has its own platform.c."""
 
 
-def sources(
+def write_sources(
     resolved: Resolved, components: Mapping[str, Component], ports: Sequence[Port]
 ) -> dict[str, str]:
     """All C files by name; scene.h lacks the GUID. components: of the members that are blocks of
@@ -64,10 +64,10 @@ def _member(id_: str, component: Component) -> tuple[str, dict[str, str]]:
     own = f'{prefix}#define GUID "{guid}"\n{header}'
     text = WRAPPER.read_text().replace('#include "component.h"', own)
     files = {f"{id_}.c": text} | {f"{id_}_{k:03}.c": piece for k, piece in enumerate(pieces)}
-    return guid, {name: prefixed(text, id_) for name, text in files.items()}
+    return guid, {name: add_prefix(text, id_) for name, text in files.items()}
 
 
-def prefixed(text: str, id_: str) -> str:
+def add_prefix(text: str, id_: str) -> str:
     text = text.replace("component_ ## ID", f"{id_}_ ## ID")
     return re.sub(r"\bpart(\d+)_", rf"{id_}_part\1_", text)
 

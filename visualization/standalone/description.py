@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.visualization.live_and_standalone import opening_message, scene_message
+from hapticlink.visualization.live_and_standalone import first_messages
 from hapticlink.visualization.live_and_standalone.offered_controls import (
     Offered,
     stiffness,
@@ -26,7 +26,7 @@ Places = Mapping[str, Mapping[str, Sequence[int]]]
 """By user and name in a frame, the indices of its signal in the vector of signals."""
 
 
-class Description:
+class PageDescription:
     """data: as JSON has it, for program.js. drawing: what the program computes of its signals."""
 
     def __init__(self, program: Resolved, ports: Sequence[Port], name: str) -> None:
@@ -50,8 +50,8 @@ class Description:
         chosen = [*offered.gains, *(hand["target"] for hand in hands.values())]
         self.data: dict[str, Any] = {
             "name": name,
-            "scene": scene_message.running(scene, system, program.meters)
-            | opening_message.drawn(picture),
+            "scene": first_messages.describe_viewed_run(scene, system, program.meters)
+            | first_messages.describe_picture(picture),
             "controls": offered.described({}),
             "topology": offered.topology,
             "hands": hands,
