@@ -11,10 +11,11 @@ export function changes(controls, others) {
 export const set = (key, value) => ({ type: "set", key, value });
 
 // The value that a text stands for, of a control.
-function valueOf(text, { value, choices }) {
+function valueOf(text, { value, choices, min, max }) {
   if (choices) return text;
   if (typeof value !== "boolean") {
     if (text.trim() === "" || !Number.isFinite(Number(text))) throw new Error(`${text} is no number`);
+    if (Number(text) < min || Number(text) > max) throw new Error(`give a number from ${min} to ${max}`);
     return Number(text);
   }
   if (text !== "true" && text !== "false") throw new Error(`${text} is neither true nor false`);

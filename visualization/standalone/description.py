@@ -11,9 +11,11 @@ import casadi as ca
 from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
+from hapticlink.programs.prepared_changes import LEAST_RATE, MOST_DELAY
 from hapticlink.programs.resolve_scene import Resolved
 from hapticlink.visualization.live_and_standalone import first_messages
 from hapticlink.visualization.live_and_standalone.offered_controls import (
+    RANGES,
     Offered,
     stiffness,
     target,
@@ -22,6 +24,8 @@ from hapticlink.visualization.live_and_standalone.offered_controls import (
 from hapticlink.visualization.mechanism.frame_signals import outputs
 from hapticlink.visualization.mechanism.picture import RAW, Part, Picture
 
+PREPARED = RANGES | {"graphics": (LEAST_RATE, RANGES["graphics"][1]), "delays": (0.0, MOST_DELAY)}
+"""For what a program is prepared."""
 Places = Mapping[str, Mapping[str, Sequence[int]]]
 """By user and name in a frame, the indices of its signal in the vector of signals."""
 
@@ -33,7 +37,7 @@ class PageDescription:
         scene, system = program.scene, program.system
         assert scene.linkage
         picture = Picture(scene.linkage, scene.all_devices, scene.contacts)
-        places, offered = _places(program), Offered(scene, system)
+        places, offered = _places(program), Offered(scene, system, ranges=PREPARED)
         parts = [p for p in picture.parts if {*p.needs} <= {*places.get(p.user, {})}]
         self.drawing = _drawing(parts, places)
         if program.changes.clock < 0:
