@@ -20,7 +20,7 @@ from benchmarks.page import Progress, table
 from benchmarks.timing import Row, made_anew, measured_scenes, simulated
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 from hapticlink.visualization.standalone import page
 
 DURATION = 3.0
@@ -75,7 +75,7 @@ def _measured(
     scene: str, options: tuple[str, ...], rounds: int, browser: Any
 ) -> tuple[int, float, float, float, float]:
     """Size (bytes), processor time to make (s), and times real time of run, node and Chromium."""
-    shown = viewed(scene, (*options, "packaging=native"), DURATION)
+    shown = load_viewed_scene(scene, (*options, "packaging=native"), DURATION)
     with temporary_folders.room() as room:
         file = room / "page.html"
         make = made_anew(lambda: page.write(shown, scene, file), room / "cache")

@@ -29,8 +29,8 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
-from hapticlink.visualization.live_page.server_pipe import Link
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
+from hapticlink.visualization.live_page.server_pipe import ChildProcess
 from hapticlink.visualization.live_page.session import Session
 
 SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5
@@ -82,10 +82,10 @@ class Measured(Session):
 def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     """Raises what playwright does without a browser."""
     seconds, load = QUICK if quick else SECONDS, load_average()
-    scene = viewed(SCENE, [f"haptics.rate={RATE}"])
+    scene = load_viewed_scene(SCENE, [f"haptics.rate={RATE}"])
     progress(f"{SCENE}, dragged", 0, seconds)
     arguments = "127.0.0.1", "0", "bench", "", ""  # no second run
-    with temporary_folders.room() as room, Link(SERVER, *arguments) as link:
+    with temporary_folders.room() as room, ChildProcess(SERVER, *arguments) as link:
         url = f"http://127.0.0.1:{link.first()['port']}/bench/"
         log = Path(room, "log.json")
         with log.open("w") as out:

@@ -21,7 +21,7 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 
 if TYPE_CHECKING:
-    from hapticlink.visualization.live_page.server_pipe import Link
+    from hapticlink.visualization.live_page.server_pipe import ChildProcess
 
 PORT = 8512
 """Of a page, where no other is asked for."""
@@ -109,9 +109,9 @@ def view(
     token = secrets.token_urlsafe(16)
     second_run = "hapticlink.commands.view_second_run", f"{root}-b"
     with _server(host, port, token, *second_run) as link:
-        from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+        from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 
-        read = viewed(scene, changes.options)  # while the server starts
+        read = load_viewed_scene(scene, changes.options)  # while the server starts
         served_port = _port(link, host, port)
         _show(read.title, host, served_port, token, browser)
         say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
@@ -128,10 +128,10 @@ def view(
 
 def _written(name: str, changes: Changes, path: Path) -> int:
     """Write the page of a scene that needs no server."""
-    from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+    from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
     from hapticlink.visualization.standalone import page
 
-    scene = viewed(name, changes.options)
+    scene = load_viewed_scene(name, changes.options)
     if path.suffix.lower() != ".html":
         raise InputFault(f"--standalone {path}: name a file that ends in .html")
     title = default_folder("", name).name
@@ -176,16 +176,16 @@ def _is_scene(name: str) -> bool:
     return name in hl.shipped() and not (Path(name) / "run.json").exists()
 
 
-def _server(host: str, port: int | None, *arguments: str) -> Link:
+def _server(host: str, port: int | None, *arguments: str) -> ChildProcess:
     """The page's server, which begins to start."""
     if not find_spec("websockets"):
         raise InputFault(f"the page needs the package websockets: {install_command('view')}")
-    from hapticlink.visualization.live_page.server_pipe import Link
+    from hapticlink.visualization.live_page.server_pipe import ChildProcess
 
-    return Link("hapticlink.visualization.live_page.server", host, _ports(port), *arguments)
+    return ChildProcess("hapticlink.visualization.live_page.server", host, _ports(port), *arguments)
 
 
-def _port(link: Link, host: str, port: int | None) -> int:
+def _port(link: ChildProcess, host: str, port: int | None) -> int:
     """The port that the server listens on. Raises InputFault where it cannot."""
     if (first := link.first()) is None:
         raise Fault("the page's server does not start")

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.base.errors import Fault
-from hapticlink.visualization.live_and_standalone.viewed_scene import unpacked
+from hapticlink.visualization.live_and_standalone.viewed_scene import unpack_scene
 from hapticlink.visualization.live_page.server_pipe import Pipe, read, to_caller
 
 
@@ -23,7 +23,7 @@ def main() -> None:
 
     root, scene, settings = arguments
     with suppress(Fault):  # the page's server has ended
-        Session(unpacked(scene), link, Path(root), hl.RealTime, settings, paused=True).run()
+        Session(unpack_scene(scene), link, Path(root), hl.RealTime, settings, paused=True).run()
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 from hapticlink.visualization.standalone import page
 
 FOLDER = Path(__file__).parents[1] / "standalone"
@@ -37,7 +37,7 @@ def main(names: Sequence[str], folder: Path = FOLDER) -> list[str]:
     made = json.loads(record.read_text()) if record.exists() else {}
     written = []
     for i, name in enumerate(names, 1):
-        path, scene = folder / f"{name}.html", viewed(name)
+        path, scene = folder / f"{name}.html", load_viewed_scene(name)
         now = _made_from(scene)
         said = "as it was"
         if made.get(name) != now or not path.exists():

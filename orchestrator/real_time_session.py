@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from bisect import bisect_left
-from collections.abc import Callable, Iterable
-from fractions import Fraction
-from functools import lru_cache
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -17,10 +13,9 @@ from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
-from hapticlink.orchestrator.base.ticks import Frames, exact
-from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
+from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
@@ -28,14 +23,17 @@ from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.arguments import require, require_name
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.live_changes import changed, choices, require_other_rate
+from hapticlink.orchestrator.system.changes import (
+    changed,
+    choices,
+    require_other_rate,
+    settable,
+)
 from hapticlink.orchestrator.system.ports import names, scalars_of
-from hapticlink.orchestrator.system.springs import limited_gains
-from hapticlink.orchestrator.system.system import Connection, System
+from hapticlink.orchestrator.system.system import Connection, InputChange, System
+from hapticlink.orchestrator.system.timeline import changed_period
 
 Result = TypeVar("Result")
-SLOWEST = 1e-3
-"""Rate (Hz) below which a clock would not tick within a session."""
 
 
 class LiveRun:
@@ -59,7 +57,7 @@ class LiveRun:
         while True:
             self._until: int | None = None
             self._again = False
-            self._settings: dict[str, tuple[list[Scalar], Callable[[Any], object]]] = {}
+            self._setters: dict[str, tuple[InputSetter, int]] = {}
             self._connections: dict[str, Connection] = {}
             self._places: dict[str, list[int]] = {}
             self._run = self._schedule(self._turn)
@@ -112,21 +110,18 @@ class LiveRun:
         number or that are not finite."""
         self._require_running()
         fmu = require_name("input or parameter", name).partition(".")[0]
-        if name not in self._settings:
-            scalars = [*scalars_of(self.system.fmu, name, "input", "parameter")]
-            self._require_free(name, scalars)
-            instance = self._simulation.instances[fmu]
-            self._settings[name] = scalars, instance.connect(scalars, range(len(scalars)))
-        scalars, set_from = self._settings[name]
+        if name not in self._setters:
+            change = InputChange(self.time, f"{name} set", fmu, settable(self.system, name))
+            self._setters[name] = InputSetter(change, self._simulation), len(change.inputs)
+        setter, size = self._setters[name]
         try:
             values = np.array(value, np.float64).ravel()
         except (TypeError, ValueError):
             values = np.empty(0)
-        if len(values) != len(scalars) or not np.isfinite(values).all():
-            raise InputFault(
-                f"{name} = {shortened(repr(value))}: give {len(scalars)} finite numbers"
-            )
-        self._simulation.instances[fmu].before_step(lambda time: set_from(values))
+        if len(values) != size or not np.isfinite(values).all():
+            raise InputFault(f"{name} = {shortened(repr(value))}: give {size} finite numbers")
+        setter.values = values
+        setter.wait()
 
     def hold(self, name: str, hold: str | None = None, delay: float | None = None) -> None:
         """Give connections another hold, or another constant latency `delay` (s); they are named
@@ -146,11 +141,9 @@ class LiveRun:
         new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in connections]
         for connection in new:
             held = make_hold(connection, self._simulation.signals, {})
-            self._loop.change_hold(connection.name, held)
+            newest = self._loop.events.previous(system.fmu[connection.source].clock)
+            self._loop.change_hold(connection.name, held, newest)
             self._connections[connection.name] = connection
-            sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]
-            stamp = self._loop.events.previous(system.fmu[connection.source].clock)
-            self._simulation.holds[connection.name].push(stamp, sample, stamp)
         self._note(f"hold of {name}: {new[0].hold}, delay {delay or 0.0:g} s")
 
     def holds(self) -> dict[str, list[str]]:
@@ -163,45 +156,29 @@ class LiveRun:
         """Change the rate (Hz) of a clock other than the haptic one, such as `graphics`, from the
         end of its current step on; steps then end on haptic ticks, or with None again where they
         do in the scene, the first at least a haptic tick later. jitter: each ends up to half this
-        share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed and the
-        step's number. Raises InputFault where an FMU cannot vary its step or has a spring whose
-        energy `pspm` limits, for a rate that is not between 0 and the haptic one, and for a jitter
-        that leaves no haptic tick between two ends."""
+        share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed. Raises
+        InputFault where an FMU cannot vary its step or has a spring whose energy `pspm` limits, for
+        a rate that is not between 0 and the haptic one, and for a jitter that leaves no haptic tick
+        between two ends."""
         timeline = self.system.timeline
         haptics, *others = timeline.clocks
         if require_name("clock", clock) not in [c.name for c in others]:
             raise InputFault(unknown("clock", clock, [c.name for c in others]))
         require_other_rate(self.system, clock)
-        events, tick = self._loop.events, haptics.longest
-        first, begun = events.previous(clock), events.current(clock)
         if rate is None and not jitter:
-            own = next(c.starts for c in others if c.name == clock)
-            skip = bisect_left(own, begun + tick) - 2
-            again = Frames(
-                lambda i: own[i + skip] if i > 1 else (first, begun)[i], len(own) - skip, 1
-            )
-            events.change_rate(clock, again)
+            self._loop.events.restore_rate(clock)
             return self._note(f"rate of {clock}: that of the scene")
         rate = require(f"rate of {clock}", rate, Annotated[float, Quantity("Hz", gt=0)])
         jitter = require(f"jitter of {clock}", jitter, Annotated[float, Quantity("1", ge=0)])
         seed = int(require("seed", seed, Seed))
-        period = 1 / (exact(rate) * timeline.base) if SLOWEST <= rate < math.inf else Fraction(0)
-        if period < haptics.longest:
-            limits = f"from {SLOWEST:g} Hz up to that of the haptics"
-            raise InputFault(f"rate of {clock} = {rate} Hz: give a rate {limits}")
-        most = float(1 - tick / period)
+        try:
+            period = changed_period(rate, timeline.base, haptics.longest)
+        except ValueError as error:
+            raise InputFault(f"rate of {clock}: {error}") from error
+        most = float(1 - haptics.longest / period)
         if not 0 <= jitter <= most:
             raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
-
-        @lru_cache(maxsize=8)  # several events ask for the same point
-        def point(i: int) -> int:
-            if i < 2:
-                return (first, begun)[i]
-            drawn = np.random.default_rng((seed, i)).uniform(-0.5, 0.5) if jitter else 0.0
-            return math.ceil((begun + (i - 1 + Fraction(jitter * drawn)) * period) / tick) * tick
-
-        count = max(math.ceil((timeline.end - begun) / period), 0) + 4
-        events.change_rate(clock, Frames(point, count, 1))
+        self._loop.events.change_rate(clock, period, jitter, seed)
         drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
         self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
 
@@ -254,20 +231,6 @@ class LiveRun:
     def _require_running(self) -> None:
         if not hasattr(self, "_simulation"):
             raise InputFault("the scene does not run yet: ask within the `turn` that `run` calls")
-
-    def _require_free(self, name: str, scalars: Iterable[Scalar]) -> None:
-        fmu = name.partition(".")[0]
-        fed = {s.name: c.name for c in self.system.into(fmu) for s in c.inputs}
-        for scalar in scalars:
-            if scalar.name in fed:
-                raise InputFault(f"{name} is fed by a connection, {fed[scalar.name]}")
-            if scalar.causality == "parameter" and scalar.variability != "tunable":
-                raise InputFault(f"{name} is not tunable: change the scene, with `reset`")
-        if name in limited_gains(self.system):
-            raise InputFault(
-                f"{name} is a gain of a spring whose energy `pspm` limits, which counts with that "
-                "of the start: change the scene, with `reset`"
-            )
 
     def _note(self, text: str) -> None:
         self._run.changes.append((self.time, text))

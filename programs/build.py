@@ -32,11 +32,11 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
-from hapticlink.programs.description import described, documentation
-from hapticlink.programs.foreign import written
+from hapticlink.programs.description import describe_program, make_documentation
+from hapticlink.programs.foreign import write_files
 from hapticlink.programs.ports import ports
-from hapticlink.programs.resolve_scene import Resolved, resolved
-from hapticlink.programs.sources import identifiers, sources
+from hapticlink.programs.resolve_scene import Resolved, resolve_scene
+from hapticlink.programs.sources import identifiers, write_sources
 
 OPTIONS = ("-DEXPORT=",)
 """The functions of the loop are not exported."""
@@ -105,19 +105,19 @@ def program_files(
     pictures: Pictures = dict,
 ) -> dict[str, bytes]:
     """All files of the FMU but its binaries. Raises InputFault as `build_program`."""
-    with resolved(scene, without) as program:
+    with resolve_scene(scene, without) as program:
         blocks_of_members = components(program)
         variables = ports(program, blocks_of_members)
-        texts = sources(program, blocks_of_members, variables)
+        texts = write_sources(program, blocks_of_members, variables)
         capable, resources = capabilities(program), dict(_resources(program))
         haptic = program.system.timeline.clocks[0]
         step_size = program.system.timeline.seconds(haptic.longest)
     if fmi == 3:
         texts |= fmi3_sources(variables)
     compiled = sorted(name for name in texts if name.endswith(".c") and "/" not in name)
-    about = described(scene, identifier, variables, capable=capable, step_size=step_size)
+    about = describe_program(scene, identifier, variables, capable=capable, step_size=step_size)
     content = {f"sources/{name}": text.encode() for name, text in texts.items()} | resources
-    content |= documentation(scene, variables, pictures())
+    content |= make_documentation(scene, variables, pictures())
     whole = digest(content | model_description.files(about, "", fmi, compiled))
     guid = guid_of(whole)
     content["sources/scene.h"] = f'#define GUID "{guid}"\n'.encode() + content["sources/scene.h"]
@@ -165,6 +165,6 @@ def _built(
     with tempfile.TemporaryDirectory(dir=folder) as name:
         listed = (e for e in files if e.startswith("sources/"))
         texts = {e.removeprefix("sources/"): files[e].decode() for e in listed}
-        room, compiled = Path(name), written(texts, Path(name))
+        room, compiled = Path(name), write_files(texts, Path(name))
         entries = {**files, **dict(binaries(compiled, identifier, room, platforms, OPTIONS))}
     return write_fmu(entries, folder, identifier)

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.ports import Port
 
 
-def described(
+def describe_program(
     scene: Scene,
     identifier: str,
     ports: Sequence[Port],
@@ -46,7 +46,7 @@ def _base(name: str, unit: Unit | None) -> dict[str, str] | None:
     return powers | {"factor": repr(unit.factor), "offset": repr(unit.offset)}
 
 
-def documentation(
+def make_documentation(
     scene: Scene, ports: Sequence[Port], pictures: Mapping[str, bytes]
 ) -> dict[str, bytes]:
     """An HTML page without references to elsewhere, and the files of its pictures."""

@@ -75,12 +75,12 @@ class Foreign:
         with tempfile.TemporaryDirectory() as folder:
             room = Path(folder)
             try:
-                return global_names(written(files, room), room)
+                return global_names(write_files(files, room), room)
             except CompilerError as error:
                 raise InputFault(f"{self.description.path}: of its sources, {error}") from error
 
 
-def written(files: Mapping[str, str], folder: Path) -> list[Path]:
+def write_files(files: Mapping[str, str], folder: Path) -> list[Path]:
     """Writes C files, by path, into a folder; returns those to compile, the largest first."""
     for name, text in files.items():
         path = folder / name
@@ -97,7 +97,7 @@ def _header(name: str, id_: str) -> str:
     return text.replace(_PLAIN, f"#define fmi2FullName(name) {id_}_ ## name")
 
 
-def read(description: Description) -> Foreign:
+def read_foreign(description: Description) -> Foreign:
     """An FMU with its sources. Raises InputFault, with the reason alone, where they cannot be
     compiled into a program."""
     if description.fmi != "2":

@@ -17,6 +17,7 @@ from hapticlink.orchestrator.run.compiled.structures import POINTERS
 NUMBERS: dict[str, Any] = {
     "double": ctypes.c_double,
     "int64_t": ctypes.c_int64,
+    "uint64_t": ctypes.c_uint64,
     "int32_t": ctypes.c_int32,
     "int16_t": ctypes.c_int16,
     "uint32_t": ctypes.c_uint32,
@@ -234,7 +235,8 @@ class TypedData:
             if issubclass(class_, ctypes.Structure):
                 text = self._structure(class_.__name__, value, f"{place}.{field}", member)
             elif issubclass(class_, ctypes.Array):
-                text = _listed(map(str, value))
+                suffix = "u" if class_._type_ is ctypes.c_uint64 else ""
+                text = _listed(f"{entry}{suffix}" if entry else "0" for entry in value)
             else:
                 text = number(value) if class_ is ctypes.c_double else str(value)
             if text not in ("0", "0.0", "{0}") and (type_, field) != ("Kind", "python"):

@@ -47,7 +47,7 @@ int PAGE(run)(Model *m, int times) {
 }
 
 /* Times (s) of the newest and of the next event of the haptic clock. */
-double PAGE(newest)(const Model *m) { return seconds(m, previous(m, 0)); }
+double PAGE(newest)(const Model *m) { return seconds(m, m->now.scene.events.clocks->last); }
 
 double PAGE(due)(const Model *m) {
     const Clock *haptics = m->now.scene.events.clocks;
@@ -56,7 +56,7 @@ double PAGE(due)(const Model *m) {
 
 /* Gives a connection another hold, and a latency (us), -1 for that of the scene. */
 int PAGE(hold)(Model *m, int choice, double microseconds) {
-    return change_hold(m, choice, (int64_t)microseconds);
+    return choose_hold(m, choice, (int64_t)microseconds);
 }
 
 /* Gives the graphics clock another rate (Hz), 0 for the scene's own steps again, and a share of each period by which it

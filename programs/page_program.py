@@ -14,10 +14,10 @@ from hapticlink.fmus.native.compiler import compile_webassembly
 from hapticlink.fmus.native.source import functions, table
 from hapticlink.programs import refusals
 from hapticlink.programs.build import OPTIONS
-from hapticlink.programs.foreign import written
+from hapticlink.programs.foreign import write_files
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.programs.sources import HERE, prefixed, sources
+from hapticlink.programs.sources import HERE, add_prefix, write_sources
 
 PAGE = "page.c"
 """What stands in place of the FMU's own file, and includes it."""
@@ -31,7 +31,7 @@ class Drawing:
     places: Sequence[int]
 
 
-def webassembly_files(
+def write_page_sources(
     program: Resolved, components: Mapping[str, Component], ports: Sequence[Port], drawing: Drawing
 ) -> dict[str, str]:
     """The C files of the module, whose functions are those of page.c. Raises InputFault for FMUs of
@@ -39,18 +39,18 @@ def webassembly_files(
     reading = (name for name, foreign in program.foreign.items() if foreign.resources)
     reasons = (f"{name} has resources, files that a page lacks" for name in reading)
     refusals.refuse(program.scene.title, reasons)
-    texts = sources(program, components, ports)
+    texts = write_sources(program, components, ports)
     texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
     texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')
     texts["scene.h"] = f'#define GUID ""\n{texts["scene.h"]}'
     return texts
 
 
-def webassembly(texts: Mapping[str, str], folder: Path) -> bytes:
+def compile_page(texts: Mapping[str, str], folder: Path) -> bytes:
     """The module of these files, compiled in `folder`. Raises CompilerError."""
     with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
-        return compile_webassembly(written(texts, room), room, OPTIONS)
+        return compile_webassembly(write_files(texts, room), room, OPTIONS)
 
 
 def _picture(drawing: Drawing) -> dict[str, str]:
@@ -68,9 +68,9 @@ def _picture(drawing: Drawing) -> dict[str, str]:
     )
     places = table("int raw_places", map(str, drawing.places))
     parts = {f"picture_{k:03}.c": piece for k, piece in enumerate(pieces)}
-    files = {name: prefixed(part, "picture") for name, part in parts.items()}
+    files = {name: add_prefix(part, "picture") for name, part in parts.items()}
     return {
         **files,
-        "picture.c": prefixed(text, "picture") + call,
+        "picture.c": add_prefix(text, "picture") + call,
         "picture.h": f"{numbers}{places}\n{declared}\n",
     }

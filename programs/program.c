@@ -24,7 +24,6 @@
 #include "fmi2Functions.h"
 
 #include "loop.h"
-#include "latencies.h"
 
 typedef const fmi2ValueReference *References;
 
@@ -96,20 +95,15 @@ static const double GROWTH = 1e12;     /* of outputs without a bound: fmi/instan
 static const double SHARE = 1e-6;      /* of a step that is whole: fmi/status.py */
 static const double NEAR = 1e-3;       /* of a tick, by which a time may be before it */
 
-enum { MOST_POINTS = 64, OWN_RATE = -1 }; /* of the window of a clock whose rate was changed; back to the scene's */
-
-typedef struct { /* of the scene while it runs: changes.h */
-    int64_t chosen[N_HOLDS + 1], delay[N_HOLDS + 1]; /* 1 + choice, 0: the scene's; ticks, -1: the scene's */
-    int64_t millihertz, begun, index, kinds; /* 0: the scene's rate; points and kinds made since */
-    double jitter;
-    Pcg64 generator;
+typedef struct { /* of the scene while it runs: prepared_changes.h */
+    int64_t chosen[N_HOLDS + 1], direct[N_HOLDS + 1]; /* 1 + choice, 0: the scene's; without latency */
+    int64_t round[N_CLOCKS], kinds; /* of the patterns of clocks; spare kinds so far */
 } Changes;
 
 typedef struct { /* what fmi2GetFMUstate saves, beside the states of the blocks */
     char guid[40];
     int64_t mode, settled, tick; /* settled: start values agree. tick: where the program stands */
     double time;
-    Pcg64 generators[N_LATENCIES + 1];
     double step_errors[N_FMUS][N_CHECKED + 1]; /* sums of the rows of step checks that are dropped */
     Changes changes;
     Scene scene;
@@ -196,7 +190,6 @@ static fmi2Status restart(Model *m) {
     memcpy(m->now.guid, GUID, sizeof GUID);
     memcpy(&m->now.scene, &initial, sizeof initial);
     m->now.mode = INSTANTIATED;
-    for (int i = 0; i < N_LATENCIES; i++) m->now.generators[i] = latencies[i].generator;
     relocate(m);
     for (int i = 0; i < N_SETTABLE; i++) {
         const Variable *v = variables + i;
@@ -273,7 +266,7 @@ static int begin(Model *m) {
     return hapticlink_block(l, &at, 0);
 }
 
-#include "changes.h"
+#include "prepared_changes.h"
 
 /* --- events ---------------------------------------------------------------------------------- */
 
@@ -284,28 +277,6 @@ static int64_t next_tick(const Events *e) {
         if (c->starts[c->at] < tick) tick = c->starts[c->at];
     }
     return tick;
-}
-
-/* The window of a clock moves on by its pattern; 0 where its communication points end. */
-static int next_window(Clock *c, const Pattern *p) {
-    int64_t *starts = (int64_t *)c->starts;
-    if (!p->n) return 0;
-    const int64_t phase = c->n - p->n; /* 1 where the first step is none of the pattern's */
-    for (int64_t i = 0; i < p->n; i++) starts[i] = starts[i + phase] + p->ticks;
-    c->n = p->n;
-    c->at = 0;
-    return 1;
-}
-
-static void draw(Model *m, int64_t hold) {
-    int i = 0;
-    Link *link = m->now.scene.loop.holds[hold]->link;
-    const Changes *now = &m->now.changes;
-    const int is_changed = now->chosen[hold] && now->delay[hold] >= 0;
-    while (!is_changed && latencies[i].hold != hold) i++;
-    for (int64_t k = 0; k < link->n_late; k++)
-        link->late[k] = is_changed ? now->delay[hold] : latency_draw(latencies + i, m->now.generators + i);
-    link->at_late = 0;
 }
 
 /* Adds the rows of step checks to their sums. */
@@ -379,15 +350,13 @@ static int serve(Model *m, int code) {
     switch (code) {
     case PAUSE: return 1;
     case STARTS:
-        if (next_rated_window(m, s->events.clocks + at->what)) return 1;
-        if (next_window(s->events.clocks + at->what, patterns + at->what)) return 1;
+        if (own_points(m, (int)at->what, m->now.changes.round[at->what] + 1)) return 1;
         fail(m, fmi2Error, "the scene's communication points end at t = %.17g s: give it a longer "
              "duration", seconds(m, next_tick(&s->events)));
         return 0;
     case KIND:
         if (new_kind(m)) return 1;
         break;
-    case DRAW: draw(m, op->a); return 1;
     case JUDGE:
         at->op++;
         return judge(m, l->fmus + op->a);

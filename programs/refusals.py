@@ -10,7 +10,7 @@ from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
-from hapticlink.programs.foreign import Foreign, read
+from hapticlink.programs.foreign import Foreign, read_foreign
 
 
 def of_scene(scene: Scene) -> None:
@@ -40,7 +40,7 @@ def of_system(system: System, outside: str | None, scene: Scene) -> dict[str, Fo
     for name in (fmu.name for fmu in scene.fmu if fmu.path and fmu.name != outside):
         description = system.fmu[name].description
         try:
-            foreign[name] = read(description)
+            foreign[name] = read_foreign(description)
         except InputFault as why:
             reasons.append(f"{name} ({description.path}) is an FMU that exists already, and {why}")
     if reasons:

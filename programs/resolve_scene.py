@@ -37,8 +37,14 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
 from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
-from hapticlink.programs.changes import CLOCK, LEAST_RATE, NONE, Changes, changes
 from hapticlink.programs.foreign import Foreign
+from hapticlink.programs.prepared_changes import (
+    CLOCK,
+    LEAST_RATE,
+    NONE,
+    PreparedChanges,
+    prepare_changes,
+)
 
 NO_END = 2**61
 """The end (ticks) of a program's timeline: as far as its times are exact it has none."""
@@ -61,7 +67,7 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Resolved:
-    """A scene's run as structures in memory, valid within the context of `resolved`."""
+    """A scene's run as structures in memory, valid within the context of `resolve_scene`."""
 
     scene: Scene
     system: System
@@ -92,7 +98,7 @@ class Resolved:
     """The outputs, `fmu.output`, that the scene records."""
     start_values: NDArray[np.float64]
     """The vector of signals at t = 0."""
-    changes: Changes
+    changes: PreparedChanges
     """What it can be changed to while it runs."""
     kept: object
     """What the structures lie in."""
@@ -116,7 +122,7 @@ class Resolved:
 
 
 @contextmanager
-def resolved(
+def resolve_scene(
     scene: Scene, outside: str | None = None, changing: bool = False
 ) -> Iterator[Resolved]:
     """The structures of a scene's run. outside: the block to leave out. changing: holds and rates
@@ -198,10 +204,10 @@ def _resolved(
     for event in _kinds(system.timeline):
         every = instructions(plan.block(event), simulation)
         kinds[event] = machine.block([i for i in every if getattr(i, "fmu", "") != outside])
-    possible = changes(machine, simulation, plan, kinds) if changing else NONE
+    possible = prepare_changes(machine, simulation, plan, kinds) if changing else NONE
     left = machine.in_python.items()
     refusals.refuse(scene.title, (f"{operation}: {why}" for operation, why in left))
-    events = Events(system.timeline, kinds, possible)
+    events = EventData(system.timeline, kinds, possible)
     fmus, memory = machine.names("fmu"), Memory()
     into = [n for n in fmus if any(c.target == n for c in system.connections)]
     setters = (structures.Setter * len(into))()
@@ -327,12 +333,12 @@ def _repeats(starts: Sequence[int]) -> int:
     return starts.repeats if isinstance(starts, Frames) else 1
 
 
-class Events:
+class EventData:
     """The structure of the event loop, with the kinds of events and the blocks of their operations,
     and the first communication points of each clock with their patterns."""
 
     def __init__(
-        self, timeline: Timeline, kinds: Mapping[Event, tuple[int, int]], possible: Changes
+        self, timeline: Timeline, kinds: Mapping[Event, tuple[int, int]], possible: PreparedChanges
     ) -> None:
         n, n_kinds = len(timeline.clocks), len(kinds) + possible.n_kinds
         self.patterns: list[Pattern] = []

@@ -8,15 +8,12 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from hapticlink.components.component import Component
 from hapticlink.fmus.cache import sha
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
 from hapticlink.fmus.native.native_fmu_entries import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number, table
 from hapticlink.fmus.reproducible_zip import guid_of
-from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
 from hapticlink.orchestrator.run.compiled import build as loop
 from hapticlink.programs.memory_as_c import Regions, TypedData
@@ -24,12 +21,12 @@ from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
 
 HERE = Path(__file__).parent
-OWN = ("program.c", "changes.h", "latencies.h", "platform.c")
+OWN = ("program.c", "prepared_changes.h", "platform.c")
 REPLACED = ("platform.c", "process_state.c")
 """Files of the loop in whose place a program has its own platform.c."""
 
 
-def sources(
+def write_sources(
     resolved: Resolved, components: Mapping[str, Component], ports: Sequence[Port]
 ) -> dict[str, str]:
     """All C files by name; scene.h lacks the GUID. components: of the members that are blocks of
@@ -67,10 +64,10 @@ def _member(id_: str, component: Component) -> tuple[str, dict[str, str]]:
     own = f'{prefix}#define GUID "{guid}"\n{header}'
     text = WRAPPER.read_text().replace('#include "component.h"', own)
     files = {f"{id_}.c": text} | {f"{id_}_{k:03}.c": piece for k, piece in enumerate(pieces)}
-    return guid, {name: prefixed(text, id_) for name, text in files.items()}
+    return guid, {name: add_prefix(text, id_) for name, text in files.items()}
 
 
-def prefixed(text: str, id_: str) -> str:
+def add_prefix(text: str, id_: str) -> str:
     text = text.replace("component_ ## ID", f"{id_}_ ## ID")
     return re.sub(r"\bpart(\d+)_", rf"{id_}_part\1_", text)
 
@@ -95,7 +92,6 @@ def _scene(
     data = TypedData(regions, handles, addresses)
     changes = resolved.changes
     settable = [p for p in ports if p.kind in ("INPUT", "OUTSIDE", "PARAMETER")]
-    latencies = [*_latencies(resolved)]
     slot_members = [member for _, member in data.slots]
     checks = [c for fmu, c in resolved.simulation.step_checks.items() if fmu in members]
     described = [(fmu, resolved.system.fmu[fmu].description) for fmu in resolved.signal_order]
@@ -112,7 +108,6 @@ def _scene(
         "N_SETTABLE": len(settable),
         "N_VARIABLES": len(ports),
         "N_GIVEN": len(given),
-        "N_LATENCIES": len(latencies),
         "N_CHECKED": max((len(c.scales) for c in checks), default=0),
         "N_START_SETTERS": len(resolved.start_fmus),
         "N_POINTERS": len(data.pointers),
@@ -161,7 +156,6 @@ def _scene(
                 str(resolved.tables.index(resolved.system.fmu[fmu].clock)) for fmu in members)),
             table("int start_fmus", map(str, resolved.start_fmus)),
             table("Pattern patterns", (f"{{{p.n}, {p.ticks}}}" for p in resolved.patterns)),
-            table("Latency latencies", latencies),
             table("char *const holds", map(json.dumps, resolved.holds)),
             table("char *const signals", map(json.dumps, names)),
             table("double bounds", (number(s.bound or 0.0) for s in outputs)),
@@ -232,20 +226,3 @@ def _lacking(resolved: Resolved, capability: str) -> str:
 def _variable(port: Port) -> str:
     place = f"{port.type.upper()}, {port.member}, {int(port.fixed)}, {port.reference}, {port.place}"
     return f"{{{port.kind}, {place}, {json.dumps(port.name)}}}"
-
-
-def _latencies(resolved: Resolved) -> Iterator[str]:
-    """The latencies of holds, as whole numbers of a common unit."""
-    base = resolved.system.timeline.base
-    for index, connection in enumerate(resolved.holds):
-        if not (latency := resolved.system.connection[connection].latency):
-            continue
-        low = exact(latency.min) / base
-        high = low if latency.max is None else exact(latency.max) / base
-        unit = np.lcm(low.denominator, high.denominator)
-        low, spread = low * int(unit), (high - low) * int(unit)
-        state = np.random.PCG64(latency.seed).state["state"]
-        words = ", ".join(
-            f"{{{value >> 64}u, {value % 2**64}u}}" for value in (state["state"], state["inc"])
-        )
-        yield (f"{{{index}, {low}u, {spread}u, {unit}u, {number(latency.loss)}, {{{words}}}}}")

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPositio
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
 from hapticlink.orchestrator.results.run_results import Recorder, RunResults
-from hapticlink.orchestrator.run import apply_timed_events
+from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meter import Meters
@@ -79,7 +79,9 @@ class Simulation(LoadedFmus):
                 self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
         self.meters.start()
         self.balance.start()
-        apply_timed_events.arm(self)
+        for change in self.system.changes:
+            if change.fmu:
+                InputSetter(change, self).wait(change.begin)
         for fmu in self.system.fmus:
             incoming = self.system.into(fmu.name)
             if not incoming:

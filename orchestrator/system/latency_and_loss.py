@@ -28,6 +28,7 @@ class Link:
     (s), a loss with the given probability, both from PCG64 with the seed."""
 
     def __init__(self, latency: Latency, base: Fraction) -> None:
+        self.latency = latency
         self._low = exact(latency.min)
         self._spread = exact(latency.max) - self._low if latency.max is not None else Fraction(0)
         self._loss, self._base = latency.loss, base
@@ -43,6 +44,16 @@ class Link:
         if luck < self._loss:
             return -1
         return math.ceil((self._low + self._spread * Fraction(share)) / self._base)
+
+    def whole_numbers(self) -> tuple[int, int, int]:
+        """The latency as (low + spread u)/unit ticks, each number below 2^63; where the exact ones
+        are larger they are rounded up to multiples of a power of 2, and so, in ticks, to at least
+        what they are."""
+        low, spread = self._low / self._base, self._spread / self._base
+        unit = math.lcm(low.denominator, spread.denominator)
+        if (low + spread) * unit >= 2**63 or unit >= 2**63:
+            unit = 2 ** max(62 - math.ceil(low + spread).bit_length(), 0)
+        return math.ceil(low * unit), math.ceil(spread * unit), unit
 
     def send(self, stamp: int, item: Any = None, earliest: int = 0) -> None:
         """Send a sample, which arrives at `earliest` (tick) or later."""

@@ -135,7 +135,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class Change:
+class InputChange:
     """What the steps of an FMU from `begin` on get (s): `values` of `inputs` once, or before each
     step that begins before `end` if that is given. Without values, the inputs keep what `held`
     brings them at `begin`; `noise` is the standard deviation that adds to it, with a seed. text:
@@ -169,7 +169,7 @@ class System:
     """Holds that did not fit."""
     replacements: Mapping[str, Replacement] = field(default_factory=dict)
     """The FMUs in the place of the loop's blocks, by name."""
-    changes: tuple[Change, ...] = ()
+    changes: tuple[InputChange, ...] = ()
     """What happens at given times, in their order."""
 
     @cached_property

@@ -12,20 +12,20 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import TimedEvent, Value
 from hapticlink.orchestrator.scene.toml_keys import Problem, reported
+from hapticlink.orchestrator.system.changes import feeding, settable
 from hapticlink.orchestrator.system.fmu_tables import entries_of
 from hapticlink.orchestrator.system.ports import carries_power, scalars_of
-from hapticlink.orchestrator.system.springs import limited_gains
-from hapticlink.orchestrator.system.system import Change, Connection, System
+from hapticlink.orchestrator.system.system import Connection, InputChange, System
 from hapticlink.orchestrator.system.timeline import GRAPHICS_RATE
 
 
-def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[Change, ...]:
+def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[InputChange, ...]:
     """The changes in the order of their times, without those after the end of the run. Findings are
     appended to `problems`."""
     if scene.at and scene.coupling == "iterated":
         problems.append((("at",), 'steps are repeated with coupling = "iterated": take another'))
     events = _Events(scene, system)
-    taken: list[Change] = []
+    taken: list[InputChange] = []
     for i, event in enumerate(scene.at):
         for key, asked in (("set", event.set), ("override", event.override)):
             for name, value in asked.items():
@@ -56,50 +56,44 @@ class _Events:
     def __init__(self, scene: Scene, system: System) -> None:
         self._scene, self._system = scene, system
 
-    def given(self, event: TimedEvent, key: str, name: str, value: Value) -> Change:
+    def given(self, event: TimedEvent, key: str, name: str, value: Value) -> InputChange:
         """A value that is set once, or that overrides a connection."""
         if name == GRAPHICS_RATE and key == "set":
             begin = self._begin("graphics", event.time)
-            return Change(begin, f"{name} = {value} Hz")
+            return InputChange(begin, f"{name} = {value} Hz")
         table = GRAPHICS_RATE.partition(".")[0]
         if name.startswith(f"{table}.") and table not in self._system.fmu:
             raise ValueError(f"of the keys of a scene's rates {GRAPHICS_RATE} alone can be set")
-        scalars = self._scalars(name)
-        feeding = self._feeding(name)
-        text = f"{name} = {shortened(str(value))}"
+        text, fed = f"{name} = {shortened(str(value))}", feeding(self._system, name)
         if key == "override":
-            self._require_disturbable(name, feeding)
+            self._require_disturbable(name, fed)
+            scalars = scalars_of(self._system.fmu, name, "input", "parameter")
             return self._change(event, name, f"{text} instead of its connection",
                                 inputs=scalars, values=_numbers(name, value, scalars),
                                 end=self._end(event))  # fmt: skip
-        if feeding:
-            raise ValueError(f"{name} is fed by {feeding[0].name}: take override")
-        for scalar in scalars:
-            if scalar.causality == "parameter" and scalar.variability != "tunable":
-                raise ValueError(f"{name} is not tunable: it keeps its start value")
-        if name in limited_gains(self._system):
-            raise ValueError(f"{name} is a gain of a spring whose energy `pspm` limits")
+        if fed:
+            raise ValueError(f"{name} is fed by {fed[0].name}: take override")
+        scalars = settable(self._system, name)
         return self._change(
             event, name, text, inputs=scalars, values=_numbers(name, value, scalars)
         )
 
-    def brought(self, event: TimedEvent, name: str, noise: float) -> Change:
+    def brought(self, event: TimedEvent, name: str, noise: float) -> InputChange:
         """An input that is frozen, or gets noise."""
-        self._scalars(name)
-        feeding = self._feeding(name)
-        self._require_disturbable(name, feeding)
-        if len(feeding) > 1:
-            raise ValueError(f"{name} is fed by {len(feeding)} connections: name one entry")
+        fed = feeding(self._system, name)
+        self._require_disturbable(name, fed)
+        if len(fed) > 1:
+            raise ValueError(f"{name} is fed by {len(fed)} connections: name one entry")
         text = f"noise of {noise:g} on {name}" if noise else f"{name} frozen"
-        return self._change(event, name, text, inputs=feeding[0].inputs, end=self._end(event),
-                            held=feeding[0], noise=noise, seed=event.seed)  # fmt: skip
+        return self._change(event, name, text, inputs=fed[0].inputs, end=self._end(event),
+                            held=fed[0], noise=noise, seed=event.seed)  # fmt: skip
 
-    def _change(self, event: TimedEvent, name: str, text: str, **parts: object) -> Change:
+    def _change(self, event: TimedEvent, name: str, text: str, **parts: object) -> InputChange:
         fmu = name.partition(".")[0]
         begin = self._begin(self._system.fmu[fmu].clock, event.time)
         until = parts.get("end")
         text += f" until {event.until:g} s" if until is not None and event.until else ""
-        return Change(begin, text, fmu, **parts)  # type: ignore[arg-type]
+        return InputChange(begin, text, fmu, **parts)  # type: ignore[arg-type]
 
     def _begin(self, clock: str, time: float) -> float:
         """The first communication point of a clock at or after a time (s), infinity where there is
@@ -115,26 +109,18 @@ class _Events:
     def _end(self, event: TimedEvent) -> float:
         return self._scene.duration + 1.0 if event.until is None else event.until
 
-    def _scalars(self, name: str) -> tuple[Scalar, ...]:
-        return scalars_of(self._system.fmu, name, "input", "parameter")
-
-    def _feeding(self, name: str) -> list[Connection]:
-        named = {s.name for s in self._scalars(name)}
-        into = self._system.into(name.partition(".")[0])
-        return [c for c in into if named & {s.name for s in c.inputs}]
-
-    def _require_disturbable(self, name: str, feeding: list[Connection]) -> None:
+    def _require_disturbable(self, name: str, fed: list[Connection]) -> None:
         fmu = name.partition(".")[0]
-        if not feeding:
+        if not fed:
             raise ValueError(f"{name} is fed by no connection: take set")
-        if carries_power(feeding[0], self._system.energy.power):
+        if carries_power(fed[0], self._system.energy.power):
             raise ValueError(
                 f"{name} carries power, which is measured as its connection brings it: disturb "
                 "what its source gets, or set a parameter of the source"
             )
         if fmu in self._scene.get_after_set:
             raise ValueError(f"{fmu} is in get_after_set: its outputs are read before that is set")
-        if any(c.needs == "spring" for c in feeding):
+        if any(c.needs == "spring" for c in fed):
             raise ValueError(f"{name} is held by `pspm`, which accounts for what it brings")
 
 

@@ -56,6 +56,8 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
     return Timeline(base, steps * a_tick, tuple(stepped), given.of)
 
 
+SLOWEST = 1e-3
+"""Rate (Hz) below which a clock that is given it would not tick within a run."""
 GRAPHICS_RATE = "graphics.rate"
 """What `[[at]]` sets of a clock."""
 
@@ -69,19 +71,28 @@ def _changed(
     for i, event in sorted(enumerate(scene.at), key=lambda pair: pair[1].time):
         if (rate := event.set.get(GRAPHICS_RATE)) is None:
             continue
-        where = ("at", i, "set", GRAPHICS_RATE)
-        number = isinstance(rate, int | float) and not isinstance(rate, bool)
-        least = a_tick * base
-        if not number or not float(rate) >= 1e-3 or 1 / exact(rate) < least:  # type: ignore[arg-type]
-            message = f"{rate!r}: give a rate (Hz) from 0.001 to that of the haptics, {1 / least}"
-            raise SceneFault(scene.title, [scene.place(where, message)])
-        period = 1 / (exact(rate) * base)  # type: ignore[arg-type]
+        try:
+            period = changed_period(rate, base, a_tick)
+        except ValueError as error:
+            where = scene.place(("at", i, "set", GRAPHICS_RATE), str(error))
+            raise SceneFault(scene.title, [where]) from error
         before = starts[: bisect_left(starts, exact(event.time) / base) + 1]
         begin = before[-1]
         count = max(math.ceil((end - begin) / period), 0) + 3
         later = (math.ceil((begin + k * period) / a_tick) * a_tick for k in range(1, count))
         starts = (*before, *later)
     return starts
+
+
+def changed_period(rate: object, base: Fraction, a_tick: int) -> Fraction:
+    """The period, in ticks of `base` (s), of a clock that is given another rate (Hz) in a run.
+    Raises ValueError for one below SLOWEST or above the haptic one, of steps of `a_tick` ticks."""
+    fastest = 1 / (a_tick * base)
+    is_number = isinstance(rate, int | float) and not isinstance(rate, bool)
+    if not is_number or not SLOWEST <= rate < math.inf or exact(rate) > fastest:
+        limits = f"from {SLOWEST:g} up to that of the haptics, {fastest}"
+        raise ValueError(f"{rate!r}: give a rate (Hz) {limits}")
+    return 1 / (exact(rate) * base)
 
 
 def _period(pace: Pace) -> Fraction:

@@ -205,6 +205,15 @@ def test_a_rate_is_changed_from_the_end_of_the_step_on() -> None:
     assert made.run["real_time"]["samples"]["graphics"]["late"] == 0
 
 
+def test_a_rate_is_changed_as_by_a_scene_that_has_it_then() -> None:
+    """A rate whose periods are no whole ticks, of which each end is the first tick after it."""
+    made = ran("closed-loop", once(0.1, lambda live: live.rate("graphics", 37.3)), "duration=1.0",
+               "graphics.rate=32")  # fmt: skip
+    at = [{"time": 4 / 32, "set": {"graphics.rate": 37.3}}]
+    again = hl.run("closed-loop", {"duration": 1.0, "graphics.rate": 32, "at": at})
+    assert np.array_equal(made.graphics["time"], again.graphics["time"])
+
+
 def test_a_rate_of_none_brings_back_the_steps_of_the_scene() -> None:
     """30 Hz, whose periods are no whole haptic ticks; the first is at least one such tick long."""
     turns = [once(0.1, lambda live: live.rate("graphics", 64.0)),
@@ -218,7 +227,7 @@ def test_a_rate_of_none_brings_back_the_steps_of_the_scene() -> None:
 
 
 def test_jitter_moves_each_end_by_up_to_half_its_share_of_a_period() -> None:
-    """Around the ends of a steady rate, on ticks, without drift; a seed gives the same again."""
+    """Around the ends of a steady rate, on ticks, without drift, as NumPy draws them."""
     ends = {}
     for seed in (0, 0, 1):
         change = once(0.1, lambda live, s=seed: live.rate("graphics", 20.0, 0.5, s))
@@ -227,7 +236,9 @@ def test_jitter_moves_each_end_by_up_to_half_its_share_of_a_period() -> None:
         off = 20 * (time[5:] - time[4] - np.arange(1, len(time) - 4) / 20)
         assert np.abs(off).max() < 0.25 + 20 / 512
         assert 0.12 < off.std() < 0.17  # uniform: 0.5 / sqrt(12) = 0.144
-        assert np.array_equal(time * 512, np.round(time * 512))
+        drawn = np.random.Generator(np.random.PCG64(seed)).random(len(time) - 5)
+        ends_in_ticks = 25.6 * (np.arange(1, len(time) - 4) + 0.5 * (drawn - 0.5))
+        assert np.array_equal(time[5:] * 512, time[4] * 512 + np.ceil(ends_in_ticks))
         assert ends.setdefault(seed, time.tolist()) == time.tolist()
         assert "jitter 0.5" in made.run["real_time"]["changes"][0][1]
     assert ends[0] != ends[1]

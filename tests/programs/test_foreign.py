@@ -18,7 +18,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.programs.build import build_program, program_files
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 from hapticlink.visualization.standalone import page
 from tests.fmus.named_fmu import Named
 from tests.orchestrator import c_fmus, foreign_scenes, native_mass
@@ -135,15 +135,14 @@ def test_it_runs_in_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     table_fmu(tmp_path)
     beside = f'fmu.+={{name="one", path="{tmp_path}/one.fmu"}}'
     wired = 'connection.+={from="virtual_mechanism.x[1]", to="one.F", factor=100, convert=false}'
-    opened = viewed("pendulum", (beside, wired))
+    opened = load_viewed_scene("pendulum", (beside, wired))
     rows = test_page_program.under_node(page.html(opened, "page"), [])
     monkeypatch.setattr(test_page_program, "CHANGES", [])
     changed = test_page_program.changed_run(opened, lambda *_: None)
     assert np.abs(rows - changed).max() < 1e-9
+    added = load_viewed_scene("pendulum", (f'fmu.+={{name="table", path="{tmp_path}/table.fmu"}}',))
     with pytest.raises(InputFault, match="table has resources, files that a page lacks"):
-        page.html(
-            viewed("pendulum", (f'fmu.+={{name="table", path="{tmp_path}/table.fmu"}}',)), "t"
-        )
+        page.html(added, "t")
 
 
 @pytest.mark.parametrize(

@@ -28,13 +28,13 @@ from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
 from hapticlink.programs.build import components
-from hapticlink.programs.page_program import webassembly_files
+from hapticlink.programs.page_program import write_page_sources
 from hapticlink.programs.ports import ports
-from hapticlink.programs.resolve_scene import resolved
+from hapticlink.programs.resolve_scene import resolve_scene
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, load_viewed_scene
 from hapticlink.visualization.standalone import page
-from hapticlink.visualization.standalone.description import Description
+from hapticlink.visualization.standalone.description import PageDescription
 from tests.visualization.browser_code.javascript import javascript
 
 P_C = "virtual_environment.P_c -> controller.P_c"
@@ -68,7 +68,7 @@ for (let i = 1; i <= given.events; i++) {
 
 
 def dragged(options: tuple[str, ...] = ()) -> Scene:
-    return viewed("closed-loop", options, duration=1.5)
+    return load_viewed_scene("closed-loop", options, duration=1.5)
 
 
 @cache
@@ -95,7 +95,7 @@ def changed_run(scene: Scene, apply: Callable[[LiveRun, Any], None]) -> np.ndarr
         simulation.start()
         live = LiveRun(scene)
         vars(live).update(
-            _simulation=simulation, _loop=loop, _settings={}, _connections={}, _places={},
+            _simulation=simulation, _loop=loop, _setters={}, _connections={}, _places={},
             _run=SimpleNamespace(changes=[]),
         )  # fmt: skip
         haptic = system.timeline.clocks[0].longest
@@ -172,11 +172,11 @@ MUSL = (
 @pytest.mark.skipif(fmpy.platform != "linux64", reason="runs a program for Linux")
 def test_webassembly_has_the_bits_of_the_same_c_with_the_same_sine(tmp_path: Path) -> None:
     """Against a program for this machine with musl, whose mathematics WebAssembly has, too."""
-    with resolved(dragged(), changing=True) as program:
+    with resolve_scene(dragged(), changing=True) as program:
         made = components(program)
         variables = ports(program, made)
-        description = Description(program, variables, "page")
-        files = webassembly_files(program, made, variables, description.drawing)
+        description = PageDescription(program, variables, "page")
+        files = write_page_sources(program, made, variables, description.drawing)
     references = description.data["parameters"]
     pull = dict(zip(references["hand.target"], (0.06, -0.01, 0.0), strict=True))
     pull |= dict(zip(references["hand.stiffness"], STIFFNESS, strict=True))

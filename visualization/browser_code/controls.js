@@ -1,6 +1,6 @@
 // The controls of the running FMUs. They show the values that the run reports, not those last set.
 import { text } from "./canvas.js";
-import { set } from "./changes.js";
+import { set } from "./settings.js";
 
 const NAMES = {
   "hand.stiffness": "Hand: stiffness", "hand.damping": "Hand: damping",

@@ -5,13 +5,12 @@ import { Controls } from "./controls.js";
 import { Ending } from "./ending.js";
 import { Energies } from "./energies.js";
 import { tags } from "./legend.js";
-import { asked, differing, written } from "./links.js";
+import { addressOf, differing, messagesOf } from "./settings.js";
 import { loudness } from "./loudness.js";
 import { presets, restored } from "./presets.js";
-import { connected } from "./socket.js";
+import { connectToServer, startWorker } from "./runs.js";
 import { Sound } from "./sound.js";
 import { Stage } from "./stage.js";
-import { started } from "./worker_run.js";
 
 const $ = (id) => document.getElementById(id);
 let untouched = true; // nobody has pulled yet
@@ -166,7 +165,7 @@ function restore() { choose(null); restored(acting(), start).forEach(change); }
 
 // Does what the page's address asks for, of run A and, where it has settings of B, of both.
 function follow() {
-  const { "": a, "b.": b, why } = asked(location.hash, start);
+  const { "": a, "b.": b, why } = messagesOf(location.hash, start);
   for (const message of a) run.send(message);
   if (b.length) {
     run.compare(true);
@@ -181,7 +180,7 @@ function note_address() {
   clearTimeout(later);
   later = setTimeout(() => {
     const b = shown.b ? differing(shown.b.controls, start).map(([key, value]) => [`b.${key}`, value]) : [];
-    address = written([...differing(shown.controls, start), ...b]);
+    address = addressOf([...differing(shown.controls, start), ...b]);
     if (address !== location.hash.slice(1)) location.replace(`#${address}`);
   }, 300);
 }
@@ -234,6 +233,6 @@ function draw() {
   requestAnimationFrame(draw);
 }
 // The run is in this file, as its program, or behind the server that the page is from.
-const run = ($("program") ? started : connected)({ received, opened: note, lost });
+const run = ($("program") ? startWorker : connectToServer)({ received, opened: note, lost });
 $("hear").hidden = !run.listen;
 draw();

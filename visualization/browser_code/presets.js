@@ -1,5 +1,5 @@
 // Settings of a scene that show something, each with what it changes; and all settings as at the start.
-import { changes, set } from "./changes.js";
+import { changes, set } from "./settings.js";
 
 // Hz, and the factor of the coupling's damping with which extrapolated motion grows by half the rate in the mouse's hand.
 const CALM_RATE = 64, BUZZ_RATE = 16, MORE = 1.1;

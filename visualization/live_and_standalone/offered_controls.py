@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings import labels
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.live_changes import choices_of_slower
+from hapticlink.orchestrator.system.changes import choices_of_slower
 from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
@@ -30,6 +30,10 @@ RATE, JITTER, RENDERED = "graphics.rate", "jitter", "controller.topology"
 """Keys of the controls of the rate (Hz), of the share of its period by which each may be shorter or
 longer, and of whether constrained directions are rendered. Further ones, by connection and
 parameter: `holds.NAME`, `delays.NAME` (s) and `gains.NAME`, a factor on the scene's value."""
+RANGES = {
+    "graphics": (0.01, 1e4), "jitter": (0.0, 0.9), "delays": (0.0, 1.0), "gains": (0.0, 1e2)
+}  # fmt: skip
+"""Of the values of controls that are numbers, by the first part of their key."""
 Settings = dict[str, Any]
 """What was changed on the page, by key, which a run that begins anew gets again."""
 
@@ -39,7 +43,11 @@ class Offered:
     connection, the present one first; the graphics `rate`, None where there is none."""
 
     def __init__(
-        self, scene: Scene, system: System, holds: Mapping[str, list[str]] | None = None
+        self,
+        scene: Scene,
+        system: System,
+        holds: Mapping[str, list[str]] | None = None,
+        ranges: Mapping[str, tuple[float, float]] = RANGES,
     ) -> None:
         self.gains = _gains(scene, system)
         self.holds = choices_of_slower(system) if holds is None else holds
@@ -47,8 +55,8 @@ class Offered:
         of = dict.fromkeys(labels.block(f.name) or f.name for f in fmus)
         self._of = " and ".join(of)
         self.rate = scene.graphics.rate if scene.graphics and fmus else None
-        haptics = system.timeline
-        self._most = float(1 / (haptics.clocks[0].longest * haptics.base))
+        haptics = 1 / (system.timeline.clocks[0].longest * system.timeline.base)
+        self._ranges = {**ranges, "graphics": (ranges["graphics"][0], float(haptics))}
 
     @property
     def own_rate(self) -> float | None:
@@ -59,8 +67,8 @@ class Offered:
         """The controls by `key`, each with its value and what bounds it, as JSON has it."""
         controls: list[dict[str, Any]] = []
         if self.rate is not None:
-            rate = {"key": RATE, "value": self.own_rate, "max": self._most}
-            controls += [rate | {"words": _titled(self._of)}, {"key": JITTER, "value": 0.0}]
+            rate = {"key": RATE, "value": self.own_rate, "words": _titled(self._of)}
+            controls += [rate, {"key": JITTER, "value": 0.0}]
         if self.topology:
             controls.append({"key": RENDERED, "value": True})
         for name, choices in self.holds.items():
@@ -72,7 +80,11 @@ class Offered:
         for name, (value, units) in self.gains.items():
             start = {"start": value.tolist(), "units": units}
             controls.append({"key": f"gains.{name}", "value": 1.0} | start)
-        return [c | {"value": settings.get(c["key"], c["value"])} for c in controls]
+        for control in controls:
+            control["value"] = settings.get(control["key"], control["value"])
+            if limits := self._ranges.get(control["key"].partition(".")[0]):
+                control["min"], control["max"] = limits
+        return controls
 
     @property
     def topology(self) -> list[str]:

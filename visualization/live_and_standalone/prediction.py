@@ -22,7 +22,7 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import built
-from hapticlink.orchestrator.system.live_changes import held_by
+from hapticlink.orchestrator.system.changes import held_by
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
@@ -41,19 +41,21 @@ Parameters = Mapping[str, Sequence[float]]
 """Tunable parameters, `fmu.port`, with their values."""
 
 
-def predicted(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
+def predict_stability(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
     """`verdict` ("" where there is none), `said`, which is its one line on the page, and `why`, its
     tooltip."""
-    *_, last = verdicts(scene, settings, parameters)
+    *_, last = predict_stepwise(scene, settings, parameters)
     return last
 
 
-def verdicts(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[dict[str, str]]:
-    """As `predicted`, of the first hands so far, which are not called stable before all are judged,
-    and then of all."""
+def predict_stepwise(
+    scene: Scene, settings: Settings, parameters: Parameters
+) -> Iterator[dict[str, str]]:
+    """As `predict_stability`, of the first hands so far, which are not called stable before all
+    are judged, and then of all."""
     cases: list[Case] = []
     try:
-        for case, beside in judged(scene, settings, parameters):
+        for case, beside in judge_hands(scene, settings, parameters):
             cases.append(case)
             if len(cases) == SO_FAR:
                 yield _verdict(cases, beside, so_far=True)
@@ -77,7 +79,9 @@ def _verdict(cases: Sequence[Case], beside: str, so_far: bool = False) -> dict[s
     return {"verdict": verdict, "said": said, "why": "\n".join(lines)}
 
 
-def judged(scene: Scene, settings: Settings, parameters: Parameters) -> Iterator[tuple[Case, str]]:
+def judge_hands(
+    scene: Scene, settings: Settings, parameters: Parameters
+) -> Iterator[tuple[Case, str]]:
     """The cases of the run, a hand each, and which friction of holds is taken out of them, in
     words. Raises InputFault where its computation would take long, and as `stability` does."""
     if settings.get(JITTER):

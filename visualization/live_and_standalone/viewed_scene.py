@@ -18,7 +18,7 @@ DURATION = 600.0
 """s after which a page begins anew, which bounds what a run keeps on the disk."""
 
 
-def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scene:
+def load_viewed_scene(name: str, options: Options = (), duration: float = DURATION) -> Scene:
     """The scene with a spring hand for each user that pulls nowhere yet, of compiled FMUs if the
     options say nothing else, and without its end at the border of the workspace. Raises InputFault
     for a scene without a linkage, or one that has an FMU of the user's in place of a hand."""
@@ -47,13 +47,13 @@ def viewed(name: str, options: Options = (), duration: float = DURATION) -> Scen
     return open_scene.load(read, changes)
 
 
-def packed(scene: Scene) -> bytes:
+def pack_scene(scene: Scene) -> bytes:
     """A scene for another process, with the plugins that it needs."""
     return pickle.dumps((tuple(registry.origins()), pickle.dumps(scene)))
 
 
-def unpacked(content: bytes) -> Scene:
-    """The scene that was `packed`."""
+def unpack_scene(content: bytes) -> Scene:
+    """The scene of `pack_scene`."""
     modules, pickled = pickle.loads(content)
     plugins.load(modules)
     scene: Scene = pickle.loads(pickled)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.real_time_session import LiveRun
-from hapticlink.orchestrator.system.live_changes import choices_between_rates
+from hapticlink.orchestrator.system.changes import choices_between_rates
 from hapticlink.visualization.live_and_standalone.offered_controls import (
     CLOCK,
     JITTER,

@@ -12,7 +12,7 @@ SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
 
 
-class Frames:
+class FrameReader:
     """The frames of one run, a few numbers each."""
 
     def __init__(self, live: LiveRun) -> None:

@@ -8,14 +8,12 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError
 
-from hapticlink.visualization.live_and_standalone.offered_controls import RENDERED
+from hapticlink.visualization.live_and_standalone.offered_controls import RANGES, RENDERED
 
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Coordinate = Annotated[Number, Field(ge=-1e3, le=1e3)]
 Name = Annotated[str, Field(max_length=200)]
-RANGES = {"graphics": (0.01, 1e4), "jitter": (0.0, 0.9), "delays": (0.0, 1.0), "gains": (0.0, 1e2)}
-"""Of the values of controls that are numbers, by the first part of their key."""
 MAX_CHARACTERS = 4096
 """Of a message."""
 

@@ -29,7 +29,7 @@ from websockets.http11 import Request, Response
 
 from hapticlink.visualization.browser_code.one_file import PAGE, headers
 from hapticlink.visualization.live_page import messages
-from hapticlink.visualization.live_page.server_pipe import Link, read, to_caller, write
+from hapticlink.visualization.live_page.server_pipe import ChildProcess, read, to_caller, write
 from hapticlink.visualization.live_page.stability_process import StabilityProcess
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Pages:
         self._holding: dict[str, ServerConnection | None] = {"": None}
         self._picture: Picture | None = None
         self._newest: dict[str, dict[str, Any]] = {}
-        self._second: Link | None = None
+        self._second: ChildProcess | None = None
         self._newest_of_second: dict[str, dict[str, Any]] = {}
         self._stability = StabilityProcess(self.show)
         self._files = {p.name: p for p in PAGE.iterdir() if p.suffix in TYPES}
@@ -116,7 +116,7 @@ class Pages:
         """Begin a second run with the settings of the first, or end it."""
         if on and not self._second and (first := self._newest.get("settings")):
             module, root = self._second_run
-            self._second = Link(module, root, first["scene"], first["settings"])
+            self._second = ChildProcess(module, root, first["scene"], first["settings"])
             self._broadcast("refused", {"type": "refused", "why": "the second run begins"})
         elif not on and self._second:
             asyncio.get_running_loop().run_in_executor(None, self._second.end)
@@ -229,9 +229,9 @@ async def _served(
         try:
             while (message := read(sys.stdin.buffer)) is not None:
                 if message["type"] == "opening":
-                    from hapticlink.visualization.live_and_standalone import opening_message
+                    from hapticlink.visualization.live_and_standalone import first_messages
 
-                    message = opening_message.opening(message["title"], *message["picture"])
+                    message = first_messages.open_page(message["title"], *message["picture"])
                 loop.call_soon_threadsafe(pages.show, message)
         finally:
             loop.call_soon_threadsafe(ended.set)

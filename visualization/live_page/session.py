@@ -17,12 +17,12 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
-from hapticlink.visualization.live_and_standalone import scene_message
+from hapticlink.visualization.live_and_standalone import first_messages
 from hapticlink.visualization.live_and_standalone.offered_controls import Settings, target
-from hapticlink.visualization.live_and_standalone.viewed_scene import packed
+from hapticlink.visualization.live_and_standalone.viewed_scene import pack_scene
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.controls import Controls
-from hapticlink.visualization.live_page.frames import Frames
+from hapticlink.visualization.live_page.frames import FrameReader
 from hapticlink.visualization.live_page.server_pipe import Pipe
 
 TURN, FRAME = 0.0035, 0.015
@@ -145,12 +145,12 @@ class Session:
 
     def _start(self, live: LiveRun) -> None:
         self._before.close()
-        self._frames, self._controls = Frames(live), Controls(live, self._settings)
+        self._frames, self._controls = FrameReader(live), Controls(live, self._settings)
         self._controls.restore()
         scene = self._scene
         self._held = {target(user): at for user, at in self._frames.handles(live).items()}
-        self._packed = packed(scene)
-        self._link.send(scene_message.running(scene, live.system, live.energies()))
+        self._packed = pack_scene(scene)
+        self._link.send(first_messages.describe_viewed_run(scene, live.system, live.energies()))
         self._tell_controls()
         if self._state["paused"]:
             live.pause()

@@ -19,7 +19,7 @@ from typing import Any
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Interrupted
-from hapticlink.visualization.live_page.server_pipe import Link, read, to_caller, write
+from hapticlink.visualization.live_page.server_pipe import ChildProcess, read, to_caller, write
 
 REST, LOOK = 0.3, 0.02
 """Times (s) for which nothing was changed before the verdict is computed, and between two looks for
@@ -33,12 +33,12 @@ class StabilityProcess:
         self._tell = tell
         self._asked: tuple[Any, ...] = ()
         self._number = 0
-        self._link: Link | None = None
+        self._link: ChildProcess | None = None
         self._answering: asyncio.Task[None] | None = None
 
     def ask(self, *asked: Any) -> None:
         """Compute the verdict on a run, instead of that which is being computed. asked: its packed
-        scene, and the other arguments of `verdicts`."""
+        scene, and the other arguments of `predict_stepwise`."""
         if asked == self._asked:
             return
         self._asked, self._number = asked, self._number + 1
@@ -57,7 +57,7 @@ class StabilityProcess:
     async def _answer(self, number: int) -> None:
         await asyncio.sleep(REST)
         if not self._link or not self._link.alive:
-            self._link = Link(__name__)
+            self._link = ChildProcess(__name__)
         self._link.send((number, *self._asked))
         while self._link.alive:
             for of, answer in self._link.received():
@@ -87,13 +87,13 @@ def main() -> None:
         os._exit(1)
 
     threading.Thread(target=receive, daemon=True).start()
-    from hapticlink.visualization.live_and_standalone.prediction import verdicts
-    from hapticlink.visualization.live_and_standalone.viewed_scene import unpacked
+    from hapticlink.visualization.live_and_standalone.prediction import predict_stepwise
+    from hapticlink.visualization.live_and_standalone.viewed_scene import unpack_scene
 
     while True:
         number, scene, *changes = questions.get()
         with suppress(Interrupted):
-            for answer in verdicts(unpacked(scene), *changes):
+            for answer in predict_stepwise(unpack_scene(scene), *changes):
                 write(out, (number, answer))
             write(out, (number, None))
 

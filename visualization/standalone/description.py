@@ -11,9 +11,11 @@ import casadi as ca
 from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
+from hapticlink.programs.prepared_changes import LEAST_RATE, MOST_DELAY
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.visualization.live_and_standalone import opening_message, scene_message
+from hapticlink.visualization.live_and_standalone import first_messages
 from hapticlink.visualization.live_and_standalone.offered_controls import (
+    RANGES,
     Offered,
     stiffness,
     target,
@@ -22,18 +24,20 @@ from hapticlink.visualization.live_and_standalone.offered_controls import (
 from hapticlink.visualization.mechanism.frame_signals import outputs
 from hapticlink.visualization.mechanism.picture import RAW, Part, Picture
 
+PREPARED = RANGES | {"graphics": (LEAST_RATE, RANGES["graphics"][1]), "delays": (0.0, MOST_DELAY)}
+"""For what a program is prepared."""
 Places = Mapping[str, Mapping[str, Sequence[int]]]
 """By user and name in a frame, the indices of its signal in the vector of signals."""
 
 
-class Description:
+class PageDescription:
     """data: as JSON has it, for program.js. drawing: what the program computes of its signals."""
 
     def __init__(self, program: Resolved, ports: Sequence[Port], name: str) -> None:
         scene, system = program.scene, program.system
         assert scene.linkage
         picture = Picture(scene.linkage, scene.all_devices, scene.contacts)
-        places, offered = _places(program), Offered(scene, system)
+        places, offered = _places(program), Offered(scene, system, ranges=PREPARED)
         parts = [p for p in picture.parts if {*p.needs} <= {*places.get(p.user, {})}]
         self.drawing = _drawing(parts, places)
         if program.changes.clock < 0:
@@ -50,8 +54,8 @@ class Description:
         chosen = [*offered.gains, *(hand["target"] for hand in hands.values())]
         self.data: dict[str, Any] = {
             "name": name,
-            "scene": scene_message.running(scene, system, program.meters)
-            | opening_message.drawn(picture),
+            "scene": first_messages.describe_viewed_run(scene, system, program.meters)
+            | first_messages.describe_picture(picture),
             "controls": offered.described({}),
             "topology": offered.topology,
             "hands": hands,

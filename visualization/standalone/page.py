@@ -15,12 +15,12 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.build import components
-from hapticlink.programs.page_program import webassembly, webassembly_files
+from hapticlink.programs.page_program import compile_page, write_page_sources
 from hapticlink.programs.ports import ports
-from hapticlink.programs.resolve_scene import resolved
+from hapticlink.programs.resolve_scene import resolve_scene
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.live_and_standalone.prediction import predicted
-from hapticlink.visualization.standalone.description import Description
+from hapticlink.visualization.live_and_standalone.prediction import predict_stability
+from hapticlink.visualization.standalone.description import PageDescription
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob: data:; "
@@ -31,7 +31,7 @@ MODULE = "page.wasm"
 
 
 def write(scene: Scene, name: str, path: Path) -> None:
-    """Write the page of a scene that `viewed` has made. name: of the files that the page saves.
+    """Write the page of a scene of `load_viewed_scene`. name: of the files that the page saves.
     Raises InputFault where the scene cannot become a program, with what stands in the way."""
     folders.ensure(path.parent, "--standalone")
     text = html(scene, name)
@@ -42,13 +42,13 @@ def write(scene: Scene, name: str, path: Path) -> None:
 def html(scene: Scene, name: str) -> str:
     """The page. The same scene gives the same bytes."""
     with temporary_folders.room() as room:
-        with resolved(scene, changing=True) as program:
+        with resolve_scene(scene, changing=True) as program:
             blocks = components(program)
             variables = ports(program, blocks)
-            description = Description(program, variables, name)
-            files = webassembly_files(program, blocks, variables, description.drawing)
+            description = PageDescription(program, variables, name)
+            files = write_page_sources(program, blocks, variables, description.drawing)
         module = _compiled(files, room)
-    verdict = predicted(scene, {}, description.parameters)
+    verdict = predict_stability(scene, {}, description.parameters)
     description.data["map"] = {"type": "map"} | verdict
     contents = {
         "data": one_file.as_json(description.data).encode(),
@@ -69,7 +69,7 @@ def _compiled(files: Mapping[str, str], room: Path) -> bytes:
         def make(folder: Path) -> Path:
             path = folder / "page.fmu"
             with path.open("xb") as file:
-                reproducible_zip.write({MODULE: webassembly(files, folder)}, file)
+                reproducible_zip.write({MODULE: compile_page(files, folder)}, file)
             return path
 
         path = cache.cached(material, make, room, interrupt.check)

@@ -101,11 +101,11 @@ static int next_event(Loop *l, Events *e) {
     for (;;) {
         for (int64_t i = 0; i < e->n_clocks; i++) {
             Clock *c = e->clocks + i;
-            c->next = c->at;
-            if (c->at + 1 >= c->n) {
+            if (c->at + 1 >= c->n && !further_points(c)) {
                 e->at.what = i;
                 return STARTS;
             }
+            c->next = c->at;
         }
         const int64_t tick = next_tick(e);
         if (tick == INT64_MAX) return DONE;
@@ -134,8 +134,10 @@ static int next_event(Loop *l, Events *e) {
 static void complete(Events *e) {
     for (int64_t i = 0; i < e->n_clocks; i++) {
         Clock *c = e->clocks + i;
-        if (c->next > c->at && c->side) c->side->awaited = 0;
+        if (c->next == c->at) continue;
         c->at = c->next;
+        c->last = c->starts[c->at - 1];
+        if (c->side) c->side->awaited = 0;
     }
     e->events++;
     e->at.op = -1;

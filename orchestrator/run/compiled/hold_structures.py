@@ -40,8 +40,8 @@ KINDS: Mapping[type[Hold], int] = {
     }.items()
 }
 """The holds that have C, with their names in loop.h."""
-DRAWN, FEW = 256, 16
-"""Latencies that are drawn at a time, and samples that there is room for at first."""
+FEW = 16
+"""Samples that there is room for at first."""
 
 
 class Parts(NamedTuple):
@@ -130,6 +130,13 @@ def fill_reader(c: structures.Reader, reader: Reader) -> None:
     c.fill(reader, "where", "factor", "offset", n=len(reader.where))
 
 
+def fill_generator(c: structures.Pcg64, seed: int) -> None:
+    """Fills the structure of NumPy's PCG64 with a seed."""
+    state = np.random.PCG64(seed).state["state"]
+    for words, number in ((c.state, state["state"]), (c.increment, state["inc"])):
+        words[:] = divmod(number, 2**64)
+
+
 class CompiledHold(Hold):
     """A hold in C. sources: the indices of its samples in the signal vector; held: where `evaluate`
     puts its value. loop: the address of the Loop that it runs in."""
@@ -164,9 +171,9 @@ class CompiledHold(Hold):
         self._growing: list[tuple[structures.Structure, dict[str, int]]] = []
         self.link = self._account = None
         if link:
-            self._link, self._late = link, np.zeros(DRAWN, np.int64)
-            self.link = structures.Link(n_late=DRAWN, at_late=DRAWN)
-            self.link.fill(late=self._late)
+            low, spread, unit = link.whole_numbers()
+            self.link = structures.Link(low=low, spread=spread, unit=unit, loss=link.latency.loss)
+            fill_generator(self.link.generator, link.latency.seed)
             self._growing = [(self.link, {"arrivals": 1, "stamps": 1, "samples": width})]
         if isinstance(own, Account):
             self._account = account = _compiled_account(own, tank)
@@ -186,12 +193,6 @@ class CompiledHold(Hold):
             accounts = {id(h.own): h._account for h in holds}
             self._c.fill(far=accounts[id(observer)], credit=credit)
 
-    def draw(self) -> None:
-        """Draw the next latencies."""
-        assert self.link is not None
-        self._late[:] = [self._link.draw() for _ in range(DRAWN)]
-        self.link.at_late = 0
-
     def grow(self) -> None:
         """Make room for more samples."""
         before, self.room = self.room, 2 * self.room or FEW
@@ -204,26 +205,18 @@ class CompiledHold(Hold):
         for growing in filter(None, (self.link, self._account)):
             growing.room = self.room
 
-    def serve(self, code: int) -> None:
-        """Do what `push` or `value` in C have returned for."""
-        if code == structures.DRAW:
-            self.draw()
-        else:
-            assert code == structures.GROW
-            self.grow()
-
     def push(self, stamp: int, sample: Vector, arrival: int) -> None:
         if self._further:
             sample = np.concatenate([sample, self._further()])
         own = np.ascontiguousarray(sample, np.float64)
         assert len(own) == self._width
-        while code := self._push(self.address, own.ctypes.data, stamp, arrival):
-            self.serve(code)
+        while self._push(self.address, own.ctypes.data, stamp, arrival):
+            self.grow()
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
         value = np.zeros(self._n)
-        while code := self._value(self.address, self._loop, tick, ahead, value.ctypes.data):
-            self.serve(code)
+        while self._value(self.address, self._loop, tick, ahead, value.ctypes.data):
+            self.grow()
         return value
 
 

@@ -128,11 +128,22 @@ static void push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
     take(h, y, stamp, arrival);
 }
 
+/* Link.draw: the next latency (ticks), -1 for a lost sample. All but the loss are whole numbers. */
+static int64_t draw(Link *k) {
+    const uint64_t share = random_bits(&k->generator), luck = random_bits(&k->generator);
+    if ((double)luck * 0x1p-53 < k->loss) return -1;
+    /* ceil(N / (unit 2^53)), N = low 2^53 + spread share. A division of 128 bits would call a
+     * function of the compiler's library, which a program lacks. */
+    const __uint128_t product = (__uint128_t)k->spread * share;
+    const uint64_t whole = (uint64_t)k->low + (uint64_t)(product >> 53), unit = (uint64_t)k->unit;
+    const uint64_t rest = (uint64_t)product & ((1ull << 53) - 1);
+    return (int64_t)(whole / unit + (whole % unit || rest));
+}
+
 /* Link.send, kept in the order of (arrival, stamp). */
 static int send(Link *k, const double *y, int64_t width, int64_t stamp, int64_t from) {
-    if (k->at_late == k->n_late) return DRAW;
     if (k->n == k->room) return GROW;
-    const int64_t late = k->late[k->at_late++];
+    const int64_t late = draw(k);
     k->sent++;
     if (late < 0) {
         k->lost++;

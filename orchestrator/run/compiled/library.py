@@ -40,6 +40,8 @@ def loaded() -> ctypes.CDLL:
         "block": (pointer, pointer, integer),
         "push": (pointer, pointer, integer, integer),
         "value": (pointer, pointer, integer, number, pointer),
+        "change_rate": (pointer, pointer),
+        "change_hold": (pointer, integer, pointer, integer),
         "watch": (ctypes.c_int,),
         "guard": (ctypes.c_int,),
         "now": (),

@@ -97,12 +97,18 @@ typedef struct {
 
 /* --- holds ------------------------------------------------------------------------------------ */
 
-/* Samples in transit: latency_and_loss.py. `late` are latencies (ticks) drawn in advance, -1 for a lost
- * sample. */
+/* PCG64 as NumPy has it, with a state and an increment of 128 bits each, the high words first. */
+typedef struct {
+    uint64_t state[2], increment[2];
+} Pcg64;
+
+/* Samples in transit: latency_and_loss.py. A sample is lost with a probability `loss`; the latency of another
+ * is (low + spread u)/unit ticks, rounded up, u uniform from 0 to 1. */
 typedef struct {
     int64_t started, newest, sent, lost, overtaken;
-    int64_t *late /* [n_late] */;
-    int64_t n_late, at_late;
+    int64_t low, spread, unit;
+    double loss;
+    Pcg64 generator;
     int64_t *arrivals /* [room] */, *stamps /* [room] */;
     double *samples /* [room * width] */;
     int64_t n, room;
@@ -241,11 +247,23 @@ typedef struct {
     int64_t started, done, awaited, longer;
 } Side;
 
-/* A window of a clock's communication points (ticks), at the current one; `next` after its event. */
+/* The rate of a clock that was changed. Steps of ticks + rest/parts ticks would end at tick + part/parts; an end
+ * is at the first haptic tick, of which each has `haptic` ticks, from there on, or from up to half of
+ * `jitter` of a step before or behind it. parts: 0 where the rate is the scene's. */
+typedef struct {
+    int64_t ticks, rest, parts, haptic;
+    double jitter;
+    Pcg64 generator;
+    int64_t tick, part;
+} Rate;
+
+/* A window of a clock's communication points (ticks), at the current one; `next` after its event. last: that of
+ * its newest event. */
 typedef struct {
     const int64_t *starts /* [n] */;
-    int64_t n, at, next;
+    int64_t n, at, next, last;
     Side *side;                           /* NULL where all steps are taken in the loop */
+    Rate rate;
 } Clock;
 
 /* The schedule of a run in real time, and what became of it (ns): pace.py. */
@@ -305,7 +323,6 @@ enum {
     RAISED,      /* call `what`, -1 for doStep, has left a Python exception, which ctypes raises */
     STEPPED,     /* doStep returned `status`, asks to end or is cut short */
     UNRESTORED,  /* the state before a step that was checked could not be restored */
-    DRAW,        /* latencies */
     STOP,        /* the condition to stop holds */
     KIND,        /* an event of a kind that is new */
     STARTS,      /* of clock `what`: its next window */
@@ -335,6 +352,8 @@ EXPORT int hapticlink_events(Loop *l, Events *e);
 EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick);
 EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
 EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+EXPORT void hapticlink_change_rate(Clock *c, const Rate *rate);
+EXPORT int hapticlink_change_hold(Loop *l, int64_t place, Hold *h, int64_t stamp);
 EXPORT void hapticlink_guard(int on); /* while it is on, exit() ends the process with status 1 */
 EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
 
@@ -344,6 +363,8 @@ int fmu_do_step(const Fmu *f, double time, double size);
 int fmu_save(const Fmu *f, void *get_state, void **state);
 int fmu_step(Fmu *f, double time, double end, double size, At *at);
 int fmu_checked_step(Fmu *f, double time, double end, double size, At *at);
+int push_sample(const Loop *l, Hold *h, int64_t stamp, int64_t arrival);
+int further_points(Clock *c); /* of a clock whose rate was changed; 0 for others */
 int meter_sample(Meter *m, const double *board, int64_t stamp);
 int meter_move(Meter *m, const double *board, int64_t tick);
 void meter_feed(Meter *m, const double *board, double share);
@@ -358,6 +379,8 @@ void pace_end(const Loop *l, Events *e, int64_t time);
 int64_t now(void);
 void wait_until(int64_t time);
 void watch_signals(int on);
+uint64_t random_bits(Pcg64 *g); /* 53 of them */
+double uniform(Pcg64 *g); /* from 0 to 1 */
 int signal_came(void);
 int exception_left(void);
 void note_arithmetic(void);      /* how numbers are rounded from here on */

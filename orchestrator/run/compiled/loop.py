@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Mapping
+from fractions import Fraction
 from types import MappingProxyType
 
 import numpy as np
@@ -13,6 +15,7 @@ from hapticlink.orchestrator.plan.event_kinds import event, key_of, keyed_events
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.hold_structures import fill_generator
 from hapticlink.orchestrator.run.compiled.operation_records import PATIENCE, Machine
 from hapticlink.orchestrator.run.concurrent_fmus import Side
 from hapticlink.orchestrator.run.pace import Pace
@@ -76,21 +79,30 @@ class Events:
 
     def previous(self, clock: str) -> int:
         """The communication point (ticks) at which the newest sample of a clock is."""
-        return self._point(clock, -1)
+        last: int = self._clocks[self._index(clock)].last
+        return last
 
-    def current(self, clock: str) -> int:
-        """The communication point (ticks) that a clock goes to."""
-        return self._point(clock, 0)
+    def change_rate(self, clock: str, period: Fraction, jitter: float, seed: int) -> None:
+        """Let steps of a clock, from the end of the current one on, end at the first haptic tick
+        after whole periods (ticks), each up to half of `jitter` of one before or behind that."""
+        whole, rest = divmod(period, 1)
+        rest = rest.limit_denominator(2**40)
+        rate = structures.Rate(ticks=whole, rest=rest.numerator, parts=rest.denominator)
+        rate.fill(haptic=self._timeline.clocks[0].longest, jitter=jitter)
+        fill_generator(rate.generator, seed)
+        clock_c = self._clocks[self._index(clock)]
+        self._machine.library.change_rate(ctypes.addressof(clock_c), ctypes.addressof(rate))
 
-    def _point(self, clock: str, further: int) -> int:
+    def restore_rate(self, clock: str) -> None:
+        """Let steps of a clock, from the end of the current one on, end where the scene has it, the
+        first at least a haptic tick later."""
         i = self._index(clock)
-        return self._starts[i][self._given[i] + self._clocks[i].at + further]
-
-    def change_rate(self, clock: str, starts: Sequence[int]) -> None:
-        """Replace the communication points of a clock, `previous` and `current` the first."""
-        i = self._index(clock)
-        self._starts[i], self._given[i], self._clocks[i].at = starts, 1, 0
-        self._next_window(i)
+        c, starts = self._clocks[i], self._starts[i]
+        current = c.kept["starts"][c.at]
+        first = bisect_left(starts, current + self._timeline.clocks[0].longest)
+        window = np.array([current, *starts[first : first + WINDOW]], np.int64)
+        c.fill(starts=window, n=len(window), at=0)
+        c.rate.parts, self._given[i] = 0, first - 1
 
     def patience(self, ns: int) -> None:
         """Have `turn` called after that time each."""

@@ -115,12 +115,14 @@ class Machine:
         values, loop = signals.values[signals.hold(name)], ctypes.addressof(self.loop)
         return CompiledHold(self.library, loop, hold, sources, values, tank)
 
-    def change_hold(self, name: str, hold: Hold) -> None:
-        """Replace the hold of a connection. Raises InputFault where the old or the new one has no
-        C."""
+    def change_hold(self, name: str, hold: Hold, stamp: int) -> None:
+        """Replace the hold of a connection; it begins with the newest sample, of tick `stamp`.
+        Raises InputFault where the old or the new one has no C."""
         self._require_compiled(name, self._simulation.holds[name])
         self._simulation.holds[name] = compiled = self.other_hold(name, hold)
-        self._holds[self._index("hold", name, lambda index: compiled)] = compiled.address
+        index, loop = self._index("hold", name, lambda index: compiled), ctypes.addressof(self.loop)
+        while self.library.change_hold(loop, index, compiled.address, stamp):
+            compiled.grow()
 
     def other_hold(self, name: str, hold: Hold) -> CompiledHold:
         """A hold that a connection can have in place of its own. Raises InputFault where it has no
@@ -327,11 +329,11 @@ class Machine:
             self.operations(instruction, tick)
         elif code == structures.STOP:
             raise Stop
-        elif code in (structures.DRAW, structures.GROW):
+        elif code == structures.GROW:
             assert isinstance(instruction, Push | Evaluate | Blend)
             hold = simulation.holds[instruction.connection]
             assert isinstance(hold, CompiledHold)
-            hold.serve(code)
+            hold.grow()
             return
         else:
             assert isinstance(instruction, Get | Set | Step)

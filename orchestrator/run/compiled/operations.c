@@ -36,7 +36,8 @@ static int blend(const Loop *l, const Op *op, int64_t tick) {
     return 0;
 }
 
-static int push(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
+/* The newest sample of the source of a hold. */
+int push_sample(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
     double *sample = hold_scratch(h);
     if (h->far) *h->credit = account_credit(h->far, l);
     for (int64_t k = 0; k < h->width; k++) sample[k] = l->values[h->sources[k]];
@@ -87,7 +88,7 @@ int hapticlink_block(Loop *l, At *at, int64_t tick) {
             code = (op->c == 1 && f->check ? fmu_checked_step : fmu_step)(f, begins, ends, op->x, at);
             break;
         }
-        case PUSH: code = push(l, l->holds[op->a], tick + op->b, tick + l->late); break;
+        case PUSH: code = push_sample(l, l->holds[op->a], tick + op->b, tick + l->late); break;
         case EVALUATE: code = evaluate(l, l->holds[op->a], tick, op->x); break;
         case BLEND: code = blend(l, op, tick); break;
         case SAMPLE: code = meter_sample(l->meters[op->a], l->values, tick + op->b); break;

@@ -69,7 +69,8 @@ def _address(value: Any) -> Any:
 def _declared(text: str) -> dict[str, Any]:
     """The structures and numbers of a header whose fields are all of 2 or 8 bytes."""
     types: dict[str, Any] = {
-        "double": ctypes.c_double, "int64_t": ctypes.c_int64, "int16_t": ctypes.c_int16
+        "double": ctypes.c_double, "int64_t": ctypes.c_int64, "int16_t": ctypes.c_int16,
+        "uint64_t": ctypes.c_uint64,
     }  # fmt: skip
 
     def fields(name: str, body: str) -> Iterator[tuple[str, Any]]:

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
-from hapticlink.visualization.live_and_standalone.prediction import predicted
-from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, viewed
+from hapticlink.visualization.live_and_standalone.prediction import predict_stability
+from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, load_viewed_scene
 from tests.analysis.stability.own_hand import own_hand
 from tests.visualization.browser_code.chromium import Page, chromium
 from tests.visualization.browser_code.served_page import Served, values
@@ -51,7 +51,7 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
     held = {"hand.stiffness": [100.0, 100.0, 0.0], "hand.target": [[0.0, *handle]]}
     for text, hold, verdict in ((before, "zoh", "stable"), (told, "foh", "unstable")):
         options = held | {"hold": hold, "duration": 3.0}
-        found = own_hand(viewed(SCENE, OPTIONS), options)
+        found = own_hand(load_viewed_scene(SCENE, OPTIONS), options)
         mouse = text.partition("\n")[0]
         assert mouse.startswith(f"the mouse: {verdict}, growth rate ")
         growth = float(mouse.partition("growth rate ")[2].partition(" ")[0])
@@ -65,16 +65,16 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
      ({JITTER: 0.1}, "with jitter the system never repeats")],
 )  # fmt: skip
 def test_what_would_take_long_is_refused(settings: Settings, said: str) -> None:
-    found = predicted(viewed(SCENE, OPTIONS), settings, {})
+    found = predict_stability(load_viewed_scene(SCENE, OPTIONS), settings, {})
     assert (found["verdict"], found["said"]) == ("", f"not computed: {said}")
 
 
 def test_a_verdict_says_that_it_is_without_the_friction_of_a_hold() -> None:
     settings: Settings = {RATE: 64.0}
     beside = ", without the friction of hold passive"
-    assert beside not in predicted(viewed(SCENE), settings, {})["said"]
+    assert beside not in predict_stability(load_viewed_scene(SCENE), settings, {})["said"]
     settings["holds.controller.F_drift -> virtual_mechanism.F_drift"] = "passive"
-    assert predicted(viewed(SCENE), settings, {})["said"].endswith(beside)
+    assert predict_stability(load_viewed_scene(SCENE), settings, {})["said"].endswith(beside)
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
@@ -93,8 +93,8 @@ def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
         assert _children(server, "live_page.stability_process") == [computing]
         handle = window.until(lambda new: True)["frame"]["handle"]
     parameters = {"hand.stiffness": [*STIFFNESS], "hand.target": handle}
-    mouse = predicted(viewed(SCENE, OPTIONS), {}, parameters)["why"].partition("\n")[0]
-    assert found["why"].startswith(mouse)
+    why = predict_stability(load_viewed_scene(SCENE, OPTIONS), {}, parameters)["why"]
+    assert found["why"].startswith(why.partition("\n")[0])
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")

@@ -7,28 +7,28 @@ from typing import Any
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.live_and_standalone.scene_message import power
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
-from hapticlink.visualization.live_page.frames import Frames
+from hapticlink.visualization.live_and_standalone.first_messages import describe_power
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
+from hapticlink.visualization.live_page.frames import FrameReader
 from tests.visualization.browser_code.javascript import javascript
 
 
 def test_the_energy_at_the_users_port_is_that_of_the_results() -> None:
-    frames: list[Frames] = []
+    frames: list[FrameReader] = []
     said: list[dict[str, Any]] = []
     seen: list[dict[str, Any]] = []
 
     def turn(live: hl.RealTime) -> None:
         if not frames:
-            frames.append(Frames(live))
-            said.extend(power(live.system, live.energies()))
+            frames.append(FrameReader(live))
+            said.extend(describe_power(live.system, live.energies()))
             live.set("hand.stiffness", (100.0, 100.0, 0.0))
             live.set("hand.target", (0.03, 0.03, 0.0))
         seen.append(frames[0].frame(live))
         if live.time > 0.3 and "booked" in seen[-1]:
             live.stop()
 
-    made = hl.RealTime(viewed("closed-loop", ["haptics.rate=512"])).run(turn)
+    made = hl.RealTime(load_viewed_scene("closed-loop", ["haptics.rate=512"])).run(turn)
     x = made["virtual_mechanism.x"][made.time("virtual_mechanism.x") == seen[-1]["t"]]
     assert seen[-1]["x"] == x[0].tolist()
     shown = [{"t": f["t"], "booked": f["booked"], "stored": f["stored"], "states": []}

@@ -11,7 +11,7 @@ import pytest
 from hapticlink.fmus import blocks as block_fmus
 from hapticlink.fmus import cache, lock
 from hapticlink.orchestrator.scene.blocks import blocks
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 from tests.visualization.browser_code.chromium import Page, chromium
 from tests.visualization.browser_code.served_page import Served
 
@@ -20,7 +20,7 @@ from tests.visualization.browser_code.served_page import Served
 def lock_of_last_block(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """In an empty cache, the lock of the FMU of closed-loop that is built last."""
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "cache"))
-    last = blocks(viewed("closed-loop")).built[-1]
+    last = blocks(load_viewed_scene("closed-loop")).built[-1]
     with monkeypatch.context() as patched:
         patched.setattr(cache, "cached", lambda material, *_: cache.key(material))
         key = block_fmus.build_block(last.block, last.settings, tmp_path, packaging="native")

@@ -9,10 +9,10 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.visualization.live_and_standalone.offered_controls import RATE, Settings, target
-from hapticlink.visualization.live_and_standalone.prediction import judged
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.prediction import judge_hands
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 from hapticlink.visualization.live_page.controls import Controls
-from hapticlink.visualization.live_page.frames import Frames
+from hapticlink.visualization.live_page.frames import FrameReader
 from tests.visualization.browser_code.chromium import Page
 from tests.visualization.browser_code.javascript import javascript
 from tests.visualization.browser_code.served_page import Served
@@ -26,12 +26,12 @@ def begun(name: str) -> tuple[list[dict[str, Any]], dict[str, list[float]]]:
 
     def turn(live: hl.RealTime) -> None:
         its = Controls(live, {})
-        handles = Frames(live).handles(live)
+        handles = FrameReader(live).handles(live)
         held = {target(user): [*place] for user, place in handles.items()}
         found.extend((its.described(), its.parameters() | held))
         live.stop()
 
-    hl.RealTime(viewed(name, {"packaging": "python"})).run(turn, tables=False)
+    hl.RealTime(load_viewed_scene(name, {"packaging": "python"})).run(turn, tables=False)
     return found[0], found[1]
 
 
@@ -60,7 +60,7 @@ def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(
     hand = {"stiffness": [100.0, 100.0, 0.0], "target": [[0.0, 0.0245, 0.0148, -0.785]]}
     peaks = []
     for chosen in options:
-        scene = viewed("closed-loop-direct", {**chosen, "packaging": "python"})
+        scene = load_viewed_scene("closed-loop-direct", {**chosen, "packaging": "python"})
         given = {f"hand.{key}": value for key, value in hand.items()} | {"duration": 3.0}
         port = hl.run(scene, given).measures().port
         assert port
@@ -80,8 +80,8 @@ def test_buzz_is_a_vibration_that_is_seen(name: str) -> None:
     for gain, values in parameters.items():
         factor = settings.get(f"gains.{gain}", 1.0)
         parameters[gain] = [factor * value for value in values]
-    scene = viewed(name, {"packaging": "python"})
-    case, _ = next(judged(scene, settings, parameters))
+    scene = load_viewed_scene(name, {"packaging": "python"})
+    case, _ = next(judge_hands(scene, settings, parameters))
     assert case.growth > 1.0
     assert 5.0 < case.hertz < 30.0
 

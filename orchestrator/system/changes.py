@@ -1,4 +1,4 @@
-"""What a run can be changed to while it goes on: other holds, latencies and rates."""
+"""What can be changed of a scene that runs: inputs and parameters, holds, latencies and rates."""
 
 from __future__ import annotations
 
@@ -7,11 +7,36 @@ from dataclasses import replace
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
+from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.assign_holds import misfit
-from hapticlink.orchestrator.system.ports import power_across_rates
+from hapticlink.orchestrator.system.ports import power_across_rates, scalars_of
+from hapticlink.orchestrator.system.springs import limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
+
+
+def settable(system: System, name: str) -> tuple[Scalar, ...]:
+    """The entries of an input that no connection feeds, or of a tunable parameter, `fmu.port`.
+    Raises InputFault for others, and for the gains of a spring whose energy `pspm` limits."""
+    scalars = scalars_of(system.fmu, name, "input", "parameter")
+    if fed := feeding(system, name):
+        raise InputFault(f"{name} is fed by a connection, {fed[0].name}")
+    if any(s.causality == "parameter" and s.variability != "tunable" for s in scalars):
+        raise InputFault(f"{name} is not tunable: change its start value, in the scene")
+    if name in limited_gains(system):
+        raise InputFault(
+            f"{name} is a gain of a spring whose energy `pspm` limits, which counts with that "
+            "of the start: change its start value, in the scene"
+        )
+    return scalars
+
+
+def feeding(system: System, name: str) -> list[Connection]:
+    """The connections that feed an input or parameter, `fmu.port`."""
+    named = {s.name for s in scalars_of(system.fmu, name, "input", "parameter")}
+    into = system.into(name.partition(".")[0])
+    return [c for c in into if named & {s.name for s in c.inputs}]
 
 
 def held_by(c: Connection, hold: str | None, delay: float | None) -> Connection:

@@ -1,11 +1,21 @@
-// Settings in the address of a page: #graphics.rate=10&hold=passive. Those of a second run begin with "b.".
-import { changes, set } from "./changes.js";
+// Settings of controls: how they differ, as messages, and in the address of a page, #graphics.rate=10&hold=passive, where
+// those of a second run begin with "b.".
+
+// The controls with other values than `others`, of those that both have; what a scene varies by itself has the value null.
+export function changes(controls, others) {
+  const values = new Map(others.map(({ key, value }) => [key, value]));
+  return controls.filter(({ key, value }) => value !== null && values.has(key) && value !== values.get(key));
+}
+
+// The message that gives a control a value.
+export const set = (key, value) => ({ type: "set", key, value });
 
 // The value that a text stands for, of a control.
-function valueOf(text, { value, choices }) {
+function valueOf(text, { value, choices, min, max }) {
   if (choices) return text;
   if (typeof value !== "boolean") {
     if (text.trim() === "" || !Number.isFinite(Number(text))) throw new Error(`${text} is no number`);
+    if (Number(text) < min || Number(text) > max) throw new Error(`give a number from ${min} to ${max}`);
     return Number(text);
   }
   if (text !== "true" && text !== "false") throw new Error(`${text} is neither true nor false`);
@@ -13,12 +23,12 @@ function valueOf(text, { value, choices }) {
 }
 
 // The messages that set what an address asks for, by prefix of its run; `why` of what the scene does not have.
-export function asked(hash, controls) {
+export function messagesOf(hash, controls) {
   const found = { "": [], "b.": [], why: [] };
   for (const [whole, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
     const run = whole.startsWith("b.") ? "b." : "", key = whole.slice(run.length);
     try {
-      found[run].push(...messagesOf(key, text, controls));
+      found[run].push(...messagesOfKey(key, text, controls));
     } catch (error) {
       found.why.push(`${whole}=${text}: ${error.message}`);
     }
@@ -27,7 +37,7 @@ export function asked(hash, controls) {
 }
 
 // Of one control, or with the key "hold" or "delay" of all connections that can have it.
-function messagesOf(key, text, controls) {
+function messagesOfKey(key, text, controls) {
   const every = /^(hold|delay)s?$/.test(key) ? `${key.replace(/s$/, "")}s.` : null;
   const of = controls.filter((each) => (every ? each.key.startsWith(every) : each.key === key));
   if (!of.length) throw new Error("this scene has no such control");
@@ -51,4 +61,4 @@ export function differing(controls, start) {
 }
 
 // As the part of an address behind "#".
-export const written = (pairs) => pairs.map((pair) => pair.map(encodeURIComponent).join("=")).join("&");
+export const addressOf = (pairs) => pairs.map((pair) => pair.map(encodeURIComponent).join("=")).join("&");

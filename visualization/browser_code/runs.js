@@ -1,9 +1,30 @@
-// A run in a worker of the page's own file: the same messages as with a server. A frame is asked for whenever the
-// screen is drawn. Beyond what a server can, it compares two settings, and sends samples to be heard.
+// The run behind a page, on a server or in a worker: messages to it, and from it. Beyond what a server can, a worker sends
+// samples to be heard.
 import { unpacked, unpackedText } from "./packed.js";
 
-export function started({ received, opened, lost }) {
-  const ready = begun(received, lost);
+// A run behind the server that the page is from: messages over a websocket, in both directions.
+export function connectToServer({ received, opened, lost }) {
+  let socket = null;
+  const connect = () => {
+    const url = new URL("run", location.href);
+    url.protocol = "ws:";
+    socket = new WebSocket(url);
+    socket.onopen = opened;
+    socket.onmessage = (event) => received(JSON.parse(event.data));
+    socket.onclose = () => {
+      lost("The run has ended, or its connection: start hapticlink view again.");
+      setTimeout(connect, 2000);
+    };
+  };
+  connect();
+  const send = (message) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); };
+  return { send, compare: (on) => send({ type: "compare", on }) };
+}
+
+// A run in a worker of the page's own file: the same messages as with a server. A frame is asked for whenever the
+// screen is drawn.
+export function startWorker({ received, opened, lost }) {
+  const ready = loadWorker(received, lost);
   const send = (message, moved = []) => ready.then((worker) => worker.postMessage(message, moved));
   const ask = () => { send({ type: "frame" }); requestAnimationFrame(ask); };
   opened();
@@ -15,7 +36,7 @@ export function started({ received, opened, lost }) {
   };
 }
 
-async function begun(received, lost) {
+async function loadWorker(received, lost) {
   const [source, data, program] = await Promise.all([unpackedText("worker"), unpackedText("data"), unpacked("program")]);
   const worker = new Worker(URL.createObjectURL(new Blob([source], { type: "text/javascript" })));
   worker.onmessage = ({ data: message }) => (message.type === "file" ? save(message) : received(message));

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.run.instructions import instructions
 from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.live_changes import (
+from hapticlink.orchestrator.system.changes import (
     choices_of_slower,
     held_by,
     require_other_rate,
@@ -59,7 +59,7 @@ class Family:
 
 
 @dataclass(frozen=True)
-class Changes:
+class PreparedChanges:
     """choices: in the order of the array of their structures, at `address`. clock: the index of
     that whose rate can be changed, -1 if there is none. spare: the index of the first operation of
     `most` for each spare kind."""
@@ -78,17 +78,19 @@ class Changes:
         return SPARE_KINDS if self.families else 0
 
 
-NONE = Changes([], 0)
+NONE = PreparedChanges([], 0)
 """Of a program that stays as its scene has it."""
 
 
-def changes(
+def prepare_changes(
     machine: Machine, simulation: Simulation, plan: Plan, kinds: Iterable[Event]
-) -> Changes:
+) -> PreparedChanges:
     """The changes that are possible in a scene. kinds: of its events."""
     held = [*_holds(machine, simulation)]
     pointers = (ctypes.c_void_p * max(len(held), 1))(*(hold.address for _, hold in held))
-    possible = Changes([choice for choice, _ in held], ctypes.addressof(pointers), kept=pointers)
+    possible = PreparedChanges(
+        [choice for choice, _ in held], ctypes.addressof(pointers), kept=pointers
+    )
     names = [clock.name for clock in simulation.system.timeline.clocks]
     if CLOCK not in names[1:]:
         return possible

@@ -1,0 +1,53 @@
+"""Gives the FMUs of a run what is changed of their inputs and parameters, at times that the scene
+has or as somebody asks for it meanwhile.
+
+An FMU takes it before a step, by the callback of the loop, `Instance.before_step`; a step without a
+change that is due costs one comparison of two numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
+from hapticlink.orchestrator.system.system import InputChange
+
+
+class InputSetter:
+    """A change that waits for a step of its FMU, and for the next one as long as it acts. Each step
+    of the loop sets what the connection brings before, so that it acts again once this ends.
+
+    values: what is set; None until `held` has brought it.
+    """
+
+    def __init__(self, change: InputChange, fmus: LoadedFmus) -> None:
+        self._change, self._signals = change, fmus.signals
+        self._instance = fmus.instances[change.fmu]
+        self._set = self._instance.connect(change.inputs, range(len(change.inputs)))
+        self.values = np.array(change.values) if change.values else None
+        self._random = np.random.Generator(np.random.PCG64(change.seed))
+
+    def wait(self, time: float = -math.inf) -> None:
+        """Act before the first step that begins at `time` (s) or later."""
+        self._instance.before_step(self, time)
+
+    def __call__(self, now: float) -> None:
+        change = self._change
+        if change.end is not None and now >= change.end:
+            return
+        self._set(self._values())
+        if change.end is not None:
+            self.wait(math.nextafter(now, math.inf))
+
+    def _values(self) -> Vector:
+        change, signals = self._change, self._signals
+        if change.noise and change.held:
+            brought = signals.values[[*signals.places(change.held)]]
+            return brought + change.noise * self._random.standard_normal(len(brought))
+        if self.values is None:
+            assert change.held is not None
+            self.values = signals.values[[*signals.places(change.held)]]
+        return self.values
