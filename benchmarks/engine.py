@@ -64,10 +64,10 @@ def ran(scene: str, options: list[str], block: str | None, folder: Path) -> Ran:
     assert linkage is not None
     moved, at = {}, 1
     for joint in linkage.joint:
-        if joint.type == "free":
+        if joint.kind.free:
             way = np.column_stack([rows[f"virtual_mechanism.q[{at + i}]"] for i in (0, 1)])
             moved[joint.child] = float(np.linalg.norm(way - way[0], axis=1).max() * 1e3)
-        at += 3 if joint.type == "free" else 1
+        at += joint.kind.size
     path = np.column_stack([rows[f"virtual_mechanism.x[{i}]"] for i in (1, 2)])
     energy = port.peak if (port := found.measures().port) else None
     why = "ended" if end["reason"] == "duration" else f"{end['reason']} at {end['time']:.2g} s"

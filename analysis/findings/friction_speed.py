@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import of_block
-from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.components.specs.joint_types import JOINT_TYPES
 from hapticlink.orchestrator.base.signal_names import JOINT_RATES
 from hapticlink.orchestrator.results.read_results import Results, Vector
 
@@ -28,7 +28,7 @@ def coarse(results: Results) -> Iterator[str]:
     linkage, speeds = results.record.scene["linkage"], results.record.friction_speeds
     if not linkage or not speeds:
         return
-    units = [(j["name"], unit) for j in linkage["joint"] for unit in COORDINATE_UNITS[j["type"]]]
+    units = [(j["name"], unit) for j in linkage["joint"] for unit in JOINT_TYPES[j["type"]].units]
     table = of_block(results, JOINT_RATES, len(units))
     for (name, unit), rate in zip(units, table[JOINT_RATES].T if table else (), strict=False):
         speed, most = speeds.get(name, 0.0), float(np.abs(rate).max(initial=0.0))

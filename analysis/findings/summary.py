@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.analysis.findings.user_port import allowance, allowed, pushed_by_others
-from hapticlink.components.specs.linkage import COORDINATE_UNITS
+from hapticlink.components.specs.joint_types import JOINT_TYPES
 from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
@@ -402,7 +402,7 @@ def _start(results: Results) -> Iterator[str]:
     linkage = results.record.scene["linkage"]
     if not linkage:
         return
-    size = sum(len(COORDINATE_UNITS[joint["type"]]) for joint in linkage["joint"])
+    size = sum(JOINT_TYPES[joint["type"]].size for joint in linkage["joint"])
     table = of_block(results, JOINT_COORDINATES, size)
     if table and len(table["time"]):
         yield from moved(linkage, table[JOINT_COORDINATES][0])
@@ -415,7 +415,7 @@ def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
     given = {name: np.atleast_1d(start).tolist() for name, start in starts.items()}
     poses, far, coordinates = {}, [], iter(q)
     for joint in linkage["joint"]:
-        name, units = joint["name"], COORDINATE_UNITS[joint["type"]]
+        name, units = joint["name"], JOINT_TYPES[joint["type"]].units
         poses[name] = list(islice(coordinates, len(units)))
         for start, value, unit in zip(given.get(name, ()), poses[name], units, strict=False):
             if abs(value - start) > SMALLEST_MOVE[unit]:

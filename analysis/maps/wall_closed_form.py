@@ -43,7 +43,7 @@ def form(scene: Scene, panel: Mapping[str, str], x: str, y: str) -> Form | None:
         return None
     joint, body = linkage.joint[0], linkage.body[0]
     keys = [START.format(wall.name, name) for name in ("stiffness", "damping")]
-    if sorted((x, y)) != sorted(keys) or joint.type != "prismatic" or not joint.damping:
+    if sorted((x, y)) != sorted(keys) or joint.kind.units != ("m",) or not joint.damping:
         return None
     sprung = joint.stiffness or joint.drive or linkage.spring
     held = read.hands or (read.hand is not None and read.hand.type != "constant")

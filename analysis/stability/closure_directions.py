@@ -18,7 +18,6 @@ from scipy.linalg import null_space
 
 from hapticlink.analysis.stability.state_vector import Coordinate
 from hapticlink.components.dynamics.closure_jacobian_values import closure_jacobian
-from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.signal_names import SHARED
@@ -67,7 +66,7 @@ class Closures:
 
     @property
     def _n(self) -> int:
-        return sum(COORDINATES[j.type] for j in self.linkage.joint) if self.linkage else 0
+        return len(self.linkage.coordinate_units) if self.linkage else 0
 
     @cached_property
     def _jacobian(self) -> Callable[[Vector], Matrix]:

@@ -15,7 +15,6 @@ from hapticlink.analysis.stability.hands import FIRM, own_hand, spring, standing
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import Joints
-from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import temporary_folders
@@ -324,7 +323,7 @@ def by_joint(linkage: Linkage, q: Vector) -> dict[str, float | list[float]]:
     joints: dict[str, float | list[float]] = {}
     first = 0
     for joint in linkage.joint:
-        size = COORDINATES[joint.type]
+        size = joint.kind.size
         values = q[first : first + size].tolist()
         joints[joint.name] = values if size > 1 else values[0]
         first += size

@@ -7,7 +7,6 @@ into its C++ library.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -66,12 +65,12 @@ def _ends(joint: Joint) -> list[RigidTransform]:
 
 
 def _joint(joint: Joint, parent: Any, child: Any) -> Any:
-    if joint.type == "revolute":
+    if joint.kind.free:
+        return tree.PlanarJoint(joint.name, parent, child)
+    (freedom,) = joint.kind.freedoms
+    if freedom.turns:
         return tree.RevoluteJoint(joint.name, parent, child, [0, 0, 1])
-    if joint.type == "prismatic":
-        axis = joint.axis or 0.0
-        return tree.PrismaticJoint(joint.name, parent, child, [math.cos(axis), math.sin(axis), 0])
-    return tree.PlanarJoint(joint.name, parent, child)
+    return tree.PrismaticJoint(joint.name, parent, child, [*joint.direction(freedom), 0])
 
 
 def prepare(

@@ -77,12 +77,12 @@ class Terms:
 
     @staticmethod
     def _kinds(joint: Joint) -> list:
-        if joint.type == "revolute":
-            return [pin.JointModelRZ()]
-        if joint.type == "prismatic":
-            axis = joint.axis or 0.0
-            return [pin.JointModelPrismaticUnaligned(math.cos(axis), math.sin(axis), 0.0)]
-        return [pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ()]
+        return [
+            pin.JointModelRZ()
+            if freedom.turns
+            else pin.JointModelPrismaticUnaligned(*joint.direction(freedom), 0.0)
+            for freedom in joint.kind.freedoms
+        ]
 
     def _frame(self, name: str, body: str, at: Point | None) -> int:
         joint, frame = self._bodies[body]

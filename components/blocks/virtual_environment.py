@@ -31,7 +31,7 @@ from hapticlink.components.dynamics.variables import (
 )
 from hapticlink.components.linkage import branch
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinate_units, coordinates
+from hapticlink.components.linkage.parameters import coordinates
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage
 
@@ -120,7 +120,7 @@ def _outputs(
     mobility: bool,
     local_model: bool,
 ) -> list[Variable]:
-    units = coordinate_units(linkage)
+    units = linkage.coordinate_units
     return [
         Variable("x", (3,), POSE, description="pose of the copy's operational point"),
         Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),

@@ -1,9 +1,9 @@
 """Broad phase: pairs that can never touch and need no narrow phase.
 
-A chain of revolute joints keeps every point of a body within the sum of its links' lengths of the
-joint on the ground. A prismatic or free joint in the chain has no such bound. Loops only reduce the
-reach. Lengths are those of the scene, so the result is fixed when the FMU is built; all other pairs
-are evaluated at every pose.
+A chain of joints that only turn keeps every point of a body within the sum of its links' lengths of
+the joint on the ground. A joint that slides has no such bound. Loops only reduce the reach. Lengths
+are those of the scene, so the result is fixed when the FMU is built; all other pairs are evaluated
+at every pose.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def reach(linkage: Linkage, body: str) -> tuple[Point, float]:
     here = joint.at_child or ORIGIN
     length = max(math.dist(here, end) for end in shape.shape) + (shape.radius or 0.0)
     while True:
-        if joint.type != "revolute":
+        if joint.kind.slides:
             return ORIGIN, math.inf
         there = joint.at_parent or ORIGIN
         if joint.parent == "ground":

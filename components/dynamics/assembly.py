@@ -22,7 +22,7 @@ from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, 
 from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import COORDINATES, coordinates
+from hapticlink.components.linkage.parameters import coordinates
 from hapticlink.components.specs.linkage import Linkage
 
 STEPS = 12
@@ -77,7 +77,7 @@ def start_coordinates(linkage: Linkage) -> NDArray[np.float64]:
 
 def _given(linkage: Linkage) -> NDArray[np.bool_]:
     """Whether `start_velocity` gives the rate of each coordinate, (n,)."""
-    named = {j.name: (1.0,) * COORDINATES[j.type] for j in linkage.joint}
+    named = {j.name: (1.0,) * j.kind.size for j in linkage.joint}
     given = {name: value for name, value in named.items() if name in linkage.start_velocity}
     return np.array(coordinates(linkage, given), dtype=bool)
 
@@ -112,7 +112,7 @@ def _rates(linkage: Linkage, qd: NDArray[np.float64]) -> Iterator[str]:
     """`crank = 2` for each joint that `start_velocity` names."""
     place = 0
     for j in linkage.joint:
-        rates = qd[place : place + COORDINATES[j.type]].tolist()
+        rates = qd[place : place + j.kind.size].tolist()
         place += len(rates)
         if j.name in linkage.start_velocity:
             value = f"{rates[0]:.10g}" if len(rates) == 1 else str(rates)

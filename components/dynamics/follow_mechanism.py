@@ -25,13 +25,13 @@ from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.projection import MU, projection
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinate_units, coordinates
+from hapticlink.components.linkage.parameters import coordinates
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 
 
 def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     """The copy's inputs from the mechanism; q_ref also where it only serves to compare branches."""
-    units = coordinate_units(linkage)
+    units = linkage.coordinate_units
     n, rates = len(units), tuple(f"{u}/s" for u in units)
     x_ref = Variable("x_ref", (3,), POSE, description="pose of the mechanism's operational point")
     v_ref = Variable("v_ref", (3,), TWIST, description="its velocity")

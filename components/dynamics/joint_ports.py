@@ -16,18 +16,17 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.linkage import Joint, Linkage
 
-_UNITS = {"revolute": ("N.m", "rad", "rad/s"), "prismatic": ("N", "m", "m/s")}
-
 
 def _of(linkage: Linkage, port: str) -> Iterator[tuple[Joint, str]]:
-    """The joints with a port, and the name of its variable. Raises ValueError for a free joint,
-    which has three coordinates."""
+    """The joints with a port, and the name of its variable. Raises ValueError for a joint of
+    several coordinates."""
     for joint in linkage.joint:
         if port not in joint.ports:
             continue
-        if joint.type not in _UNITS:
+        if joint.kind.size > 1:
             raise ValueError(
-                f"joint `{joint.name}`: ports are of one coordinate, a free joint has 3"
+                f"joint `{joint.name}`: ports are of one coordinate, a {joint.type} joint has "
+                f"{joint.kind.size}"
             )
         yield joint, f"{joint.name}.{port}"
 
@@ -39,20 +38,24 @@ def inputs(linkage: Linkage) -> list[Variable]:
     for joint, name in _of(linkage, "effort"):
         power = Power(f"{joint.name}.position") if "position" in joint.ports else None
         text = f"effort on {joint.name} from outside"
-        rows.append(Variable(name, (), _UNITS[joint.type][0], description=text, power=power))
+        rows.append(
+            Variable(name, (), joint.kind.freedom.effort_unit, description=text, power=power)
+        )
     return rows
 
 
 def outputs(linkage: Linkage) -> list[Variable]:
     """Position (rad or m) and velocity (rad/s or m/s) of the joints with these ports."""
     rows = [
-        Variable(name, (), _UNITS[j.type][1], description=f"coordinate of {j.name}")
+        Variable(name, (), j.kind.freedom.unit, description=f"coordinate of {j.name}")
         for j, name in _of(linkage, "position")
     ]
     for joint, name in _of(linkage, "velocity"):
         of = f"{joint.name}.position" if "position" in joint.ports else None
         text = f"rate of {joint.name}"
-        rows.append(Variable(name, (), _UNITS[joint.type][2], description=text, derivative_of=of))
+        rows.append(
+            Variable(name, (), joint.kind.freedom.rate_unit, description=text, derivative_of=of)
+        )
     return rows
 
 

@@ -20,7 +20,7 @@ import casadi as ca
 
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import mean_link_length
-from hapticlink.components.specs.linkage import COORDINATE_UNITS, Body, Joint, Linkage
+from hapticlink.components.specs.linkage import Body, Joint, Linkage
 
 LIGHT = 1e-2  # relative to the mean
 
@@ -50,10 +50,10 @@ def own_inertia(joint: Joint, body: Body) -> list[float]:
     """The smallest inertia of a body at each coordinate of its joint (kg or kg.m2)."""
     arm = math.dist(body.center or (0.0, 0.0), joint.at_child or (0.0, 0.0))
     turning = body.inertia + body.mass * arm**2
-    if joint.type == "free":
+    sliding = body.mass
+    if joint.kind.turns:  # the body may turn out of the way of its mass
         sliding = body.mass * body.inertia / turning if turning else 0.0
-        return [sliding, sliding, turning]
-    return [turning if joint.type == "revolute" else body.mass]
+    return [turning if freedom.turns else sliding for freedom in joint.kind.freedoms]
 
 
 def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
@@ -68,7 +68,7 @@ def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
         for joint in group:
             for i, own in enumerate(own_inertia(joint, bodies[joint.child])):
                 index = model.coordinate(joint.name) + i
-                turns = COORDINATE_UNITS[joint.type][i] == "rad"
+                turns = joint.kind.freedoms[i].turns
                 turning += [index] if turns else []
                 light += [index] if own < LIGHT * mean * (length**2 if turns else 1) else []
         arm = ca.sumsqr(W[:, turning]) / len(turning) if turning else ca.SX(1)

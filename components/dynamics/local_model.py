@@ -24,14 +24,13 @@ from hapticlink.components.dynamics.operational_space import Terms
 from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.linkage import Linkage
 
 
 def ports(linkage: Linkage) -> list[Variable]:
     """The inputs D (n x n), W (m x n), w (m) and J_h (3 x n); their start values are those of the
     assembled start pose."""
-    units, m = coordinate_units(linkage), sum(rows(linkage))
+    units, m = linkage.coordinate_units, sum(rows(linkage))
     n = len(units)
     lengths = tuple("m" if unit == "rad" else "1" for unit in units)
     turns = tuple("1" if unit == "rad" else "1/m" for unit in units)

@@ -17,7 +17,6 @@ from hapticlink.components.component import Component
 from hapticlink.components.dynamics.light_bodies import groups, own_inertia
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import mean_link_length
-from hapticlink.components.specs.linkage import COORDINATE_UNITS
 
 SINGULAR = 1e-10  # relative to the same matrix with mass and inertia everywhere
 
@@ -64,7 +63,7 @@ def massless_coordinates(model: LinkageModel) -> dict[int, tuple[str, float]]:
         for group in groups(model.linkage)
         for joint in group
         for i, (unit, own) in enumerate(
-            zip(COORDINATE_UNITS[joint.type], own_inertia(joint, bodies[joint.child]), strict=True)
+            zip(joint.kind.units, own_inertia(joint, bodies[joint.child]), strict=True)
         )
         if own == 0
     }

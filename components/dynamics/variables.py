@@ -7,7 +7,6 @@ from hapticlink.components.component import ACCELERATION, MOBILITY, POSE, TWIST,
 from hapticlink.components.linkage.closures import gear_parameters, rows
 from hapticlink.components.linkage.parameters import (
     body_parameters,
-    coordinate_units,
     coordinates,
     mean_link_length,
 )
@@ -36,7 +35,7 @@ def mechanism_parameters(
 
 def start_parameters(linkage: Linkage) -> list[Variable]:
     """Parameters for the start pose before assembly and the start velocity before projection."""
-    units = coordinate_units(linkage)
+    units = linkage.coordinate_units
     rates = tuple(f"{u}/s" for u in units)
     q, qd = (tuple(coordinates(linkage, s)) for s in (linkage.start, linkage.start_velocity))
     n = (len(units),)
@@ -65,13 +64,13 @@ def direction_parameters(directions: Directions) -> list[Variable]:
 
 
 def states(linkage: Linkage) -> list[Variable]:
-    units = coordinate_units(linkage)
+    units = linkage.coordinate_units
     n = (len(units),)
     return [Variable("q", n, units), Variable("qd", n, tuple(f"{u}/s" for u in units))]
 
 
 def motion_outputs(linkage: Linkage) -> list[Variable]:
-    units, m = coordinate_units(linkage), sum(rows(linkage))
+    units, m = linkage.coordinate_units, sum(rows(linkage))
     rates, changes = (tuple(f"{u}/{per}" for u in units) for per in ("s", "s2"))
     n, velocity = (len(units),), "velocity of the operational point"
     bias = "operational acceleration at zero wrench"

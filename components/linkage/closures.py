@@ -20,9 +20,7 @@ import casadi as ca
 
 from hapticlink.components.component import Signals, Variable
 from hapticlink.components.linkage.parameters import loop_name, mean_link_length
-from hapticlink.components.specs.linkage import COORDINATE_UNITS, Gear, Linkage
-
-ROWS = {"revolute": 2, "slot": 1, "prismatic": 2}
+from hapticlink.components.specs.linkage import Gear, Joint, Linkage
 
 
 class Placed(Protocol):
@@ -49,7 +47,7 @@ class Closure:
 
 def rows(linkage: Linkage) -> tuple[int, ...]:
     """The number of rows of each closure: loops first, then gears."""
-    return (*(ROWS[loop.type] for loop in linkage.loop), *(1 for _ in linkage.gear))
+    return (*(loop.kind.rows for loop in linkage.loop), *(1 for _ in linkage.gear))
 
 
 def gear_name(linkage: Linkage, index: int) -> str:
@@ -61,7 +59,7 @@ def gear_parameters(linkage: Linkage) -> list[Variable]:
     rows = []
     for i, gear in enumerate(linkage.gear):
         name = gear_name(linkage, i)
-        unit, per = (COORDINATE_UNITS[_type(linkage, joint)][0] for joint in gear.joints)
+        unit, per = (_joint(linkage, joint).kind.units[0] for joint in gear.joints)
         text = f"{gear.joints[0]} over {gear.joints[1]}"
         ratio_unit = "1" if unit == per else f"{unit}/{per}"
         rows.append(Variable(f"{name}.ratio", (), ratio_unit, gear.ratio, text, "fixed"))
@@ -70,8 +68,8 @@ def gear_parameters(linkage: Linkage) -> list[Variable]:
     return rows
 
 
-def _type(linkage: Linkage, joint: str) -> str:
-    return next(j.type for j in linkage.joint if j.name == joint)
+def _joint(linkage: Linkage, name: str) -> Joint:
+    return next(j for j in linkage.joint if j.name == name)
 
 
 def _offset(linkage: Linkage, gear: Gear) -> float:
@@ -89,7 +87,7 @@ def closures(model: Placed) -> list[Closure]:
     for i, gear in enumerate(linkage.gear):
         name = gear_name(linkage, i)
         first, second = (model.q[model.coordinate(joint)] for joint in gear.joints)
-        turns = _type(linkage, gear.joints[0]) == "revolute"
+        turns = _joint(linkage, gear.joints[0]).kind.turns
         h = first - model.p[f"{name}.ratio"] * second - model.p[f"{name}.offset"]
         joins = f"{gear.joints[0]} to {gear.joints[1]}"
         rows_of_loops.append(Closure(name, joins, length * h if turns else h))
@@ -100,11 +98,11 @@ def _loop(model: Placed, index: int, length: float) -> Closure:
     loop, name = model.linkage.loop[index], loop_name(model.linkage, index)
     first, second = (model.frames[body] for body in loop.bodies)
     gap = first.point(model.p[f"{name}.at1"]) - second.point(model.p[f"{name}.at2"])
-    if loop.type != "revolute":
+    if loop.kind.has_axis:
         axis = model.p[f"{name}.axis"]
         across = second.rotation @ ca.vertcat(-ca.sin(axis), ca.cos(axis))
         gap = ca.dot(across, gap)
-    if loop.type == "prismatic":
+    if not loop.kind.turns:
         turned = first.angle - second.angle - model.p[f"{name}.angle"]
         gap = ca.vertcat(gap, length * turned)
     return Closure(name, f"{loop.bodies[0]} to {loop.bodies[1]}", gap)

@@ -2,7 +2,7 @@
 
 For a joint of the tree it is its own of q. For a cut joint, which closes a loop, it is the angle of
 the first body from the second, or the displacement of the first point from the second along the
-axis of a slot or prismatic joint.
+axis of a joint that slides.
 """
 
 from __future__ import annotations
@@ -12,22 +12,25 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import COORDINATE_UNITS, loop_name
+from hapticlink.components.linkage.parameters import loop_name
 from hapticlink.components.specs.linkage import Joint, Linkage, Loop
 
 
 @dataclass(frozen=True)
 class JointCoordinate:
-    """A joint of one coordinate, or a cut joint by its index; unit: of the coordinate."""
+    """A joint of one coordinate, or a cut joint by its index."""
 
     name: str
     joint: Joint | Loop
-    unit: str
     cut: int | None = None
 
     @property
+    def unit(self) -> str:
+        return self.joint.kind.freedom.unit
+
+    @property
     def effort_unit(self) -> str:
-        return "N.m" if self.unit == "rad" else "N"
+        return self.joint.kind.freedom.effort_unit
 
     def value(self, model: LinkageModel) -> ca.SX:
         """c(q)."""
@@ -35,7 +38,7 @@ class JointCoordinate:
             return model.q[model.coordinate(self.name)]
         loop = model.linkage.loop[self.cut]
         first, second = (model.frames[body] for body in loop.bodies)
-        if loop.type == "revolute":
+        if loop.kind.freedom.turns:
             return first.angle - second.angle
         axis, ends = model.p[f"{self.name}.axis"], [model.p[f"{self.name}.at{k}"] for k in (1, 2)]
         along = second.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis))
@@ -43,21 +46,19 @@ class JointCoordinate:
 
 
 def joints_with(linkage: Linkage, *keys: str) -> list[JointCoordinate]:
-    """The joints, then the cut joints, that have one of the keys. Raises ValueError for a free
-    joint that has, whose coordinates are three."""
+    """The joints, then the cut joints, that have one of the keys. Raises ValueError for a
+    joint of several coordinates that has."""
     coordinates = []
     for j in linkage.joint:
         given = [key for key in keys if getattr(j, key) is not None]
-        units = COORDINATE_UNITS[j.type]
-        if given and len(units) > 1:
+        if given and j.kind.size > 1:
             raise ValueError(
                 f"joint `{j.name}`: {', '.join(given)} act on one coordinate and a {j.type} joint "
-                "has three; use a spring between points"
+                f"has {j.kind.count}; use a spring between points"
             )
         if given:
-            coordinates.append(JointCoordinate(j.name, j, units[0]))
+            coordinates.append(JointCoordinate(j.name, j))
     for i, loop in enumerate(linkage.loop):
         if any(getattr(loop, key) is not None for key in keys):
-            unit = "rad" if loop.type == "revolute" else "m"
-            coordinates.append(JointCoordinate(loop_name(linkage, i), loop, unit, i))
+            coordinates.append(JointCoordinate(loop_name(linkage, i), loop, i))
     return coordinates

@@ -20,7 +20,6 @@ import casadi as ca
 
 from hapticlink.components.component import Signals
 from hapticlink.components.linkage.closures import Closure, closures
-from hapticlink.components.linkage.parameters import COORDINATES
 from hapticlink.components.specs.linkage import Joint, Linkage
 
 
@@ -73,14 +72,14 @@ class LinkageModel:
     @classmethod
     def symbolic(cls, linkage: Linkage, p: Signals) -> LinkageModel:
         """The model at symbols q and qd of its own."""
-        n = sum(COORDINATES[j.type] for j in linkage.joint)
+        n = len(linkage.coordinate_units)
         return cls(linkage, p, ca.SX.sym("q", n), ca.SX.sym("qd", n))
 
     @cached_property
     def _offsets(self) -> dict[str, int]:
         offsets, n = {}, 0
         for j in self.linkage.joint:
-            offsets[j.name], n = n, n + COORDINATES[j.type]
+            offsets[j.name], n = n, n + j.kind.size
         return offsets
 
     def coordinate(self, joint: str) -> int:
@@ -104,9 +103,7 @@ class LinkageModel:
     @cached_property
     def leaf_to_root(self) -> list[int]:
         """Indices of the coordinates, each after those of all joints farther out."""
-        outward = [
-            self.coordinate(j.name) + k for j in self.outward for k in range(COORDINATES[j.type])
-        ]
+        outward = [self.coordinate(j.name) + k for j in self.outward for k in range(j.kind.size)]
         return outward[::-1]
 
     @cached_property
@@ -114,46 +111,45 @@ class LinkageModel:
         """World frame of every body, from the ground outward."""
         frames = {"ground": Frame.turned(ca.SX(2, 1), ca.SX(0))}
         for j in self.outward:
-            frames[j.child] = self._child(j, frames[j.parent], self._of(j))
+            frames[j.child] = self._child(j, frames[j.parent])
         return frames
 
     def _of(self, joint: Joint) -> ca.SX:
         k = self.coordinate(joint.name)
-        return self.q[k : k + COORDINATES[joint.type]]
+        return self.q[k : k + joint.kind.size]
 
-    def _pivot(self, joint: Joint) -> ca.SX:
-        """World position of the joint's point of the parent, m."""
-        return self.frames[joint.parent].point(self.p.get(f"{joint.name}.at_parent"))
+    def _guided(self, joint: Joint, parent: Frame) -> tuple[ca.SX, ca.SX]:
+        """World position of the joint's point after its slides (m), and the directions of these, a
+        column each."""
+        q, guided = self._of(joint), list[tuple[ca.SX, ca.SX]]()
+        for i, freedom in enumerate(joint.kind.freedoms):
+            if isinstance(freedom.along, tuple):
+                guided.append((q[i], ca.SX(ca.DM(freedom.along))))
+            elif freedom.along:
+                axis = self.p[f"{joint.name}.axis"]
+                guided.append((q[i], ca.vertcat(ca.cos(axis), ca.sin(axis))))
+        pivot = parent.point(self.p.get(f"{joint.name}.at_parent"))
+        if not guided:
+            return pivot, ca.SX(2, 0)
+        along = parent.rotation @ ca.horzcat(*(direction for _, direction in guided))
+        return pivot + along @ ca.vertcat(*(slide for slide, _ in guided)), along
 
     def twists(self, joint: Joint) -> tuple[ca.SX, list[ca.SX]]:
         """The joint's point in the world (m), and the twist (omega, v_x, v_y) there for a unit rate
         of each of its coordinates."""
-        R, pivot = self.frames[joint.parent].rotation, self._pivot(joint)
-        turn = ca.sparsify(ca.SX([1, 0, 0]))
+        pivot, along = self._guided(joint, self.frames[joint.parent])
+        turn, slides = ca.sparsify(ca.SX([1, 0, 0])), iter(ca.horzsplit(along))
+        return pivot, [
+            turn if freedom.turns else ca.vertcat(ca.SX(1, 1), next(slides))
+            for freedom in joint.kind.freedoms
+        ]
 
-        def slide(direction: ca.SX) -> ca.SX:
-            return ca.vertcat(ca.SX(1, 1), direction)
-
-        if joint.type == "revolute":
-            return pivot, [turn]
-        if joint.type == "prismatic":
-            axis = self.p[f"{joint.name}.axis"]
-            along = R @ ca.vertcat(ca.cos(axis), ca.sin(axis))
-            return pivot + along * self._of(joint), [slide(along)]
-        moved = pivot + R @ self._of(joint)[:2]
-        return moved, [slide(R[:, 0]), slide(R[:, 1]), turn]
-
-    def _child(self, joint: Joint, parent: Frame, q: ca.SX) -> Frame:
-        at_parent, back = (self.p.get(f"{joint.name}.at_{end}") for end in ("parent", "child"))
-        pivot, angle = parent.point(at_parent), parent.angle
-        if joint.type == "revolute":
-            angle = angle + q
-        elif joint.type == "prismatic":
-            axis = self.p[f"{joint.name}.axis"]
-            pivot = pivot + parent.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis)) * q
-        else:
-            pivot, angle = pivot + parent.rotation @ q[:2], angle + q[2]
-        child = Frame.turned(pivot, angle)
+    def _child(self, joint: Joint, parent: Frame) -> Frame:
+        pivot, _ = self._guided(joint, parent)
+        q, angle = self._of(joint), parent.angle
+        for i, freedom in enumerate(joint.kind.freedoms):
+            angle = angle + q[i] if freedom.turns else angle
+        child, back = Frame.turned(pivot, angle), self.p.get(f"{joint.name}.at_child")
         if back is None:
             return child
         return Frame(pivot - child.rotation @ back, angle, child.rotation)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs.linkage import COORDINATE_UNITS, Linkage
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Point
 
 
@@ -32,15 +32,15 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
             rows.append(fixed(f"{j.name}.at_parent", "m", j.at_parent, f"{j.name} on {j.parent}"))
         if j.at_child is not None:
             rows.append(fixed(f"{j.name}.at_child", "m", j.at_child, f"{j.name} on {j.child}"))
-        if j.type == "prismatic":
+        if j.kind.has_axis:
             rows.append(fixed(f"{j.name}.axis", "rad", j.axis or 0.0, f"direction of {j.name}"))
     for i, loop in enumerate(linkage.loop):
         name = loop_name(linkage, i)
         for k, (body, at) in enumerate(zip(loop.bodies, loop.at, strict=True)):
             rows.append(fixed(f"{name}.at{k + 1}", "m", at, f"{name} on {body}"))
-        if loop.type != "revolute":
+        if loop.kind.has_axis:
             rows.append(fixed(f"{name}.axis", "rad", loop.axis or 0.0, f"direction of {name}"))
-        if loop.type == "prismatic":
+        if not loop.kind.turns:
             text = f"angle of {loop.bodies[0]} from {loop.bodies[1]}"
             rows.append(fixed(f"{name}.angle", "rad", loop.angle or 0.0, text))
     if linkage.operational_point.at is not None:
@@ -57,15 +57,11 @@ def loop_name(linkage: Linkage, index: int) -> str:
     return linkage.loop[index].name or f"loop{index + 1}"
 
 
-def coordinate_units(linkage: Linkage) -> tuple[str, ...]:
-    return tuple(unit for j in linkage.joint for unit in COORDINATE_UNITS[j.type])
-
-
 def coordinates(linkage: Linkage, values: Mapping[str, float | Sequence[float]]) -> list[float]:
     """Flat joint coordinates from values by joint name; missing ones are 0."""
     flat: list[float] = []
     for j in linkage.joint:
-        value = values.get(j.name, (0.0,) * COORDINATES[j.type])
+        value = values.get(j.name, (0.0,) * j.kind.size)
         flat.extend(value if isinstance(value, Sequence) else (value,))
     return flat
 
@@ -91,7 +87,3 @@ def mean_link_length(linkage: Linkage) -> float:
         math.sqrt(b.inertia / b.mass) for b in bodies if b.mass > 0 and b.inertia > 0
     ]
     return sum(lengths) / len(lengths) if lengths else 1.0
-
-
-COORDINATES = {joint: len(units) for joint, units in COORDINATE_UNITS.items()}
-"""Number of coordinates of a joint, by its type."""

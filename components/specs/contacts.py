@@ -112,7 +112,7 @@ def _places(corners: int, others: int) -> int:
 
 def _touch(linkage: Linkage, contacts: Contacts, both: set[str]) -> bool:
     """Whether two bodies touch each other."""
-    joined = [{j.parent, j.child} for j in linkage.joint if j.type != "free"]
+    joined = [{j.parent, j.child} for j in linkage.joint if not j.kind.free]
     if contacts.bodies == "none" or both in joined:
         return False
     if contacts.bodies == "free":

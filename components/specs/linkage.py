@@ -7,6 +7,7 @@ FMU. SI units throughout.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
@@ -14,6 +15,13 @@ from typing import Annotated, Any, Literal
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.bodies import Body
 from hapticlink.components.specs.drives import Drive
+from hapticlink.components.specs.joint_types import (
+    JOINT_TYPES,
+    CutType,
+    Freedom,
+    JointType,
+    TreeType,
+)
 from hapticlink.components.specs.quantities import (
     Angle,
     Coordinate,
@@ -83,7 +91,7 @@ class Joint:
 
     name: str
     """Its name in start values."""
-    type: Literal["revolute", "prismatic", "free"] = "revolute"
+    type: TreeType = "revolute"
     """revolute: one angle; prismatic: one displacement along `axis`; free: x, y and theta of the
     child in the parent's frame."""
     parent: str = "ground"
@@ -118,16 +126,24 @@ class Joint:
     """Ports of the mechanism's FMU for a motor or controller outside: NAME.effort is an input,
     NAME.position and NAME.velocity are outputs."""
 
+    @property
+    def kind(self) -> JointType:
+        """The record of its type."""
+        return JOINT_TYPES[self.type]
 
-COORDINATE_UNITS = {"revolute": ("rad",), "prismatic": ("m",), "free": ("m", "m", "rad")}
-"""The units of a joint's coordinates, by its type."""
+    def direction(self, freedom: Freedom) -> tuple[float, float]:
+        """Of a slide of the joint, in the parent's frame: a unit vector."""
+        if isinstance(freedom.along, tuple):
+            return freedom.along
+        axis = self.axis or 0.0
+        return math.cos(axis), math.sin(axis)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
     """A cut joint, which closes a loop between two bodies."""
 
-    type: Literal["revolute", "slot", "prismatic"] = "revolute"
+    type: CutType = "revolute"
     """revolute: the two points coincide; slot: the first body's point, a pin, is on the line
     through the second body's point along `axis`; prismatic: so it is, and the first body does not
     turn relative to the second."""
@@ -160,6 +176,11 @@ class Loop:
     """As of a joint."""
     drive: Drive | None = None
     """As of a joint."""
+
+    @property
+    def kind(self) -> JointType:
+        """The record of its type."""
+        return JOINT_TYPES[self.type]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,6 +246,11 @@ class Linkage:
     the others are the smallest that are consistent with the loops."""
 
     @property
+    def coordinate_units(self) -> tuple[str, ...]:
+        """The units of the joint coordinates, n of them."""
+        return tuple(unit for j in self.joint for unit in j.kind.units)
+
+    @property
     def closed(self) -> bool:
         """Whether it has closures: loops or gears."""
         return bool(self.loop or self.gear)
@@ -233,7 +259,7 @@ class Linkage:
     def free(self) -> set[str]:
         """The bodies on a free joint that are in no loop."""
         looped = {name for loop in self.loop for name in loop.bodies}
-        return {j.child for j in self.joint if j.type == "free"} - looped
+        return {j.child for j in self.joint if j.kind.free} - looped
 
     @property
     def objects(self) -> set[str]:

@@ -1,9 +1,9 @@
 """A scene's linkage, with what it can touch, as a model of MuJoCo (MJCF).
 
-The plane of the linkage is z = 0. Revolute joints are hinges about z, prismatic ones slides, a free
-joint two slides and a hinge; loops are `connect` equalities between two sites, gears equalities of
-joints. Pairs that can touch are listed, so that no others do: discs are spheres, capsules capsules,
-polygons prisms along z, walls of the enclosure planes.
+The plane of the linkage is z = 0. Where a joint turns it has a hinge about z, where it slides a
+slide, a free joint two slides and a hinge; loops are `connect` equalities between two sites, gears
+equalities of joints. Pairs that can touch are listed, so that no others do: discs are spheres,
+capsules capsules, polygons prisms along z, walls of the enclosure planes.
 
 Each operational point has a site NAME and three actuators NAME.x, NAME.y and NAME.theta: the first
 two pull along the world's axes, the last one on the sum of the hinges between ground and body,
@@ -12,7 +12,6 @@ which is the body's angle without jumps at half turns.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
@@ -30,7 +29,6 @@ RIGID = "0.9999 0.9999 0.001 0.5 2"
 """The impedance of closures and contacts: close to 1, so that only `solref` says how they give."""
 HAND = "hand"
 """Site and actuators of the operational point; further points have those of their names."""
-FREE = ("x", "y", "theta")
 
 
 def mjcf(
@@ -113,13 +111,15 @@ def chain(linkage: Linkage, body: str) -> list[str]:
     hinges: list[str] = []
     while body != "ground":
         joint = carrier[body]
-        hinges += [] if joint.type == "prismatic" else _names(joint)[-1:]
+        freedoms = zip(_names(joint), joint.kind.freedoms, strict=True)
+        hinges += [name for name, freedom in freedoms if freedom.turns]
         body = joint.parent
     return hinges[::-1]
 
 
 def _names(joint: Joint) -> list[str]:
-    return [f"{joint.name}.{c}" for c in FREE] if joint.type == "free" else [joint.name]
+    freedoms = joint.kind.freedoms
+    return [f"{joint.name}.{f.name}" for f in freedoms] if len(freedoms) > 1 else [joint.name]
 
 
 def _misfits(linkage: Linkage) -> Iterator[str]:
@@ -132,7 +132,7 @@ def _misfits(linkage: Linkage) -> Iterator[str]:
     if any(j.ports for j in linkage.joint):
         yield f"`ports` of joints are not passed on: {ours}"
     for i, loop in enumerate(linkage.loop):
-        if loop.type != "revolute":
+        if loop.kind.has_axis:
             yield f"loop {i + 1} is a {loop.type} joint, and only revolute ones are closed: {ours}"
         own = (loop.stiffness, loop.damping, loop.friction, loop.limits)
         if any(value is not None for value in own):
@@ -182,13 +182,6 @@ def _sites(linkage: Linkage) -> Iterator[tuple[str, str, Point | None]]:
 
 
 def _joint(body: ET.Element, joint: Joint, position: Point) -> None:
-    if joint.type == "free":
-        for name, axis in zip(_names(joint), ("1 0 0", "0 1 0", "0 0 1"), strict=True):
-            kind = "hinge" if axis == "0 0 1" else "slide"
-            ET.SubElement(body, "joint", name=name, type=kind, axis=axis, pos=_xy(position))
-        return
-    hinge, direction = joint.type == "revolute", joint.axis or 0.0
-    axis = "0 0 1" if hinge else _xy((math.cos(direction), math.sin(direction)))
     given: dict[str, float | None] = {
         "stiffness": joint.stiffness,
         "springref": joint.rest,
@@ -200,9 +193,11 @@ def _joint(body: ET.Element, joint: Joint, position: Point) -> None:
         ends = (limits.lower, -1e9), (limits.upper, 1e9)
         interval = " ".join(repr(none if end is None else end) for end, none in ends)
         attributes |= {"range": interval, "limited": "true", "solimplimit": RIGID}
-    kind = "hinge" if hinge else "slide"
-    place = {"name": joint.name, "type": kind, "axis": axis, "pos": _xy(position)}
-    ET.SubElement(body, "joint", place | attributes)
+    for name, freedom in zip(_names(joint), joint.kind.freedoms, strict=True):
+        kind = "hinge" if freedom.turns else "slide"
+        axis = "0 0 1" if freedom.turns else _xy(joint.direction(freedom))
+        place = {"name": name, "type": kind, "axis": axis, "pos": _xy(position)}
+        ET.SubElement(body, "joint", place | attributes)
 
 
 def _closures(equality: ET.Element, linkage: Linkage) -> None:

@@ -25,7 +25,6 @@ from hapticlink.analysis.findings.tracking import (
     pose_error,
 )
 from hapticlink.analysis.findings.user_port import UserPort, allowance, allowed, user_port
-from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.signal_names import (
@@ -80,7 +79,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     linkage = scene_part(
         results, "linkage", Linkage
     )  # an SSP has the block, but not its description
-    size = len(coordinate_units(linkage)) if linkage else 0
+    size = len(linkage.coordinate_units) if linkage else 0
     if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
         q = table[JOINT_COORDINATES]
         if len(ends := q[np.isfinite(q).all(axis=1)][[0, -1]]):

@@ -211,8 +211,8 @@ def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
     for i, (name, found) in enumerate(corners.items()):
         _name(axes, i, name, found, middle)
     named = [
-        (j.name, j.child, j.at_child) if j.type == "prismatic" else (j.name, j.parent, j.at_parent)
-        for j in linkage.joint if j.type != "free"
+        (j.name, j.child, j.at_child) if j.kind.slides else (j.name, j.parent, j.at_parent)
+        for j in linkage.joint if j.kind.mark
     ]  # fmt: skip
     named += [(loop.name, loop.bodies[0], loop.at[0]) for loop in linkage.loop if loop.name]
     names: dict[tuple[float, ...], list[str]] = {}

@@ -143,7 +143,7 @@ def attached(linkage: Linkage, body: str) -> Iterator[Point]:
     for joint in linkage.joint:
         if joint.child == body:
             yield joint.at_child or ORIGIN
-        if joint.parent == body and joint.type != "free":
+        if joint.parent == body and joint.kind.mark:
             yield joint.at_parent or ORIGIN
     for loop in linkage.loop:
         yield from (
@@ -200,7 +200,7 @@ def _corners(linkage: Linkage, body: Body, key: str = "poses") -> tuple[Place, .
     """The outline of a body; one with a single joint reaches to the pins that slide in it."""
     at = [Place((key, body.name), p) for p in _outline(linkage, body).tolist()]
     if len(at) == 1:
-        loops = (x for x in linkage.loop if x.type != "revolute" and x.bodies[1] == body.name)
+        loops = (x for x in linkage.loop if x.kind.has_axis and x.bodies[1] == body.name)
         at += [Place((key, loop.bodies[0]), loop.at[0]) for loop in loops]
     return (*at,)
 
@@ -224,15 +224,15 @@ def _slides(linkage: Linkage) -> Iterator[Mark]:
     beyond = BEYOND * (max(float(np.ptp(each, axis=0).max()) for each in corners) or 0.1)
     for joint in linkage.joint:
         ends = (_on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent))
-        if joint.parent == "ground" and joint.type != "free":
+        if joint.parent == "ground" and joint.kind.mark:
             yield Mark("ground", "ground", ends[1:], None, "#8c8c8c")
-        if joint.type == "prismatic":
+        if joint.kind.has_axis:
             yield _rail(ends, joint.axis, beyond)
     for loop in linkage.loop:
         pin, guide = (_on(b, at) for b, at in zip(loop.bodies, loop.at, strict=True))
         if "ground" in loop.bodies:
             yield Mark("ground", "ground", (pin,), None, "#8c8c8c")
-        if loop.type != "revolute":
+        if loop.kind.has_axis:
             yield _rail((pin, guide), loop.axis, beyond)
 
 
@@ -250,12 +250,12 @@ def _springs(linkage: Linkage) -> Iterator[Mark]:
 
 def _joints(linkage: Linkage) -> Iterator[Mark]:
     for joint in linkage.joint:
-        if joint.type == "prismatic":
-            # It is turned like the line along which it slides.
-            ends = _on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent)
+        ends = _on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent)
+        if joint.kind.mark == "slider":  # turned like the line along which it slides
             yield Mark("joint", "slider", ends, fill="#ffffff", angle=joint.axis or 0.0)
-        elif joint.type != "free":
-            yield Mark("joint", "pin", (_on(joint.parent, joint.at_parent),), fill="#ffffff")
+        elif joint.kind.mark:
+            at = ends[0] if joint.kind.slides else ends[1]
+            yield Mark("joint", joint.kind.mark, (at,), fill="#ffffff")
     for i, loop in enumerate(linkage.loop):
         label = "" if i else "joint that closes a loop"
         yield Mark("joint", "pin", (_on(loop.bodies[0], loop.at[0]),), fill=INK, label=label)

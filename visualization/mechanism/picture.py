@@ -124,14 +124,14 @@ def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
 def _cut(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:
     """The force (N) in each joint that is cut, (2, k). It has two multipliers, a slot one; that of
     what slides is along the normal, and a moment has no arrow."""
-    rows = sum(1 if loop.type == "slot" else 2 for loop in linkage.loop)
+    rows = sum(loop.kind.rows for loop in linkage.loop)
     along, q = ca.SX.sym("lambda", rows), ca.SX.sym("q", poses.size1_in(0))
     angles, forces, row = poses(q)[2, :], [], 0
     for loop in linkage.loop:
         normal = angles[names.index(loop.bodies[1])] + (loop.axis or 0.0)
         force = along[row] * ca.vertcat(-ca.sin(normal), ca.cos(normal))
-        forces.append(along[row : row + 2] if loop.type == "revolute" else force)
-        row += 1 if loop.type == "slot" else 2
+        forces.append(force if loop.kind.has_axis else along[row : row + 2])
+        row += loop.kind.rows
     made = ca.Function("cut", [along, q], [ca.horzcat(*forces)])
     return Part("", "cut", ("lambda", "q"), (rows, q.numel()), made)
 

@@ -17,7 +17,6 @@ from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.tracking import further_users, of_any_shape, of_block, table_of
 from hapticlink.analysis.findings.user_port import tolerated, user_port
-from hapticlink.components.linkage.parameters import coordinate_units
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
@@ -54,7 +53,7 @@ class Recorded:
         self.linkage = linkage
         device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
-        for signal, size in zip(NEEDED, (len(coordinate_units(linkage)), 3), strict=True):
+        for signal, size in zip(NEEDED, (len(linkage.coordinate_units), 3), strict=True):
             table = of_block(results, signal, size)
             if table is None:
                 message = "is not recorded: run the scene with record.signals = 'all'"

@@ -36,41 +36,42 @@ def check(scene: Scene) -> Iterator[Problem]:
     if linkage.operational_point.body not in bodies:
         message = unknown("body", linkage.operational_point.body, bodies)
         yield (*here, "operational_point", "body"), message
-    types = {j.name: j.type for j in linkage.joint}
+    joints = {j.name: j for j in linkage.joint}
     for table in ("start", "start_velocity"):
         for name, value in getattr(linkage, table).items():
-            if name not in types:
-                yield (*here, table, name), unknown("joint", name, types)
-            elif isinstance(value, tuple) != (types[name] == "free"):
-                wanted = "three numbers" if types[name] == "free" else "one number"
-                yield (*here, table, name), f"{value!r}: a {types[name]} joint takes {wanted}"
+            if (joint := joints.get(name)) is None:
+                yield (*here, table, name), unknown("joint", name, joints)
+            elif (len(value) if isinstance(value, tuple) else 1) != joint.kind.size:
+                wanted = f"{joint.kind.count} number{'s' if joint.kind.size > 1 else ''}"
+                yield (*here, table, name), f"{value!r}: a {joint.type} joint takes {wanted}"
 
 
 def _cuts(linkage: Linkage) -> Iterator[Problem]:
     """Problems of keys that a kind of cut joint needs, or does not have."""
     for i, loop in enumerate(linkage.loop):
         path: Path = ("linkage", "loop", i)
-        if loop.type != "revolute" and loop.axis is None:
+        if loop.kind.has_axis and loop.axis is None:
             yield (*path, "axis"), f"a {loop.type} joint needs its direction (rad)"
-        if loop.type == "revolute" and loop.axis is not None:
+        if not loop.kind.has_axis and loop.axis is not None:
             yield (
                 (*path, "axis"),
-                'a revolute joint has no direction: leave it out, or type = "slot"',
+                f'a {loop.type} joint has no direction: leave it out, or type = "slot"',
             )
-        if loop.type != "prismatic" and loop.angle is not None:
+        if loop.kind.turns and loop.angle is not None:
             yield (*path, "angle"), f"a {loop.type} joint turns freely: leave its angle out"
 
 
 def _gears(linkage: Linkage) -> Iterator[Problem]:
-    types = {j.name: j.type for j in linkage.joint}
+    joints = {j.name: j for j in linkage.joint}
     names = [loop.name for loop in linkage.loop]
     for i, gear in enumerate(linkage.gear):
         path: Path = ("linkage", "gear", i)
         for k, name in enumerate(gear.joints):
-            if name not in types:
-                yield (*path, "joints", k), unknown("joint", name, types)
-            elif types[name] == "free":
-                yield (*path, "joints", k), f"{name!r} is free: a gear couples single coordinates"
+            if (joint := joints.get(name)) is None:
+                yield (*path, "joints", k), unknown("joint", name, joints)
+            elif joint.kind.size > 1:
+                text = f"{name!r} is {joint.type}: a gear couples single coordinates"
+                yield (*path, "joints", k), text
         if gear.joints[0] == gear.joints[1]:
             yield (*path, "joints"), "a gear couples two different joints"
         if gear.name is not None and gear.name in names:
@@ -101,13 +102,14 @@ def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:
             )
         else:
             parents[joint.child] = joint.parent
-        if joint.ports and joint.type == "free":
-            yield (*path, "ports"), "ports are of one coordinate, and a free joint has three"
+        if joint.ports and joint.kind.size > 1:
+            text = f"ports are of one coordinate, and a {joint.type} joint has {joint.kind.count}"
+            yield (*path, "ports"), text
         if "effort" in joint.ports and isinstance(joint.drive, ConstantDrive):
             message = f"{joint.name}.effort is the drive's constant already: leave out one of them"
             yield (*path, "ports"), message
-        if joint.type == "prismatic" and joint.axis is None:
-            yield (*path, "axis"), "a prismatic joint needs its direction (rad)"
+        if joint.kind.has_axis and joint.axis is None:
+            yield (*path, "axis"), f"a {joint.type} joint needs its direction (rad)"
     held = {"ground"}
     for name, i in frames.items():
         way: dict[str, None] = {}
@@ -128,8 +130,9 @@ def _limits(linkage: Linkage) -> Iterator[Problem]:
             if (limits := part.limits) is None:
                 continue
             lower, upper = limits.lower, limits.upper
-            if kind == "joint" and part.type == "free":
-                yield path, "a free joint has three coordinates: limit revolute or prismatic joints"
+            if kind == "joint" and part.kind.size > 1:
+                text = f"a {part.type} joint has {part.kind.count} coordinates"
+                yield path, f"{text}: limit revolute or prismatic joints"
             if lower is None and upper is None:
                 yield path, "there is no limit: give `lower`, `upper` or both"
             elif lower is not None and upper is not None and lower >= upper:
