@@ -1,6 +1,6 @@
 """`hapticlink advise` on scenes that it was not made with: is another method better?
 
-Scenes are drawn with seeds: linkage, masses, gains, rates, delays, hand (tests/attack/verdicts.py).
+Scenes are drawn with seeds: linkage, masses, gains, rates, delays, hand (fuzz/verdicts.py).
 Each is advised. Then all holds with all gains run on DRAWS draws of it that `advise` has not seen.
 The best is the one with the smallest error, median of log(error) over these draws, of those that
 keep the limits in all of them.
@@ -17,6 +17,7 @@ from textwrap import fill
 import numpy as np
 
 from benchmarks.page import Progress, table
+from fuzz.verdicts import drawn
 from hapticlink.analysis.advise.advise_method import (
     Advice,
     Method,
@@ -30,7 +31,6 @@ from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene import overrides
-from tests.attack.verdicts import drawn
 
 FIRST, COUNT = 2300, 10
 """Seeds of the scenes."""
@@ -110,7 +110,7 @@ def page(found: Sequence[Judged], command: str) -> Iterator[str]:
     yield ""
     yield fill(
         f"`{command}` makes this page. Scenes are drawn with the seed of the row "
-        "(`tests/attack/verdicts.py`): linkage, masses, gains, rates, delays, hand. `advise` runs "
+        "(`fuzz/verdicts.py`): linkage, masses, gains, rates, delays, hand. `advise` runs "
         "on its own draws; then all holds with the "
         f"scene's own, soft and medium gains run on {DRAWS} others. Error: the largest distance of "
         "handle and operational point of a run, median of the draws.",

@@ -18,7 +18,7 @@ from docs.draw_buildings import BUILDINGS, FILES, ROOT, Module
 
 FREE = ("fmus",)
 """Buildings whose rooms may import each other both ways."""
-OUTSIDE = ("studies", "benchmarks", "tests", "docs")
+OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 BY_NAME = {("commands", "checkout"), ("orchestrator", "base", "plugins")}

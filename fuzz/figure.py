@@ -1,6 +1,6 @@
 """Draws results/faults/ends.png, how the cases of every attack ended, from their tables:
 
-python -m tests.attack.figure
+python -m fuzz.figure
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import csv
 
 from matplotlib.figure import Figure
 
-from tests.attack.__main__ import ATTACKS
-from tests.attack.cases import FOLDER
+from fuzz.__main__ import ATTACKS
+from fuzz.cases import FOLDER
 
 ENDS = {
     "done": "#0077bb",

@@ -12,9 +12,9 @@ import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from tests.attack.cases import Made, seeded
-from tests.attack.processes import PATIENCE, Room, own_folder
-from tests.attack.signals import python_itself
+from fuzz.cases import Made, seeded
+from fuzz.processes import PATIENCE, Room, own_folder
+from fuzz.signals import python_itself
 
 LATEST = (1.0, 3.0, 12.0)
 """Seconds after the start at which the first signal comes at the latest, in turn by chance."""

@@ -7,9 +7,9 @@ import random
 import signal
 import subprocess
 import sys
+import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,8 @@ OF_SIGNALS = ("before", "done", "told", "lost", "crashed", "hung")
 """before: a signal in Python's own start; done: after the last thing that asks."""
 BAD = ("lost", "crashed", "hung", "believed")
 FOLDER = Path("results/faults")
+Counts = dict[str, Counter[str]]
+"""Outcomes by kind."""
 
 
 @dataclass(frozen=True)
@@ -42,31 +44,33 @@ def seeded(number: int, seed: int) -> Iterator[tuple[int, str, random.Random]]:
         yield i, f"number {i} of seed {seed}", random.Random(f"{seed} {i}")
 
 
-def counted(made: Iterable[Made]) -> dict[str, Counter[str]]:
-    """Outcomes by kind, up to Ctrl-C; what was wrong goes to stderr."""
-    counts: dict[str, Counter[str]] = {}
-    with suppress(KeyboardInterrupt):
-        for i, each in enumerate(made):
-            counts.setdefault(each.kind, Counter())[each.outcome] += 1
-            if each.outcome in BAD:
-                line = f"case {i}, {each.kind}: {each.case}: {each.outcome}: {each.wrong}"
-                print(line, file=sys.stderr, flush=True)
-    return counts
+def count(made: Iterable[Made], counts: Counts, label: str) -> None:
+    """Adds each outcome to its kind in `counts`; stderr gets what was wrong, and how many cases
+    there are, every five seconds."""
+    told = time.monotonic()
+    for i, each in enumerate(made, 1):
+        counts.setdefault(each.kind, Counter())[each.outcome] += 1
+        if each.outcome in BAD:
+            line = f"case {i}, {each.kind}: {each.case}: {each.outcome}: {each.wrong}"
+            print(line, file=sys.stderr, flush=True)
+        if time.monotonic() > told + 5.0:
+            told = time.monotonic()
+            print(f"{label}: {i} cases", file=sys.stderr, flush=True)
 
 
-def total(counts: Mapping[str, Counter[str]]) -> Counter[str]:
+def total(counts: Counts) -> Counter[str]:
     """Outcomes of all kinds."""
     return sum(counts.values(), Counter())
 
 
-def bad(counts: Mapping[str, Counter[str]]) -> dict[str, int]:
+def bad(counts: Counts) -> dict[str, int]:
     """How many cases had each bad outcome; empty where none had."""
     return {outcome: n for outcome, n in total(counts).items() if n and outcome in BAD}
 
 
 def write(
     path: Path,
-    counts: Mapping[str, Counter[str]],
+    counts: Counts,
     seed: int,
     outcomes: Sequence[str] = OUTCOMES,
 ) -> None:

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from fuzz import mutations
+from fuzz.cases import Made
+from fuzz.commands import Place
+from fuzz.processes import own_folder
+from fuzz.scenes import SMALL
 from hapticlink.orchestrator.scene import find_scene
-from tests.attack import mutations
-from tests.attack.cases import Made
-from tests.attack.commands import Place
-from tests.attack.processes import own_folder
-from tests.attack.scenes import SMALL
 
 KINDS = ("set", "vary", "flags")
 WORDS = (

@@ -8,11 +8,11 @@ import tomllib
 from collections.abc import Iterator
 from typing import Any
 
+from fuzz import mutations
+from fuzz.cases import Made
+from fuzz.commands import Place
+from fuzz.processes import own_folder
 from hapticlink.orchestrator.scene import find_scene, overrides
-from tests.attack import mutations
-from tests.attack.cases import Made
-from tests.attack.commands import Place
-from tests.attack.processes import own_folder
 
 SMALL = ("pendulum", "single-body", "four-bar", "slider-crank", "sampled-spring", "trammel")
 KINDS = ("values", "lines", "bytes")

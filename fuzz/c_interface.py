@@ -14,6 +14,9 @@ from pathlib import Path
 
 import fmpy
 
+from fuzz import cases
+from fuzz.caller import TOLD, Target
+from fuzz.processes import own_folder
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
@@ -23,9 +26,6 @@ from hapticlink.fmus.native.compiler import compile_library
 from hapticlink.fmus.native.native_fmu_entries import WRAPPER
 from hapticlink.fmus.native.source import component_source
 from hapticlink.fmus.python_fmu_entries import entries
-from tests.attack import cases
-from tests.attack.caller import TOLD, Target
-from tests.attack.processes import own_folder
 from tests.fmus import sample_components
 from tests.mechanisms import five_bar
 
@@ -71,13 +71,17 @@ def sanitized(component: Component, folder: Path, wrapper: Path = WRAPPER) -> Fm
     command = ["gcc", *flags, "-fno-sanitize-recover=all", f"-I{room}", f"-I{headers}"]
     command += [f"-I{WRAPPER.parent}"]
     subprocess.run([*command, "-o", library, wrapper, "-lm"], check=True)
-    environment = {
+    kind = "native, address and undefined-behaviour sanitizers"
+    return Fmu(kind, library, GUID, _reals(component), True, sanitizer_environment())
+
+
+def sanitizer_environment() -> dict[str, str]:
+    """Variables of a process that loads a library with gcc's address sanitizer."""
+    return {
         "LD_PRELOAD": _address_library(),
         "ASAN_OPTIONS": "detect_leaks=0",
         "PYTHONMALLOC": "malloc",  # else small arrays lie beside each other in one block
     }
-    kind = "native, address and undefined-behaviour sanitizers"
-    return Fmu(kind, library, GUID, _reals(component), True, environment)
 
 
 def can_sanitize() -> bool:
@@ -157,6 +161,22 @@ def called(fmu: Fmu, number: int, seed: int, folder: Path) -> Iterator[cases.Mad
             yield cases.Made(fmu.kind, case, "hung" if status is None else "crashed", wrong)
 
 
+BROKEN = {"is_unknown(m, vr[i], REALS)": "is_unknown(m, vr[i], REALS + 1)"}
+"""A check of the wrapper, and the same one with a fault."""
+
+
+def check_that_a_fault_is_found(make: Callable[..., Fmu], folder: Path) -> None:
+    """Breaks the wrapper on purpose. Raises AssertionError where no call crashes then."""
+    ((good, bad),) = BROKEN.items()
+    text, room = WRAPPER.read_text(), folder / f"broken-{make.__name__}"
+    room.mkdir()
+    assert good in text, f"{WRAPPER.name} has no {good!r}: put a check that it has into BROKEN"
+    (room / "broken.c").write_text(text.replace(good, bad))
+    broken = make(sample_components.controller(), room, room / "broken.c")
+    crashed = any(case.outcome == "crashed" for case in called(broken, 4000, 7, room))
+    assert crashed, f"{broken.kind}: a read beyond the last variable is not found"
+
+
 KINDS: tuple[Callable[[Component, Path], Fmu], ...] = (native, trapped, sanitized, python)
 
 
@@ -174,5 +194,7 @@ def attack(number: int, seed: int) -> Iterator[cases.Made]:
     share = max(1, number // (len(made) * len(kinds)))
     with own_folder() as folder:
         for kind in kinds:
+            if kind in (trapped, sanitized):
+                check_that_a_fault_is_found(kind, folder)
             for component in made:
                 yield from called(kind(component, folder), share, seed, folder)

@@ -15,10 +15,10 @@ from pathlib import Path
 
 from fmpy import platform, sharedLibraryExtension
 
+from fuzz import cases
+from fuzz.commands import Place
+from fuzz.processes import own_folder
 from hapticlink.fmus.build_fmu import build
-from tests.attack import cases
-from tests.attack.commands import Place
-from tests.attack.processes import own_folder
 from tests.fmus import sample_components
 
 Entries = Mapping[str, bytes]

@@ -1,6 +1,6 @@
 """Fresh scenes, judged by `stability` and checked by runs of 60 s.
 
-    python -m tests.attack.verdicts --seed 53 --count 30 OUT.jsonl
+    python -m fuzz.verdicts --seed 53 --count 30 OUT.jsonl
 
 Each scene is drawn with a seed: linkage, masses, start, gains, rates, hold, delay, where the
 mechanism runs, hand. The worst case in hands is then run: in that pose, in that hand, whose target

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import hapticlink as hl
+from fuzz.cases import Made, seeded
+from fuzz.processes import own_folder
 from hapticlink.orchestrator.base.errors import Fault
-from tests.attack.cases import Made, seeded
-from tests.attack.processes import own_folder
 
 VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, -1, 1, 7, 2**70, 0.5, -0.5, 1e300, float("nan"), float("inf")),

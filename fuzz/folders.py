@@ -11,9 +11,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from fuzz.cases import Made, seeded
+from fuzz.processes import Process, own_folder
 from hapticlink.orchestrator.results import read_results
-from tests.attack.cases import Made, seeded
-from tests.attack.processes import Process, own_folder
 
 SCENES = ("pendulum", "closed-loop", "four-bar")
 REFUSED = "another run writes there"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tests.attack.cases import Made, seeded
-from tests.attack.commands import Place
-from tests.attack.processes import own_folder
+from fuzz.cases import Made, seeded
+from fuzz.commands import Place
+from fuzz.processes import own_folder
 
 FAILURES = (
     "raise RuntimeError('broken')",

@@ -22,13 +22,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from fuzz.processes import PATIENCE, Room
 from hapticlink import commands
 from hapticlink.commands import internal_error
 from hapticlink.commands import run as run
 from hapticlink.orchestrator import experiment as experiment
 from hapticlink.orchestrator.scene.scene import adapter
 from hapticlink.visualization.figures import run_figures as run_figures
-from tests.attack.processes import PATIENCE, Room
 
 ENOUGH = 0.5
 """Seconds from a run's first row on after which it is ended."""

@@ -16,9 +16,9 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from fuzz.cases import Made, hear_interrupts
+from fuzz.processes import PATIENCE, Process, Room, own_folder
 from hapticlink.orchestrator.results import read_results
-from tests.attack.cases import Made, hear_interrupts
-from tests.attack.processes import PATIENCE, Process, Room, own_folder
 
 KINDS = {
     "in process": [],

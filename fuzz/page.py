@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import hapticlink as hl
+from fuzz.cases import Made, seeded
+from fuzz.processes import own_folder
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.session import Session
-from tests.attack.cases import Made, seeded
-from tests.attack.processes import own_folder
 
 ASKED = {"resets": 10, "holds": 100, "anything": 50}
 """What a case of each kind asks for, so often."""

@@ -9,9 +9,9 @@ import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from tests.attack.cases import Made, seeded
-from tests.attack.commands import Place
-from tests.attack.processes import own_folder
+from fuzz.cases import Made, seeded
+from fuzz.commands import Place
+from fuzz.processes import own_folder
 
 NAMES = ("run.json", "haptics.csv", "plan.txt", "haptics.rows", "new")
 COMMANDS = ("run", "report", "compare", "recover", "export", "sweep")

@@ -10,11 +10,11 @@ from html import escape, unescape
 from xml.etree import ElementTree
 
 import hapticlink as hl
-from tests.attack import mutations
-from tests.attack.archives import entries, zipped
-from tests.attack.cases import Made
-from tests.attack.commands import Place
-from tests.attack.processes import own_folder
+from fuzz import mutations
+from fuzz.archives import entries, zipped
+from fuzz.cases import Made
+from fuzz.commands import Place
+from fuzz.processes import own_folder
 
 SCENES = ("pendulum", "sampled-spring", "closed-loop")
 KINDS = ("bytes", "text", "elements", "annotation", "description")

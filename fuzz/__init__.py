@@ -1,0 +1,1 @@
+"""Attacks on the project from outside, seeded, each of many cases: `python -m fuzz`."""
