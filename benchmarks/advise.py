@@ -99,7 +99,7 @@ def _error(rows: Sequence[Row]) -> float:
 
 def page(found: Sequence[Judged], command: str) -> Iterator[str]:
     known = [one for one in found if one.best]
-    yield "# What `hapticlink advise` is worth on scenes kept apart\n"
+    yield "# What `hapticlink advise` is worth on test scenes\n"
     yield fill(
         f"The method that it says to take is within a tenth of the best of all methods in "
         f"{sum(one.near for one in known)} of the {len(known)} scenes in which any keeps the "
@@ -111,7 +111,7 @@ def page(found: Sequence[Judged], command: str) -> Iterator[str]:
     yield fill(
         f"`{command}` makes this page. Scenes are drawn with the seed of the row "
         "(`fuzz/verdicts.py`): linkage, masses, gains, rates, delays, hand. `advise` runs "
-        "on its own draws; then all holds with the "
+        "on its own [draws](../../docs/glossary.md#words); then all holds with the "
         f"scene's own, soft and medium gains run on {DRAWS} others. Error: the largest distance of "
         "handle and operational point of a run, median of the draws.",
         WIDTH,

@@ -58,7 +58,7 @@ def bench(
     - standalone: a scene as a page in one file: size, and speed in a browser
     - engine: MuJoCo in the place of the graphics copy and of the mechanism
     - network: the graphics on another computer: delay, jitter and loss against error and energy
-    - advise: what `hapticlink advise` is worth on scenes kept apart
+    - advise: what `hapticlink advise` is worth on test scenes
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.

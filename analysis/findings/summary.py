@@ -106,10 +106,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
         yield _energy(port)
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
-            yield (
-                f"held {name} generated at most {short(1e3 * energy.peak)} mJ at a time, "
-                f"{short(1e3 * energy.generated)} mJ in the end"
-            )
+            yield f"held {name} {_generated(energy.peak, energy.generated)}"
     if measures.closure_m is not None:
         yield f"loops close within {measures.closure_m:.2g} m"
 
@@ -136,12 +133,19 @@ def _energy(port: PortEnergy) -> str:
     hands = [1e3 * work for name, work in port.works.items() if name.endswith("hand")]
     put_in = f"the hand put in {short(sum(hands))} mJ, " if hands else ""
     is_over = port.peak > allowed(port.hand_work)
+    generated = _generated(port.peak, port.generated, f", at {port.time_of_peak:.3g} s")
     return (
-        f"energy at the user's port: {put_in}the rendering generated at most "
-        f"{short(1e3 * port.peak)} mJ, at {port.time_of_peak:.3g} s, and "
-        f"{short(1e3 * port.generated)} mJ until the end. A passive one generates none; this is "
-        f"{'over' if is_over else 'within'} the tolerated {allowance(port.hand_work)}"
+        f"energy at the user's port: {put_in}the rendering {generated}. A passive one generates "
+        f"none; this is {'over' if is_over else 'within'} the tolerated {allowance(port.hand_work)}"
     )
+
+
+def _generated(peak: float, end: float, when: str = "") -> str:
+    """What was generated (J): at most, at the time `when`, and by the end."""
+    by_the_end = f"{'generated' if end > 0 else 'dissipated'} {short(1e3 * abs(end))} mJ"
+    if peak <= 0:
+        return f"generated no energy and {by_the_end}"
+    return f"generated at most {short(1e3 * peak)} mJ{when}, and by the end has {by_the_end}"
 
 
 def _saturated(measures: Measures) -> Iterator[str]:

@@ -37,9 +37,10 @@ def worth(found: Found) -> str:
         return [found.advice[cell].best]
 
     return (
-        "On linkages, hands and a rate that were kept apart, the method that a row says to take is "
-        f"within a tenth of the best of all methods in {near(MOBILITY, taken)} with the mechanism "
-        f"at 512 Hz, and in {near(DIRECT, taken)} with the mechanism at the graphics rate; there "
+        "On linkages, hands and a rate that were [kept apart](../../docs/glossary.md#words), the "
+        "method that a row says to take is within a tenth of the best of all methods in "
+        f"{near(MOBILITY, taken)} with the mechanism at 512 Hz, and in {near(DIRECT, taken)} with "
+        "the mechanism at the graphics rate; there "
         "the best of it and of what the row says to try, too, is in "
         f"{near(DIRECT, lambda cell: found.listed[cell])}."
     )

@@ -57,6 +57,13 @@ def test_the_first_variation_ends_early() -> None:
     assert end["time"] == pytest.approx(2.1, abs=0.05)
 
 
+def test_the_first_example_prints_what_is_below_it() -> None:
+    example, printed = blocks(ROOT / "README.md", "python", "text")
+    command = [sys.executable, "-c", example.text]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == printed.text
+
+
 def test_the_handle_stays_within_5_mm() -> None:
     distance = run_once("closed-loop").tracking().distance_mm
     assert 4 < distance.max() < 5
