@@ -89,10 +89,11 @@ def changed_period(rate: object, base: Fraction, a_tick: int) -> Fraction:
     Raises ValueError for one below SLOWEST or above the haptic one, of steps of `a_tick` ticks."""
     fastest = 1 / (a_tick * base)
     is_number = isinstance(rate, int | float) and not isinstance(rate, bool)
-    if not is_number or not SLOWEST <= rate < math.inf or exact(rate) > fastest:
-        limits = f"from {SLOWEST:g} up to that of the haptics, {fastest}"
-        raise ValueError(f"{rate!r}: give a rate (Hz) {limits}")
-    return 1 / (exact(rate) * base)
+    number = float(rate) if is_number else 0.0  # type: ignore[arg-type]
+    if SLOWEST <= number < math.inf and exact(number) <= fastest:
+        return 1 / (exact(number) * base)
+    limits = f"from {SLOWEST:g} up to that of the haptics, {fastest}"
+    raise ValueError(f"{rate!r}: give a rate (Hz) {limits}")
 
 
 def _period(pace: Pace) -> Fraction:

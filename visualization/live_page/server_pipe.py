@@ -65,7 +65,7 @@ class Pipe:
             self._outgoing.close()
 
 
-class Link(Pipe):
+class ChildProcess(Pipe):
     """A process of this package's `module`, whose first message are the `arguments`: no other
     process can read them there. A context manager that ends it."""
 
@@ -86,7 +86,7 @@ class Link(Pipe):
             time.sleep(WAIT)
         return self._received.popleft() if self._received else None
 
-    def __enter__(self) -> Link:
+    def __enter__(self) -> ChildProcess:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -104,7 +104,7 @@ class Link(Pipe):
 
 
 def to_caller() -> IO[bytes]:
-    """The standard output for messages alone, in a process of a Link: whatever prints goes to the
+    """The standard output for messages alone, in a ChildProcess: whatever prints goes to the
     standard error. Ctrl-C in the terminal is left to the caller."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     out = os.fdopen(os.dup(1), "wb")
