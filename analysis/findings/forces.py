@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import further_users, of_block
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.signal_names import (
     CONTACT_GAP,
@@ -36,7 +37,7 @@ def wrenches(results: Results, user: str = "") -> dict[str, tuple[Vector, Vector
         if (table := of_block(results, signal, 3)) and len(table["time"]):
             rows = results.within(table["time"])
             F = table[signal][rows]
-            wrenches_by_name[name] = table["time"][rows], np.hypot(F[:, 0], F[:, 1]), F[:, 2]
+            wrenches_by_name[name] = table["time"][rows], PLANE.distance(F), F[:, 2]
     return wrenches_by_name
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import (
     CONSTRAINT_COUNTS,
     COPY_BRANCH_OK,
@@ -77,11 +78,9 @@ def pose_error(results: Results, user: str = "") -> Tracking:
         return Tracking(*np.zeros((3, 0)))
     rows = until_last(results.within(mechanism["time"]), mechanism, device)
     time = mechanism["time"][rows]
-    x, y, theta = (
-        mechanism[point][rows, i] - np.interp(time, device["time"], device[handle][:, i])
-        for i in range(3)
-    )
-    return Tracking(time, np.hypot(x, y) * 1e3, np.abs(theta))
+    held = [np.interp(time, device["time"], entry) for entry in device[handle].T]
+    error = PLANE.difference(mechanism[point][rows], np.column_stack(held))
+    return Tracking(time, PLANE.distance(error) * 1e3, PLANE.angle(error))
 
 
 def until_last(rows: slice, table: Table, other: Table) -> slice:

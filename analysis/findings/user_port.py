@@ -34,6 +34,7 @@ from hapticlink.analysis.findings.tracking import (
     until_last,
 )
 from hapticlink.analysis.findings.work_of_wrenches import Works
+from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     DEVICE,
@@ -212,7 +213,7 @@ def _port(window: Results, works: Works, start: float) -> UserPort | None:
         else:
             position = f"{MECHANISM}.{point}.x"
         moved, pushing = of_block(window, position, 3), table_of(window, hand)
-        if moved is None or pushing is None or pushing[hand].shape[1:] != (3,):
+        if moved is None or pushing is None or pushing[hand].shape[1:] != PLANE.pose.shape:
             return None
         done = works.of(window, hand, position, time)[0]
         if with_device:
