@@ -111,8 +111,10 @@ def _starts(scene: Any, start: dict[str, float]) -> None:
 
 
 def _pose(start: dict[str, float]) -> list[float]:
-    """Of the operational point at the start: x m, y m, theta rad."""
-    return [start.get(f"x[{i}]", 0.0) for i in (1, 2, 3)]
+    """Of the operational point at the start."""
+    from hapticlink.components.port_space import PLANE
+
+    return [start.get(f"x[{i}]", 0.0) for i in range(1, 1 + PLANE.size)]
 
 
 def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:

@@ -90,17 +90,6 @@ class Variable:
         return tuple(f"{self.name}[{i + 1},{j + 1}]" for i in range(rows) for j in range(columns))
 
 
-POSE = ("m", "m", "rad")
-TWIST = ("m/s", "m/s", "rad/s")
-ACCELERATION = ("m/s2", "m/s2", "rad/s2")
-WRENCH = ("N", "N", "N.m")
-STIFFNESS = ("N/m", "N/m", "N.m/rad")
-DAMPING = ("N.s/m", "N.s/m", "N.m.s/rad")
-IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-INERTIA = ("kg", "kg", "kg.m", "kg", "kg", "kg.m", "kg.m", "kg.m", "kg.m2")
-MOBILITY = ("1/kg", "1/kg", "1/(kg.m)") * 2 + ("1/(kg.m)", "1/(kg.m)", "1/(kg.m2)")
-
-
 class Signals(Mapping[str, ca.SX]):
     """CasADi symbols of a list of variables, by name and as one flat column `vector`, and names for
     expressions of them. Raises ValueError for a name that is declared twice."""

@@ -109,17 +109,19 @@ class PortSpace:
         """The displacement that takes `other` to `pose`, whose rate is that of their twists."""
         return pose - other
 
-    def linear(self, entries: Any) -> Any:
-        """The entries along lengths of rows (..., n) of a pose, twist or wrench."""
-        return entries[..., : self.turns.index(True)] if any(self.turns) else entries
+    def distance(self, entries: Vector) -> Vector:
+        """The size of what is along lengths in rows (..., n): a distance (m), a force (N)."""
+        return self._size(entries, turns=False)
 
-    def distance(self, entries: Vector) -> Any:
-        """The size of the linear part of rows (..., n): a distance (m), speed or force."""
-        return reduce(np.hypot, np.moveaxis(self.linear(entries), -1, 0))
+    def angle(self, entries: Vector) -> Vector:
+        """The size of what is about axes in rows (..., n): an angle (rad), a moment (N.m)."""
+        return self._size(entries, turns=True)
 
-    def angle(self, entries: Vector) -> Any:
-        """The angular part of rows (..., n) ..."""
+    def _size(self, entries: Vector, *, turns: bool) -> Vector:
+        parts = (entries[..., i] for i, turn in enumerate(self.turns) if turn == turns)
+        return reduce(np.hypot, parts, np.zeros(entries.shape[:-1]))
 
 
+LINE = PortSpace(("x",), (0,))
 PLANE = PortSpace(("x", "y", "theta"), (0, 1, 5))
 """Planar pose (x m, y m, theta rad) and wrench (N, N, N.m)."""

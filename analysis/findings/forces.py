@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import further_users, of_block
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.signal_names import (
     CONTACT_GAP,
@@ -38,7 +39,7 @@ def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
             signal = signal_of_user(signal, user)
             if (table := of_block(results, signal, 3)) and len(table["time"]):
                 force, moment = table.by_row(
-                    lambda F: np.stack([np.hypot(F[:, 0], F[:, 1]), F[:, 2]]), signal
+                    lambda F: np.stack([PLANE.distance(F), F[:, 2]]), signal
                 )
                 yield f"{user}: {name}" if user else name, table["time"], force, moment
 

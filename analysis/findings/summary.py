@@ -13,6 +13,7 @@ from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.analysis.findings.user_port import allowance, allowed, pushed_by_others
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
 from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
@@ -397,7 +398,7 @@ def _start(results: Results) -> Iterator[str]:
         yield f"warning: {outside(device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0])}"
     pulls = of_block(results, HAND_WRENCH, 3)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
-        pull = float(np.hypot(*pulls[HAND_WRENCH][0, :2])) if len(pulls["time"]) else 0.0
+        pull = float(PLANE.distance(pulls[HAND_WRENCH][0])) if len(pulls["time"]) else 0.0
         if pull > PULL:
             yield (
                 f"warning: the hand's spring begins with a pull of {short(pull)} N: begin "

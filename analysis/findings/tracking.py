@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import (
     CONSTRAINT_COUNTS,
     COPY_BRANCH_OK,
@@ -76,8 +77,9 @@ def pose_error(results: Results, user: str = "") -> Tracking:
     times, known = device["time"], device[handle]
 
     def error(time: Vector, place: Vector) -> Vector:
-        x, y, theta = (place[:, i] - np.interp(time, times, known[:, i]) for i in range(3))
-        return np.stack([np.hypot(x, y) * 1e3, np.abs(theta)])
+        held = np.column_stack([np.interp(time, times, entry) for entry in known.T])
+        apart = PLANE.difference(place, held)
+        return np.stack([PLANE.distance(apart) * 1e3, PLANE.angle(apart)])
 
     rows = rows_until(mechanism, times[-1])
     distance, angle = mechanism.by_row(error, "time", point)

@@ -37,6 +37,7 @@ from hapticlink.analysis.findings.work_of_wrenches import (
     work_as_held,
     work_of_source,
 )
+from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     DEVICE,
@@ -151,7 +152,7 @@ def user_port(results: Results) -> UserPort | None:
         else:
             position = f"{MECHANISM}.{point}.x"
         moved, pushing = of_block(results, position, 3), table_of(results, hand)
-        if moved is None or pushing is None or pushing.shape(hand) != (3,):
+        if moved is None or pushing is None or pushing.shape(hand) != PLANE.pose.shape:
             return None
         done = works.of(hand, position)[0]
         if with_device:

@@ -21,6 +21,7 @@ from scipy.signal import butter, cont2discrete, lfilter, sosfiltfilt, ss2tf
 
 from hapticlink.analysis.fit.estimate import FROM_ZERO, Estimate, standard_deviations
 from hapticlink.analysis.fit.log import Log
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault
@@ -35,11 +36,11 @@ BLOCKS = 20
 """Parts of a log that are taken to be independent of each other, for the spread."""
 NAMES = ("mass", "stiffness", "damping", "grip_stiffness", "grip_damping")
 UNITS = {
-    "mass": ("kg", "kg.m2"),
-    "stiffness": ("N/m", "N.m/rad"),
-    "damping": ("N.s/m", "N.m.s/rad"),
-    "grip_stiffness": ("N/m", "N.m/rad"),
-    "grip_damping": ("N.s/m", "N.m.s/rad"),
+    "mass": PLANE.mass.units,
+    "stiffness": PLANE.stiffness.units,
+    "damping": PLANE.damping.units,
+    "grip_stiffness": PLANE.stiffness.units,
+    "grip_damping": PLANE.damping.units,
 }
 RANGE = (1e-7, 1e7)
 """Between these it ends (SI units): no arm is beyond, and the model's numbers stay finite."""
@@ -62,7 +63,7 @@ def fit_arm(log: Log, arm: ArmHand) -> tuple[list[Estimate], list[float]]:
     inside = slice(cut, len(pose) - cut)
     estimates: list[Estimate] = []
     unexplained: list[float] = []
-    for axis in range(3):
+    for axis in range(PLANE.size):
         F = wrench[inside, axis]
         if np.ptp(pose[inside, axis]) < STILL or np.ptp(F) < FORCELESS:
             continue
@@ -77,7 +78,7 @@ def fit_arm(log: Log, arm: ArmHand) -> tuple[list[Estimate], list[float]]:
         )
         spread = standard_deviations(found.jac, found.fun, BLOCKS, len(NAMES))
         for i, name in enumerate(NAMES):
-            value, unit = float(np.exp(found.x[i])), UNITS[name][axis == 2]
+            value, unit = float(np.exp(found.x[i])), UNITS[name][axis]
             sd = float(spread[i] * value)
             estimates.append(Estimate(f"hand.{name}[{axis}]", unit, value, sd, float(given[i])))
         unexplained.append(float(np.sum(found.fun**2) / np.sum((F - F.mean()) ** 2)))

@@ -11,6 +11,7 @@ from hapticlink.analysis.fit import log as logs
 from hapticlink.analysis.fit.arm_fit import NAMES, fit_arm
 from hapticlink.analysis.fit.device_fit import FITTED, fit_device
 from hapticlink.analysis.fit.estimate import Estimate
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.orchestrator import open_scene
@@ -83,7 +84,7 @@ class Fitted:
         hand = []
         for name in NAMES:
             assumed = getattr(self.arm, name)
-            values = [known.get(f"hand.{name}[{i}]", assumed[i]) for i in range(3)]
+            values = [known.get(f"hand.{name}[{i}]", assumed[i]) for i in range(PLANE.size)]
             hand.append(f"{name} = {toml(values, name)}")
         lines = ["[device]", *device, ""] if device else []
         if self.unexplained:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hapticlink.components.port_space import PLANE
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Matrix
@@ -66,8 +67,10 @@ def read(path: Path | str) -> Log:
         )
     signals = {name: table[name] for name, there in names.items() if there}
     for name, values in signals.items():
-        if name != "time" and values.shape[1:] != (3,):
-            raise InputFault(f"{path}: {name} has {values.shape[1:]} entries a sample, not 3")
+        if name != "time" and values.shape[1:] != PLANE.pose.shape:
+            raise InputFault(
+                f"{path}: {name} has {values.shape[1:]} entries a sample, not {PLANE.size}"
+            )
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
             raise InputFault(f"{path}: {name} is not finite in row {row + 1}")

@@ -12,13 +12,13 @@ from functools import lru_cache
 import numpy as np
 
 from hapticlink.analysis.stability.graph_slopes import GraphSlopes
-from hapticlink.components.blocks.hand import hand
+from hapticlink.components.blocks.hand import SPACE, hand
 from hapticlink.components.specs.hand import Hand
 from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.orchestrator.base.arrays import Matrix
 
 INPUTS, OUTPUT = ("x", "v"), "F"
-PORTS = 9
+PORTS = 3 * SPACE.size
 """Numbers of the ports of a hand that reads pose and velocity: x, v, F."""
 
 
@@ -41,16 +41,17 @@ def hand_slopes(spec: Hand, T: float) -> HandSlopes:
     made = hand(spec)
     functions = {f.name(): f for f in one_pass(made).functions}
     graph = GraphSlopes(functions, made.timing == "sampled", made.substeps)
-    own = [3 * (*INPUTS, OUTPUT).index(v.name) + i for v in made.inputs for i in range(3)]
-    n_y, n_x = 3, sum(v.size for v in made.states)
-    places = [*own, *range(6, PORTS + n_x)]
+    n = SPACE.size
+    own = [n * (*INPUTS, OUTPUT).index(v.name) + i for v in made.inputs for i in range(n)]
+    n_y, n_x = n, sum(v.size for v in made.states)
+    places = [*own, *range(2 * n, PORTS + n_x)]
     p = np.concatenate([np.ravel(v.start).astype(float) for v in made.parameters])
     rest = np.concatenate([np.zeros(len(own)), p, np.zeros(n_y + n_x)])
     state = np.concatenate([[0.0], rest])
     size = PORTS + n_x
     step, got = np.eye(size), np.eye(size)
-    step[6:] = got[6:] = 0.0
+    step[2 * n :] = got[2 * n :] = 0.0
     at = np.zeros((1, len(places)))
     for J, (_, slopes) in ((step, graph.step(state, at, T)), (got, graph.get(state, at))):
         J[np.ix_(places, places)] = slopes
-    return HandSlopes(step, np.vstack([got, got[6:PORTS]]))
+    return HandSlopes(step, np.vstack([got, got[2 * n : PORTS]]))

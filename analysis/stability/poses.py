@@ -15,6 +15,7 @@ from hapticlink.analysis.stability.hands import FIRM, own_hand, spring, standing
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import Joints
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import temporary_folders
@@ -77,7 +78,7 @@ class Pose:
     def lighter(self) -> Pose:
         """Pressed with LIGHT."""
         F = np.array(self.press)
-        return replace(self, press=tuple((F * LIGHT / np.hypot(*F[:2])).tolist()))
+        return replace(self, press=tuple((F * LIGHT / PLANE.distance(F)).tolist()))
 
     @property
     def name(self) -> str:
@@ -126,7 +127,7 @@ def evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     one if there was any. Raises InputFault where the poses are not recorded."""
     table = _recorded(run)
     moments = [int(i * len(table["time"]) / count) for i in range(count)]
-    size = np.hypot(*_force(table)[:, :2].T)
+    size = PLANE.distance(_force(table))
     touching = np.flatnonzero(size)
     if len(touching):
         moments.append(int(touching[np.argsort(size[touching])[len(touching) // 2]]))

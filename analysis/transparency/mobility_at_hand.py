@@ -32,6 +32,7 @@ from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.tune.felt_stiffness import CONSTRAINED, RIGID, mobility
 from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
@@ -191,7 +192,7 @@ def _felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transp
 def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Transparency:
     """The transparency of a handle with the compliances X (k, 3, 3) at HERTZ, for a mechanism of a
     mobility Lambda^-1 (3, 3) with links of a mean length (m)."""
-    S, w = np.diag([1.0, 1.0, length]), 2 * np.pi * HERTZ
+    S, w = np.diag(np.array(PLANE.scaling(length), float)), 2 * np.pi * HERTZ
     values, vectors = np.linalg.eigh(S @ mobility @ S)
     moves = values > CONSTRAINED * values[-1]
     E, P = vectors[:, moves], vectors[:, ~moves].T

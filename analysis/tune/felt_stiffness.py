@@ -17,6 +17,7 @@ from hapticlink.analysis.stability.gains import Scales
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.tune.stability_limits import FINE
 from hapticlink.components.linkage.parameters import mean_link_length
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault
@@ -36,8 +37,8 @@ CONSTRAINED = 1e-6
 def mobility(place: RestingScene) -> Matrix:
     """Lambda^-1 (3, 3) at an equilibrium. Raises InputFault where no FMU puts it out."""
     for port in MOBILITIES:
-        if len(values := place.signal(port)) == 9:
-            return values.reshape(3, 3)
+        if len(values := place.signal(port)) == PLANE.size**2:
+            return values.reshape(PLANE.mobility.shape)
     raise InputFault(f"no FMU puts out the mobility of the mechanism ({' or '.join(MOBILITIES)})")
 
 
@@ -51,14 +52,14 @@ class Feel:
     def of(cls, place: RestingScene, linkage: Linkage) -> Feel:
         """Raises InputFault where no direction is constrained and nothing touches."""
         found = {}
-        S: Matrix = np.diag([1.0, 1.0, mean_link_length(linkage)])
+        S: Matrix = np.diag(np.array(linkage.space.scaling(mean_link_length(linkage)), float))
         values, vectors = np.linalg.eigh(S @ mobility(place) @ S)
-        null = [S @ vectors[:, i] for i in range(3) if values[i] < CONSTRAINED * values[-1]]
+        null = [S @ vectors[:, i] for i in np.flatnonzero(values < CONSTRAINED * values[-1])]
         if null:
-            n = max(null, key=lambda wrench: float(np.hypot(*wrench[:2])))
-            found["constraint"] = n / np.hypot(*n[:2])
+            n = max(null, key=lambda wrench: float(PLANE.distance(wrench)))
+            found["constraint"] = n / PLANE.distance(n)
         F = place.signal(ENVIRONMENT_WRENCH)
-        if len(F) and (size := float(np.hypot(*F[:2]))):
+        if len(F) and (size := float(PLANE.distance(F))):
             found["contact"] = F / size
         if not found:
             raise InputFault(

@@ -79,7 +79,8 @@ def _controller(controller: Controller, linkage: Linkage, directions: Directions
     from hapticlink.components.linkage.parameters import mean_link_length
 
     given = directions.length_scale
-    return block.controller(controller, mean_link_length(linkage) if given is None else given)
+    length = mean_link_length(linkage) if given is None else given
+    return block.controller(controller, linkage.space, length)
 
 
 def _hand(hand: Hand) -> Component:

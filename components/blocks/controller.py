@@ -23,21 +23,9 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.component import (
-    ACCELERATION,
-    DAMPING,
-    IDENTITY,
-    INERTIA,
-    MOBILITY,
-    POSE,
-    STIFFNESS,
-    TWIST,
-    WRENCH,
-    Block,
-    Component,
-    Variable,
-)
+from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
+from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import Spring
 from hapticlink.components.specs.control import Controller, Passivity, Topology
 
@@ -45,7 +33,7 @@ _DRIFT = Spring("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_dr
 """F_drift between the operational point and the handle."""
 
 
-def _signals(spec: Controller, law: Topology | None) -> list[Variable]:
+def _signals(spec: Controller, space: PortSpace, law: Topology | None) -> list[Variable]:
     """The inputs that the chosen parts need."""
     coupled, shaped = bool(spec.teleoperation or law), spec.impedance
     posed = coupled or spec.stiffness is not None or bool(spec.passivity)
@@ -53,35 +41,43 @@ def _signals(spec: Controller, law: Topology | None) -> list[Variable]:
     coriolis = "C_d v, Coriolis and centrifugal terms of the device"
     bias = "operational acceleration at zero wrench"
     rows = (
-        ("x_S", (3,), POSE, 0.0, "pose of the operational point", coupled),
-        ("v_S", (3,), TWIST, 0.0, "velocity of the operational point", coupled),
-        ("x_D", (3,), POSE, 0.0, "pose of the handle", posed),
-        ("v_D", (3,), TWIST, 0.0, "velocity of the handle", coupled or spec.damping is not None),
-        ("F_hand", (3,), WRENCH, 0.0, "wrench of the hand", shaped),
-        ("F_env", (3,), WRENCH, 0.0, "wrench of contacts and others", spec.contact),
-        ("M", (3, 3), INERTIA, IDENTITY, "inertia of the device", inertial),
-        ("c", (3,), WRENCH, 0.0, coriolis, shaped),
-        ("Lambda_inv", (3, 3), MOBILITY, IDENTITY, "mobility at the operational point", shaped),
-        ("P_c", (3, 3), "1", 0.0, "projector on the constrained directions", bool(law)),
-        ("a_bias", (3,), ACCELERATION, 0.0, bias, spec.bias == "full"),
+        ("x_S", *space.pose, 0.0, "pose of the operational point", coupled),
+        ("v_S", *space.twist, 0.0, "velocity of the operational point", coupled),
+        ("x_D", *space.pose, 0.0, "pose of the handle", posed),
+        ("v_D", *space.twist, 0.0, "velocity of the handle", coupled or spec.damping is not None),
+        ("F_hand", *space.wrench, 0.0, "wrench of the hand", shaped),
+        ("F_env", *space.wrench, 0.0, "wrench of contacts and others", spec.contact),
+        ("M", *space.inertia, space.identity, "inertia of the device", inertial),
+        ("c", *space.wrench, 0.0, coriolis, shaped),
+        (
+            "Lambda_inv",
+            *space.mobility,
+            space.identity,
+            "mobility at the operational point",
+            shaped,
+        ),
+        ("P_c", *space.projector, 0.0, "projector on the constrained directions", bool(law)),
+        ("a_bias", *space.acceleration, 0.0, bias, spec.bias == "full"),
     )
     return [Variable(*declared) for *declared, needed in rows if needed]
 
 
-def _gains(spec: Controller, law: Topology | None, length_scale: float) -> list[Variable]:
+def _gains(
+    spec: Controller, space: PortSpace, law: Topology | None, length_scale: float
+) -> list[Variable]:
     gains = []
     if spec.damping is not None:
-        gains += [Variable("B_d", (3,), DAMPING, spec.damping, "desired damping")]
+        gains += [Variable("B_d", *space.damping, spec.damping, "desired damping")]
     if spec.stiffness is not None:
         gains += [
-            Variable("K_d", (3,), STIFFNESS, spec.stiffness, "desired stiffness"),
-            Variable("x_ref", (3,), POSE, 0.0, "pose about which K_d acts", "fixed"),
+            Variable("K_d", *space.stiffness, spec.stiffness, "desired stiffness"),
+            Variable("x_ref", *space.pose, 0.0, "pose about which K_d acts", "fixed"),
         ]
     if spec.teleoperation:
         K_pc, B_pc = spec.teleoperation.stiffness, spec.teleoperation.damping
         gains += [
-            Variable("K_pc", (3,), STIFFNESS, K_pc, "stiffness of the virtual coupling"),
-            Variable("B_pc", (3,), DAMPING, B_pc, "damping of the virtual coupling"),
+            Variable("K_pc", *space.stiffness, K_pc, "stiffness of the virtual coupling"),
+            Variable("B_pc", *space.damping, B_pc, "damping of the virtual coupling"),
         ]
     if law:
         gains += [
@@ -92,19 +88,19 @@ def _gains(spec: Controller, law: Topology | None, length_scale: float) -> list[
     return gains
 
 
-def _outputs(spec: Controller, law: Topology | None) -> list[Variable]:
-    outputs = [Variable("F_motor", (3,), WRENCH, description="u, desired wrench of the motors")]
+def _outputs(spec: Controller, space: PortSpace, law: Topology | None) -> list[Variable]:
+    outputs = [Variable("F_motor", *space.wrench, description="u, desired wrench of the motors")]
     if spec.teleoperation:
         text = "virtual coupling, + on the device, - on the mechanism"
-        outputs += [Variable("F_drift", (3,), WRENCH, description=text)]
+        outputs += [Variable("F_drift", *space.wrench, description=text)]
     if law:
         text = "F_T, wrench of the topology controller"
-        outputs += [Variable("F_constraint", (3,), WRENCH, description=text)]
+        outputs += [Variable("F_constraint", *space.wrench, description=text)]
     return outputs
 
 
-def controller(spec: Controller, length_scale: float) -> Component:
-    """The controller with the parts of `spec` that are on. length_scale is L (m).
+def controller(spec: Controller, space: PortSpace, length_scale: float) -> Component:
+    """The controller of a port with the parts of `spec` that are on. length_scale is L (m).
 
     Raises ValueError for bias "full" without the impedance part, which carries it.
     """
@@ -115,14 +111,16 @@ def controller(spec: Controller, length_scale: float) -> Component:
         )
     law = Topology() if spec.topology is True else (spec.topology or None)
     guard = Passivity() if spec.passivity is True else (spec.passivity or None)
-    outputs, parameters = _outputs(spec, law), _gains(spec, law, length_scale)
+    outputs, parameters = _outputs(spec, space, law), _gains(spec, space, law, length_scale)
     states: list[Variable] = []
     if guard:
         parameters += [*passivity.parameters(guard), passivity.PERIOD]
-        states = passivity.states(guard, POSE, WRENCH)
+        states = passivity.states(guard, space)
         outputs += passivity.OUTPUTS
-    block = Block(inputs=_signals(spec, law), parameters=parameters, states=states, outputs=outputs)
-    output = _wrenches(spec, law, block)
+    block = Block(
+        inputs=_signals(spec, space, law), parameters=parameters, states=states, outputs=outputs
+    )
+    output = _wrenches(spec, space, law, block)
     initial: dict[str, ca.SX] = {}
     step: dict[str, ca.SX] = {}
     if guard:
@@ -142,20 +140,23 @@ def controller(spec: Controller, length_scale: float) -> Component:
     )
 
 
-def _wrenches(spec: Controller, law: Topology | None, block: Block) -> dict[str, ca.SX]:
+def _wrenches(
+    spec: Controller, space: PortSpace, law: Topology | None, block: Block
+) -> dict[str, ca.SX]:
     """u of the motors, before the passivity controller, with F_drift and F_T where they are."""
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
-    force = ca.SX.zeros(3)
+    force = ca.SX.zeros(space.size)
     if spec.teleoperation:
-        output["F_drift"] = p["K_pc"] * (u["x_S"] - u["x_D"]) + p["B_pc"] * (u["v_S"] - u["v_D"])
+        output["F_drift"] = p["K_pc"] * space.difference(u["x_S"], u["x_D"])
+        output["F_drift"] += p["B_pc"] * (u["v_S"] - u["v_D"])
         force += output["F_drift"]
     if spec.contact:
         force += u["F_env"]
     if spec.damping is not None:
         force -= p["B_d"] * u["v_D"]
     if spec.stiffness is not None:
-        force -= p["K_d"] * (u["x_D"] - p["x_ref"])
+        force -= p["K_d"] * space.difference(u["x_D"], p["x_ref"])
 
     motor = force
     if spec.impedance:
@@ -164,7 +165,8 @@ def _wrenches(spec: Controller, law: Topology | None, block: Block) -> dict[str,
             a += u["a_bias"]
         motor = u["M"] @ a + u["c"] - u["F_hand"]
     if law:
-        pull = p["k_j"] * (u["x_S"] - u["x_D"]) + p["b_j"] * (u["v_S"] - u["v_D"])
-        F_T = topology.constraint_wrench(pull, u["M"], u["P_c"], p["length_scale"])
+        pull = p["k_j"] * space.difference(u["x_S"], u["x_D"])
+        pull += p["b_j"] * (u["v_S"] - u["v_D"])
+        F_T = topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"])
         output["F_constraint"], motor = F_T, motor + F_T
     return output | {"F_motor": motor}

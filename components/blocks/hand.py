@@ -20,24 +20,17 @@ from typing import Any
 import casadi as ca
 
 from hapticlink.components import integrators, time_signals
-from hapticlink.components.component import (
-    DAMPING,
-    POSE,
-    STIFFNESS,
-    TWIST,
-    WRENCH,
-    Block,
-    Component,
-    Timing,
-    Variable,
-)
+from hapticlink.components.component import Block, Component, Timing, Variable
 from hapticlink.components.paths import signal
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
 from hapticlink.components.time_signals import TimeSignal
 
-_F = Variable("F", (3,), WRENCH, description="wrench of the hand on the handle")
-_X = Variable("x", (3,), POSE, description="pose of the handle")
-_V = Variable("v", (3,), TWIST, description="velocity of the handle")
+SPACE = PLANE
+"""Of the port at the handle."""
+_F = Variable("F", *SPACE.wrench, description="wrench of the hand on the handle")
+_X = Variable("x", *SPACE.pose, description="pose of the handle")
+_V = Variable("v", *SPACE.twist, description="velocity of the handle")
 
 
 def _hand(
@@ -60,10 +53,10 @@ def _wrench(spec: ConstantHand | ProfileHand) -> Component:
     """F = F(t) - B v, with a damper to ground if the spec has one."""
     parameters, inputs = [], []
     if isinstance(spec, ConstantHand):
-        parameters += [Variable("wrench", (3,), WRENCH, spec.wrench, "wrench on the handle")]
+        parameters += [Variable("wrench", *SPACE.wrench, spec.wrench, "wrench on the handle")]
     if spec.damping is not None:
         inputs += [_V]
-        parameters += [Variable("damping", (3,), DAMPING, spec.damping, "damping to ground")]
+        parameters += [Variable("damping", *SPACE.damping, spec.damping, "damping to ground")]
     block, signals = Block(inputs=inputs, parameters=parameters, outputs=[_F]), list[TimeSignal]()
     if isinstance(spec, ConstantHand):
         F, kind = block.p["wrench"], "a constant wrench"
@@ -81,24 +74,26 @@ def _arm(spec: ArmHand) -> Component:
     block = Block(
         inputs=[_X, _V],
         parameters=[
-            Variable("mass", (3,), ("kg", "kg", "kg.m2"), spec.mass, "mass of the arm"),
-            Variable("stiffness", (3,), STIFFNESS, spec.stiffness, "arm to target path"),
-            Variable("damping", (3,), DAMPING, spec.damping, "arm to target path"),
-            Variable("grip_stiffness", (3,), STIFFNESS, spec.grip_stiffness, "arm to handle"),
-            Variable("grip_damping", (3,), DAMPING, spec.grip_damping, "arm to handle"),
+            Variable("mass", *SPACE.mass, spec.mass, "mass of the arm"),
+            Variable("stiffness", *SPACE.stiffness, spec.stiffness, "arm to target path"),
+            Variable("damping", *SPACE.damping, spec.damping, "arm to target path"),
+            Variable("grip_stiffness", *SPACE.stiffness, spec.grip_stiffness, "arm to handle"),
+            Variable("grip_damping", *SPACE.damping, spec.grip_damping, "arm to handle"),
         ],
         states=[
-            Variable("x_arm", (3,), POSE, description="pose of the arm"),
-            Variable("v_arm", (3,), TWIST, description="velocity of the arm"),
+            Variable("x_arm", *SPACE.pose, description="pose of the arm"),
+            Variable("v_arm", *SPACE.twist, description="velocity of the arm"),
         ],
         outputs=[_F],
     )
     x, u, p, t = block.x, block.u, block.p, block.t
     signals = [signal(spec.target, spec.interpolation, "hand.target")]
     over = ca.SX.sym("over", time_signals.size_over(signals))
-    target, target_rate = ca.vertsplit(time_signals.within(signals, over, t), 3)
-    F = p["grip_stiffness"] * (x["x_arm"] - u["x"]) + p["grip_damping"] * (x["v_arm"] - u["v"])
-    pull = p["stiffness"] * (target - x["x_arm"]) + p["damping"] * (target_rate - x["v_arm"])
+    target, target_rate = ca.vertsplit(time_signals.within(signals, over, t), SPACE.size)
+    F = p["grip_stiffness"] * SPACE.difference(x["x_arm"], u["x"])
+    F += p["grip_damping"] * (x["v_arm"] - u["v"])
+    pull = p["stiffness"] * SPACE.difference(target, x["x_arm"])
+    pull += p["damping"] * (target_rate - x["v_arm"])
     ode = block.ode({"x_arm": x["v_arm"], "v_arm": (pull - F) / p["mass"]}, over)
     given = ca.vertcat(u.vector, time_signals.over(signals, t, block.h))
     initial = {"x_arm": u["x"], "v_arm": u["v"]}
@@ -110,19 +105,19 @@ def _arm(spec: ArmHand) -> Component:
 def _spring(spec: SpringHand) -> Component:
     """F = K (x_t - x) + B (x_t' - v)."""
     damped = spec.damping is not None
-    parameters = [Variable("stiffness", (3,), STIFFNESS, spec.stiffness, "to target path")]
+    parameters = [Variable("stiffness", *SPACE.stiffness, spec.stiffness, "to target path")]
     if spec.damping is not None:
-        parameters.append(Variable("damping", (3,), DAMPING, spec.damping, "to target path"))
+        parameters.append(Variable("damping", *SPACE.damping, spec.damping, "to target path"))
     still = spec.target[0][1:] if isinstance(spec.target, tuple) and len(spec.target) == 1 else None
     if still:
-        parameters.append(Variable("target", (3,), POSE, still, "pose that the spring pulls to"))
+        parameters.append(Variable("target", *SPACE.pose, still, "pose that the spring pulls to"))
     block = Block(inputs=[_X, _V] if damped else [_X], parameters=parameters, outputs=[_F])
     signals = [] if still else [signal(spec.target, spec.interpolation, "hand.target")]
     if still:
-        target, rate = block.p["target"], ca.SX(3, 1)
+        target, rate = block.p["target"], ca.SX(SPACE.size, 1)
     else:
-        target, rate = ca.vertsplit(signals[0].at(block.t), 3)
-    F = block.p["stiffness"] * (target - block.u["x"])
+        target, rate = ca.vertsplit(signals[0].at(block.t), SPACE.size)
+    F = block.p["stiffness"] * SPACE.difference(target, block.u["x"])
     if damped:
         F += block.p["damping"] * (rate - block.u["v"])
     return _hand(block, "a spring to a target path", spec.timing, F, signals)

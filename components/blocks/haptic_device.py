@@ -17,18 +17,10 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components import integrators
-from hapticlink.components.component import (
-    INERTIA,
-    POSE,
-    TWIST,
-    WRENCH,
-    Block,
-    Component,
-    Variability,
-    Variable,
-)
+from hapticlink.components.component import Block, Component, Variability, Variable
 from hapticlink.components.device import pantograph
 from hapticlink.components.device.observer import Observer, State
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.ports import Power
 from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.device import Device
@@ -63,17 +55,19 @@ _TUNABLE = (
 )
 
 
+SPACE = PLANE
+"""Of the port at the handle."""
 _POWER = Power("x_true")
 _INPUTS = [
-    Variable("F_motor", (3,), WRENCH, 0.0, "desired wrench of the motors", power=_POWER),
-    Variable("F_hand", (3,), WRENCH, 0.0, "wrench of the hand on the handle", power=_POWER),
+    Variable("F_motor", *SPACE.wrench, 0.0, "desired wrench of the motors", power=_POWER),
+    Variable("F_hand", *SPACE.wrench, 0.0, "wrench of the hand on the handle", power=_POWER),
 ]
 _OUTPUTS = [
-    Variable("x", (3,), POSE, description="measured pose of the handle"),
-    Variable("v", (3,), TWIST, description="measured velocity of the handle", derivative_of="x"),
-    Variable("F_hand_observed", (3,), WRENCH, description="observed wrench of the hand"),
-    Variable("M", (3, 3), INERTIA, 0.0, "inertia of the device at the handle", kind="semidefinite"),
-    Variable("c", (3,), WRENCH, description="C_d v, Coriolis and centrifugal terms at the handle"),
+    Variable("x", *SPACE.pose, description="measured pose of the handle"),
+    Variable("v", *SPACE.twist, description="measured velocity of the handle", derivative_of="x"),
+    Variable("F_hand_observed", *SPACE.wrench, description="observed wrench of the hand"),
+    Variable("M", *SPACE.inertia, 0.0, "inertia of the device at the handle", kind="semidefinite"),
+    Variable("c", *SPACE.wrench, description="C_d v, Coriolis and centrifugal terms at the handle"),
     Variable(
         "workspace_margin",
         (),
@@ -81,17 +75,17 @@ _OUTPUTS = [
         0.0,
         "smallest distance of an arm to a stop, negative beyond it",
     ),
-    Variable("x_true", (3,), POSE, description="true pose of the handle"),
-    Variable("v_true", (3,), TWIST, 0.0, "true velocity of the handle", derivative_of="x_true"),
+    Variable("x_true", *SPACE.pose, description="true pose of the handle"),
+    Variable("v_true", *SPACE.twist, 0.0, "true velocity of the handle", derivative_of="x_true"),
 ]
 _STATES = [
-    Variable("x_true", (3,), POSE, description="pose of the handle"),
-    Variable("v_true", (3,), TWIST, description="velocity of the handle"),
+    Variable("x_true", *SPACE.pose, description="pose of the handle"),
+    Variable("v_true", *SPACE.twist, description="velocity of the handle"),
 ]
 _SENSED_STATES = [
-    Variable("x_measured", (3,), POSE, description="pose from the encoders"),
-    Variable("x_observer", (3,), POSE, description="observer state x1"),
-    Variable("v_observer", (3,), TWIST, description="observer state x2"),
+    Variable("x_measured", *SPACE.pose, description="pose from the encoders"),
+    Variable("x_observer", *SPACE.pose, description="observer state x1"),
+    Variable("v_observer", *SPACE.twist, description="observer state x2"),
 ]
 
 
@@ -99,7 +93,7 @@ def _parameters(device: Device, sensed: bool) -> list[Variable]:
     def of(rows: tuple[tuple[str, str, str], ...], variability: Variability) -> list[Variable]:
         return [Variable(n, (), u, getattr(device, n), d, variability) for n, u, d in rows]
 
-    start = Variable("x_start", (3,), POSE, 0.0, "pose of the handle at the start", "fixed")
+    start = Variable("x_start", *SPACE.pose, 0.0, "pose of the handle at the start", "fixed")
     parameters = [start, *of(_FIXED, "fixed"), *of(_TUNABLE, "tunable")]
     if device.motor_damping or device.motor_friction:
         parameters += of(_FRICTION, "tunable")
@@ -157,7 +151,7 @@ class _Encoders:
 
     def initial(self) -> dict[str, ca.SX]:
         pose = self._measure(self._p["x_start"], self._p["x_start"])
-        return {"x_measured": pose, "x_observer": pose, "v_observer": ca.SX.zeros(3)}
+        return {"x_measured": pose, "x_observer": pose, "v_observer": ca.SX.zeros(SPACE.size)}
 
     def step(self, true_pose: ca.SX, tau: ca.SX) -> dict[str, ca.SX]:
         """The states after h, at the end of which the handle is at true_pose."""
@@ -185,7 +179,7 @@ def haptic_device(device: Device, encoders: bool = False) -> Component:
     )
     tau = pantograph.motor_torques(u["F_motor"], pose, p)
     motion = _moved(block, tau, device.substeps)
-    initial = {"x_true": p["x_start"], "v_true": ca.SX.zeros(3)}
+    initial = {"x_true": p["x_start"], "v_true": ca.SX.zeros(SPACE.size)}
     step = {"x_true": motion[:3], "v_true": motion[3:]}
     if measured:
         initial |= measured.initial()

@@ -13,7 +13,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from hapticlink.components.component import POSE, TWIST, Block, Component, Variable
+from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.contact import contact_forces
 from hapticlink.components.dynamics import follow_mechanism, further_points
 from hapticlink.components.dynamics import local_model as held_matrices
@@ -105,7 +105,8 @@ def virtual_environment(
 def _parameters(
     linkage: Linkage, copy: GraphicsCopy, directions: Directions | None, contacts: Contacts | None
 ) -> list[Variable]:
-    variables = [*parameters(linkage), *start_parameters(linkage), *follow_mechanism.gains(copy)]
+    variables = [*parameters(linkage), *start_parameters(linkage)]
+    variables += follow_mechanism.gains(linkage, copy)
     if directions:
         variables.append(length_parameter(linkage, directions.length_scale))
         variables += direction_parameters(directions)
@@ -120,15 +121,15 @@ def _outputs(
     mobility: bool,
     local_model: bool,
 ) -> list[Variable]:
-    units = linkage.coordinate_units
+    units, space = linkage.coordinate_units, linkage.space
     return [
-        Variable("x", (3,), POSE, description="pose of the copy's operational point"),
-        Variable("v", (3,), TWIST, description="its velocity", derivative_of="x"),
+        Variable("x", *space.pose, description="pose of the copy's operational point"),
+        Variable("v", *space.twist, description="its velocity", derivative_of="x"),
         Variable("q", (len(units),), units, description="the copy's coordinates"),
-        *([mobility_output()] if mobility else []),
-        *(direction_outputs() if directions else []),
-        *(further_points.mobility_output(name) for name in users if mobility),
-        *(further_points.direction_outputs(users) if directions else []),
+        *([mobility_output(space)] if mobility else []),
+        *(direction_outputs(space) if directions else []),
+        *(mobility_output(space, f"{name}.", name) for name in users if mobility),
+        *(output for name in users if directions for output in direction_outputs(space, name)),
         *(_BRANCH if linkage.closed else []),
         *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
         *(held_matrices.ports(linkage) if local_model else []),

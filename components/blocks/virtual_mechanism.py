@@ -18,7 +18,7 @@ import casadi as ca
 from hapticlink.components import forces, integrators, time_signals
 from hapticlink.components.blocks.mechanism_steps import DEFLECTIONS, MechanismSteps
 from hapticlink.components.blocks.step_defaults import StepDefaults
-from hapticlink.components.component import WRENCH, Block, Component, Variable
+from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.contact import contact_forces, joint_limits
 from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
@@ -129,10 +129,11 @@ class _Parts:
 def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) -> Block:
     """The variables of the parts."""
     linkage, directions, contacts = parts.linkage, parts.directions, parts.contacts
+    space = linkage.space
     drift = "virtual coupling, acts with - on the mechanism"
     inputs = [
-        Variable("F_hand", (3,), WRENCH, description="wrench of the hand", power=Power("x")),
-        Variable("F_drift", (3,), WRENCH, description=drift, power=Power("x", sign=-1.0)),
+        Variable("F_hand", *space.wrench, description="wrench of the hand", power=Power("x")),
+        Variable("F_drift", *space.wrench, description=drift, power=Power("x", sign=-1.0)),
     ]
     parameters = mechanism_parameters(linkage, parts.mechanism, defaults.baumgarte.beta)
     parameters += defaults.parameters
@@ -149,7 +150,7 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
         length = directions.length_scale if directions else length_scale
         parameters.append(length_parameter(linkage, length))
     if parts.touches or parts.felt:
-        outputs.append(wrench_output())
+        outputs.append(wrench_output(space))
     if parts.touches:
         parameters += joint_limits.parameters(linkage)
     if contacts:
@@ -164,8 +165,9 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
     if directions:
         memory += [Variable(name) for name in further_points.counts(parts.users)]
         parameters += direction_parameters(directions)
-        outputs += [mobility_output(), *direction_outputs()]
-        outputs += further_points.direction_outputs(parts.users)
+        outputs.append(mobility_output(space))
+        for user in ("", *parts.users):
+            outputs += direction_outputs(space, user)
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
 
 
@@ -301,4 +303,6 @@ class _Equations:
         efforts = self._pushed + (self._others if self._parts.felt else 0)
         acceleration = J_h @ space.response(efforts)[0]
         L = self._block.p["length_scale"]
-        return equivalent_wrench(space.Lambda_inv, space.open_mobility(J_h), acceleration, L)
+        return equivalent_wrench(
+            self.model.linkage.space, space.Lambda_inv, space.open_mobility(J_h), acceleration, L
+        )

@@ -20,6 +20,7 @@ import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Block, Component, Variable
 from hapticlink.components.control import passivity as observer
+from hapticlink.components.port_space import LINE
 from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.control import Passivity
 
@@ -72,7 +73,7 @@ def virtual_wall(
         text = "m of the device, for its passivity controller"
         parameters += [Variable("mass", (), "kg", passivity, text)]
         parameters += observer.parameters(Passivity())
-        states += observer.states(Passivity(), ("m",), ("N",))
+        states += observer.states(Passivity(), LINE)
         outputs += observer.OUTPUTS
     block = Block(inputs=inputs, parameters=parameters, states=states, outputs=outputs)
     return _component(block, unilateral)

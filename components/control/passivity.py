@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Signals, Variable
+from hapticlink.components.port_space import PortSpace
 from hapticlink.components.specs.control import Passivity
 
 PERIOD = Variable(STEP_SIZE, (), "s", 1e-3, "period T", "fixed")
@@ -43,13 +44,12 @@ def parameters(spec: Passivity) -> list[Variable]:
     return variables
 
 
-def states(spec: Passivity, x: tuple[str, ...], F: tuple[str, ...]) -> list[Variable]:
-    """The observer's memory; x and F: units of the entries of the pose and of the wrench."""
-    shape = (len(x),)
+def states(spec: Passivity, space: PortSpace) -> list[Variable]:
+    """The observer's memory, of a port."""
     variables = [
         Variable("E_before", (), "J", description="energy left at the last sample"),
-        Variable("x_before", shape, x, description="pose at the last sample"),
-        Variable("F_before", shape, F, description="wrench of the last sample"),
+        Variable("x_before", *space.pose, description="pose at the last sample"),
+        Variable("F_before", *space.wrench, description="wrench of the last sample"),
     ]
     if spec.reset_after is not None:
         variables.append(Variable("free_time", (), "s", description="time without a wrench"))

@@ -9,9 +9,12 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components.dynamics.constrained_directions import scaling
+from hapticlink.components.port_space import PortSpace
 
 
-def constraint_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) -> ca.SX:
+def constraint_wrench(
+    space: PortSpace, pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX
+) -> ca.SX:
     """F_T = S (P_c M_s^-1 P_c)^+ S pull, with M_s = S^-1 M_d S^-1 (N, N, N.m).
 
     pull = k_j e + b_j edot (m/s2, m/s2, rad/s2) is the acceleration of the device along the
@@ -23,7 +26,7 @@ def constraint_wrench(pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX) ->
 
         (P A P)^+ = (P A P + I - P)^-1 P.
     """
-    S = scaling(length_scale)
+    S = scaling(space, length_scale)
     mobility = S @ ca.inv(M) @ S
-    regular = P_c @ mobility @ P_c + ca.SX.eye(3) - P_c
+    regular = P_c @ mobility @ P_c + ca.SX.eye(space.size) - P_c
     return S @ ca.solve(regular, P_c @ S @ pull)

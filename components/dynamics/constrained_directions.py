@@ -5,7 +5,7 @@ S = diag(1, 1, L) all entries of the scaled mobility S Lambda^-1 S are in 1/kg; 
 its small eigenvalues are the constrained directions.
 The report takes an SVD (B.14) at the graphics rate since SVDs have no guaranteed run time; a
 fixed number of cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, section 8.5)
-has one, and a 3 x 3 matrix is diagonal to rounding after five sweeps.
+has one, and a 3 x 3 matrix (the plane's) is diagonal to rounding after five sweeps.
 
 Small is relative to the largest eigenvalue, and to those of the same linkage with open loops: where
 the loops lock the operational point in all directions, Lambda^-1 consists of rounding errors.
@@ -13,61 +13,65 @@ the loops lock the operational point in all directions, Lambda^-1 consists of ro
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
+from functools import reduce
+from itertools import combinations
 
 import casadi as ca
 
 from hapticlink.components.component import Block
 from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.port_space import PortSpace
 
 SWEEPS = 5
 TINY = 1e-300
 LOCKED = 1e-10  # relative to the open linkage's mobility, below which Lambda^-1 is rounding
 
 
-def scaling(length_scale: ca.SX) -> ca.SX:
-    """S = diag(1, 1, L)."""
-    return ca.diag(ca.vertcat(1, 1, length_scale))
+def scaling(space: PortSpace, length_scale: ca.SX) -> ca.SX:
+    """S, diag(1, 1, L) in the plane."""
+    return ca.diag(ca.vertcat(*space.scaling(length_scale)))
 
 
 def eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Eigenvalues (3 x 1) and eigenvectors (columns, 3 x 3) of a symmetric 3 x 3 matrix."""
-    A, V = ca.SX(A), ca.SX.eye(3)
-    V = ca.densify(V)
+    """Eigenvalues (n x 1) and eigenvectors (columns, n x n) of a symmetric n x n matrix."""
+    A, n = ca.SX(A), A.shape[0]
+    V = ca.densify(ca.SX.eye(n))
     for _ in range(SWEEPS):
-        for i, j in ((0, 1), (0, 2), (1, 2)):
+        for i, j in combinations(range(n), 2):
             gap, twice = A[j, j] - A[i, i], 2 * A[i, j]
             sign = ca.if_else(gap < 0, -1, 1)
             tangent = sign * twice / (ca.fabs(gap) + ca.sqrt(gap**2 + twice**2) + TINY)
             c = 1 / ca.sqrt(1 + tangent**2)
             s = c * tangent
-            G = ca.SX.eye(3)
+            G = ca.SX.eye(n)
             G[i, i], G[j, j], G[i, j], G[j, i] = c, c, s, -s
             A = G.T @ A @ G
             V = V @ G
     return ca.diag(A), V
 
 
-def locked(open_mobility: ca.SX, length_scale: ca.SX) -> ca.SX:
-    """The eigenvalue (1/kg) below which a direction is locked; open_mobility is J D^-1 J'."""
-    S = scaling(length_scale)
-    return LOCKED * ca.trace(S @ open_mobility @ S)
+def locked(open_mobility: ca.SX) -> ca.SX:
+    """The eigenvalue (1/kg) below which a direction is locked, from S J D^-1 J' S of the linkage
+    with open loops."""
+    return LOCKED * ca.trace(open_mobility)
 
 
 def largest(eigenvalues: ca.SX) -> ca.SX:
-    return ca.fmax(ca.fmax(eigenvalues[0], eigenvalues[1]), eigenvalues[2])
+    return reduce(ca.fmax, ca.vertsplit(eigenvalues))
 
 
 def _ranks(eigenvalues: ca.SX) -> list[ca.SX]:
     """The rank of each eigenvalue in ascending order (0 is the smallest, ties by index)."""
-    ranks = []
-    for i in range(3):
+    ranks, n = [], eigenvalues.numel()
+    for i in range(n):
         below = [
             eigenvalues[j] < eigenvalues[i] if j > i else eigenvalues[j] <= eigenvalues[i]
-            for j in range(3)
+            for j in range(n)
             if j != i
         ]
-        ranks.append(below[0] + below[1])
+        ranks.append(reduce(operator.add, below))
     return ranks
 
 
@@ -89,7 +93,7 @@ def count(
 
 
 def projector(eigenvalues: ca.SX, vectors: ca.SX, number: ca.SX) -> ca.SX:
-    """P_c, the orthogonal projector (3 x 3, dimensionless) on the eigenvectors of the `number`
+    """P_c, the orthogonal projector (n x n, dimensionless) on the eigenvectors of the `number`
     smallest eigenvalues."""
     chosen = ca.vertcat(*(ca.if_else(r < number, 1, 0) for r in _ranks(eigenvalues)))
     return vectors @ ca.diag(chosen) @ vectors.T
@@ -116,11 +120,11 @@ def constrained_directions(
     steps from q to q1: at the operational point, or at a point with Jacobian J, whose names have
     the prefix."""
     p, before, q = block.p, block.x[f"{prefix}n_constrained"], space.model.q
-    S = scaling(p["length_scale"])
+    S = scaling(space.model.linkage.space, p["length_scale"])
     mobility = space.Lambda_inv if J is None else space.mobility(J)
-    least = locked(space.open_mobility(space.terms.J_h if J is None else J), p["length_scale"])
-    given = block.u.vector, p.vector
-    scaled = ca.Function("scaled", [q, *given], [S @ mobility @ S, least], {"cse": True})
+    opened = space.open_mobility(space.terms.J_h if J is None else J)
+    given, both = (block.u.vector, p.vector), [S @ mobility @ S, locked(S @ opened @ S)]
+    scaled = ca.Function("scaled", [q, *given], both, {"cse": True})
     tolerance, hysteresis = p["rank_tolerance"], p["hysteresis"]
 
     def number(q: ca.SX, before: ca.SX) -> ca.SX:

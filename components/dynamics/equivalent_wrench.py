@@ -9,27 +9,34 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.component import WRENCH, Variable
+from hapticlink.components.component import Variable
 from hapticlink.components.dynamics.constrained_directions import eigen, largest, locked, scaling
+from hapticlink.components.port_space import PortSpace
 
 # Directions with an eigenvalue below this share of the largest one are left out of F_env, and so
 # are those that the loops lock.
 RANK = 1e-6
 
 
-def wrench_output(prefix: str = "", place: str = "the operational point") -> Variable:
+def wrench_output(
+    space: PortSpace, prefix: str = "", place: str = "the operational point"
+) -> Variable:
     text = f"wrench of contacts, joint limits and others at {place}"
-    return Variable(f"{prefix}F_env", (3,), WRENCH, description=text)
+    return Variable(f"{prefix}F_env", *space.wrench, description=text)
 
 
 def equivalent_wrench(
-    Lambda_inv: ca.SX, open_mobility: ca.SX, acceleration: ca.SX, length_scale: ca.SX
+    space: PortSpace,
+    Lambda_inv: ca.SX,
+    open_mobility: ca.SX,
+    acceleration: ca.SX,
+    length_scale: ca.SX,
 ) -> ca.SX:
-    """The wrench F of least scaled norm with Lambda^-1 F = a, F = S (S Lambda^-1 S)^+ S a (3 x 1).
+    """The wrench F of least scaled norm with Lambda^-1 F = a, F = S (S Lambda^-1 S)^+ S a.
     open_mobility is J D^-1 J' of the linkage with open loops."""
-    S = scaling(length_scale)
+    S = scaling(space, length_scale)
     values, vectors = eigen(S @ Lambda_inv @ S)
-    least = locked(open_mobility, length_scale)
+    least = locked(S @ open_mobility @ S)
     mobile = values > ca.fmax(RANK * largest(values), least)
     inverse = ca.if_else(mobile, 1 / ca.if_else(mobile, values, 1), 0)
     return S @ (vectors @ (inverse * (vectors.T @ (S @ acceleration))))

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.component import DAMPING, POSE, STIFFNESS, TWIST, Block, Variable
+from hapticlink.components.component import Block, Variable
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.projection import MU, projection
@@ -33,8 +33,9 @@ def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     """The copy's inputs from the mechanism; q_ref also where it only serves to compare branches."""
     units = linkage.coordinate_units
     n, rates = len(units), tuple(f"{u}/s" for u in units)
-    x_ref = Variable("x_ref", (3,), POSE, description="pose of the mechanism's operational point")
-    v_ref = Variable("v_ref", (3,), TWIST, description="its velocity")
+    space, pose = linkage.space, "pose of the mechanism's operational point"
+    x_ref = Variable("x_ref", *space.pose, description=pose)
+    v_ref = Variable("v_ref", *space.twist, description="its velocity")
     start = tuple(coordinates(linkage, linkage.start))
     q_ref = Variable("q_ref", (n,), units, start, "the mechanism's coordinates")
     qd_ref = Variable("qd_ref", (n,), rates, description="the mechanism's joint rates")
@@ -43,7 +44,7 @@ def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     return [q_ref, qd_ref]
 
 
-def gains(copy: GraphicsCopy) -> list[Variable]:
+def gains(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     if copy.sync == "exact":
         return []
     if copy.sync == "joint":
@@ -51,9 +52,10 @@ def gains(copy: GraphicsCopy) -> list[Variable]:
             Variable("K_g", (), "1/s2", copy.joint_stiffness, "pull on a coordinate's error"),
             Variable("B_g", (), "1/s", copy.joint_damping, "pull on its rate"),
         ]
+    space = linkage.space
     return [
-        Variable("K_g", (3,), STIFFNESS, copy.stiffness, "stiffness of the graphics controller"),
-        Variable("B_g", (3,), DAMPING, copy.damping, "damping of the graphics controller"),
+        Variable("K_g", *space.stiffness, copy.stiffness, "stiffness of the graphics controller"),
+        Variable("B_g", *space.damping, copy.damping, "damping of the graphics controller"),
     ]
 
 
@@ -79,10 +81,10 @@ def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX,
         pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
-        K_g, B_g = ca.diag(p["K_g"]), ca.diag(p["B_g"])
+        space, K_g, B_g = model.linkage.space, ca.diag(p["K_g"]), ca.diag(p["B_g"])
         added = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
         solver = ClosedLoopSolver(TreeInertia(model, added), model.W, rows(model.linkage), MU)
-        pull = model.J_h.T @ (K_g @ (u["x_ref"] - model.x_h) + B_g @ u["v_ref"])
+        pull = model.J_h.T @ (K_g @ space.difference(u["x_ref"], model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)
     momentum = D.apply(qd) + h * (pull - model.C_qd)
     qd1, _ = solver.solve(momentum / weight, ca.SX(solver.m, 1))

@@ -20,22 +20,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from hapticlink.components.component import (
-    ACCELERATION,
-    MOBILITY,
-    POSE,
-    TWIST,
-    WRENCH,
-    Block,
-    Signals,
-    Variable,
-)
+from hapticlink.components.component import Block, Signals, Variable
 from hapticlink.components.dynamics.constrained_directions import (
     ConstrainedDirections,
     constrained_directions,
 )
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
 from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.variables import mobility_output
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.linkage import Linkage
@@ -48,39 +40,25 @@ def inputs(linkage: Linkage, users: Users) -> Iterator[Variable]:
     for name in (point.name for point in linkage.point):
         pose = f"{name}.x"
         text = f"wrench at {name}"
-        yield Variable(f"{name}.F_hand", (3,), WRENCH, description=text, power=Power(pose))
+        yield Variable(f"{name}.F_hand", *linkage.space.wrench, description=text, power=Power(pose))
         if name in users:
             text = f"virtual coupling at {name}, acts with - on the mechanism"
             drift = Power(pose, sign=-1.0)
-            yield Variable(f"{name}.F_drift", (3,), WRENCH, description=text, power=drift)
+            yield Variable(f"{name}.F_drift", *linkage.space.wrench, description=text, power=drift)
 
 
 def outputs(linkage: Linkage, users: Users, *, mobility: bool) -> Iterator[Variable]:
     for name in (point.name for point in linkage.point):
         x = f"{name}.x"
-        yield Variable(x, (3,), POSE, description=f"pose of {name}")
+        yield Variable(x, *linkage.space.pose, description=f"pose of {name}")
         text = f"velocity of {name}"
-        yield Variable(f"{name}.v", (3,), TWIST, description=text, derivative_of=x)
+        yield Variable(f"{name}.v", *linkage.space.twist, description=text, derivative_of=x)
         if mobility:
-            yield mobility_output(name)
+            yield mobility_output(linkage.space, f"{name}.", name)
         if name in users:
             text = f"acceleration of {name} at zero wrench"
-            yield Variable(f"{name}.a_bias", (3,), ACCELERATION, description=text)
-            yield wrench_output(f"{name}.", name)
-
-
-def mobility_output(name: str) -> Variable:
-    text = f"mobility at {name}"
-    return Variable(f"{name}.Lambda_inv", (3, 3), MOBILITY, description=text, kind="semidefinite")
-
-
-def direction_outputs(users: Users) -> Iterator[Variable]:
-    """P_c and the number of constrained directions at the points of users."""
-    for name in users:
-        text = f"projector on the constrained directions at {name}, scaled by L"
-        yield Variable(f"{name}.P_c", (3, 3), "1", description=text, kind="projector")
-        text = f"number of constrained directions at {name}"
-        yield Variable(f"{name}.n_constraints", (), "1", description=text)
+            yield Variable(f"{name}.a_bias", *linkage.space.acceleration, description=text)
+            yield wrench_output(linkage.space, f"{name}.", name)
 
 
 def counts(users: Users) -> list[str]:
@@ -141,7 +119,11 @@ def values(
             acceleration = J @ space.response(applied - J.T @ point.wrench)[0]
             outputs[f"{point.name}.a_bias"] = space.bias(point.x)
             outputs[f"{point.name}.F_env"] = equivalent_wrench(
-                space.mobility(J), space.open_mobility(J), acceleration, block.p["length_scale"]
+                model.linkage.space,
+                space.mobility(J),
+                space.open_mobility(J),
+                acceleration,
+                block.p["length_scale"],
             )
     return outputs
 

@@ -28,12 +28,12 @@ from hapticlink.components.specs.linkage import Linkage
 
 
 def ports(linkage: Linkage) -> list[Variable]:
-    """The inputs D (n x n), W (m x n), w (m) and J_h (3 x n); their start values are those of the
+    """The inputs D (n x n), W (m x n), w (m) and J_h (k x n); their start values are those of the
     assembled start pose."""
     units, m = linkage.coordinate_units, sum(rows(linkage))
     n = len(units)
     lengths = tuple("m" if unit == "rad" else "1" for unit in units)
-    turns = tuple("1" if unit == "rad" else "1/m" for unit in units)
+    turning = tuple("1" if unit == "rad" else "1/m" for unit in units)
     inertias = {("m", "m"): "kg.m2", ("m", "1"): "kg.m", ("1", "m"): "kg.m", ("1", "1"): "kg"}
     D_units = tuple(inertias[a, b] for a in lengths for b in lengths)
     starts = _at_start(linkage)
@@ -43,8 +43,9 @@ def ports(linkage: Linkage) -> list[Variable]:
         text = "Jacobian of the loop closures"
         variables.append(Variable("W", (m, n), lengths, starts["W"], text))
         variables.append(Variable("w", (m,), "m/s2", starts["w"], "Wdot qd"))
-    J_units, text = (*lengths, *lengths, *turns), "Jacobian of the operational point"
-    return [*variables, Variable("J_h", (3, n), J_units, starts["J_h"], text)]
+    space, text = linkage.space, "Jacobian of the operational point"
+    J_units = tuple(u for turns in space.turns for u in (turning if turns else lengths))
+    return [*variables, Variable("J_h", (space.size, n), J_units, starts["J_h"], text)]
 
 
 def values(model: LinkageModel) -> dict[str, ca.SX]:
@@ -78,6 +79,6 @@ def held(model: LinkageModel, u: Mapping[str, ca.SX]) -> Terms:
         W=W,
         w=u["w"] if loop else ca.SX(0, 1),
         J_h=u["J_h"],
-        Jdot_qd=ca.SX(3, 1),
+        Jdot_qd=ca.SX(model.linkage.space.size, 1),
         efforts=forces.efforts(model),
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from hapticlink.components import forces
-from hapticlink.components.component import ACCELERATION, MOBILITY, POSE, TWIST, Variable
+from hapticlink.components.component import Variable
 from hapticlink.components.linkage.closures import gear_parameters, rows
 from hapticlink.components.linkage.parameters import (
     body_parameters,
     coordinates,
     mean_link_length,
 )
+from hapticlink.components.port_space import PortSpace
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
 
@@ -70,17 +71,17 @@ def states(linkage: Linkage) -> list[Variable]:
 
 
 def motion_outputs(linkage: Linkage) -> list[Variable]:
-    units, m = linkage.coordinate_units, sum(rows(linkage))
+    units, m, space = linkage.coordinate_units, sum(rows(linkage)), linkage.space
     rates, changes = (tuple(f"{u}/{per}" for u in units) for per in ("s", "s2"))
     n, velocity = (len(units),), "velocity of the operational point"
     bias = "operational acceleration at zero wrench"
     variables = [
-        Variable("x", (3,), POSE, description="pose of the operational point"),
-        Variable("v", (3,), TWIST, description=velocity, derivative_of="x"),
+        Variable("x", *space.pose, description="pose of the operational point"),
+        Variable("v", *space.twist, description=velocity, derivative_of="x"),
         Variable("q", n, units, description="joint coordinates"),
         Variable("qd", n, rates, description="joint rates", derivative_of="q"),
         Variable("qdd", n, changes, description="joint accelerations", derivative_of="qd"),
-        Variable("a_bias", (3,), ACCELERATION, description=bias),
+        Variable("a_bias", *space.acceleration, description=bias),
         Variable("energy", (), "J", description="kinetic and potential energy"),
     ]
     if m:
@@ -91,14 +92,18 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
     return variables
 
 
-def mobility_output() -> Variable:
-    text = "mobility at the operational point"
-    return Variable("Lambda_inv", (3, 3), MOBILITY, description=text, kind="semidefinite")
+def mobility_output(
+    space: PortSpace, prefix: str = "", place: str = "the operational point"
+) -> Variable:
+    text = f"mobility at {place}"
+    return Variable(f"{prefix}Lambda_inv", *space.mobility, description=text, kind="semidefinite")
 
 
-def direction_outputs() -> list[Variable]:
-    text = "projector on the constrained directions, scaled by L"
+def direction_outputs(space: PortSpace, user: str = "") -> list[Variable]:
+    """P_c and the number of constrained directions at the operational point, or at a user's."""
+    prefix, at = (f"{user}.", f" at {user}") if user else ("", "")
+    text = f"projector on the constrained directions{at}, scaled by L"
     return [
-        Variable("P_c", (3, 3), "1", description=text, kind="projector"),
-        Variable("n_constraints", (), "1", description="number of constrained directions"),
+        Variable(f"{prefix}P_c", *space.projector, description=text, kind="projector"),
+        Variable(f"{prefix}n_constraints", description=f"number of constrained directions{at}"),
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.quantities import (
     Length,
     LinearDamping,
@@ -88,3 +89,8 @@ class Device:
     """Integration steps per communication step; the size of the FMU's equations grows with them."""
     observer: Observer = field(default_factory=Observer)
     """The observer, used with sensing = "encoders"."""
+
+    @property
+    def space(self) -> PortSpace:
+        """That of the port at the handle."""
+        return PLANE

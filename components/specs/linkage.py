@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from hapticlink.components.integrators import METHODS
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.bodies import Body
 from hapticlink.components.specs.drives import Drive
 from hapticlink.components.specs.joint_types import (
@@ -244,6 +245,11 @@ class Linkage:
     start_velocity: Mapping[str, Velocity | Twist] = field(default_factory=dict)
     """Joint velocities at t = 0 by the joint's name; three for a free joint. Given ones are kept;
     the others are the smallest that are consistent with the loops."""
+
+    @property
+    def space(self) -> PortSpace:
+        """That of the ports at its operational points."""
+        return PLANE
 
     @property
     def coordinate_units(self) -> tuple[str, ...]:

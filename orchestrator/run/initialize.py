@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.base.signal_names import DEVICE
@@ -143,7 +144,7 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
             names = (s.name for s in instance.description.outputs)
             start = dict(zip(names, instance.outputs.tolist(), strict=True))
             if (margin := start["workspace_margin"]) < 0:
-                pose = [start[f"x_true[{i}]"] for i in (1, 2, 3)]
+                pose = [start[f"x_true[{i}]"] for i in range(1, 1 + PLANE.size)]
                 raise FmuFault(fmu, outside(pose, margin), 0.0, repeatable=True)
     for instance in instances.values():
         instance.require_finite()

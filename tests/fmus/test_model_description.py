@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.components.component import INERTIA, MOBILITY, WRENCH
+from hapticlink.components.port_space import PLANE
 from hapticlink.fmus.description_common import described as of_component
 from hapticlink.fmus.errors import InvalidUnit
 from hapticlink.fmus.model_description import files
@@ -46,9 +46,9 @@ def test_units(unit, exponents):
 
 def test_units_of_the_contract_are_known():
     force_over_acceleration = {"kg": 1}
-    assert [base_unit(u) for u in WRENCH] == [N, N, {**N, "m": 2}]
-    assert base_unit(INERTIA[0]) == force_over_acceleration
-    for heavy, light in zip(INERTIA, MOBILITY, strict=True):
+    assert [base_unit(u) for u in PLANE.wrench.units] == [N, N, {**N, "m": 2}]
+    assert base_unit(PLANE.inertia.units[0]) == force_over_acceleration
+    for heavy, light in zip(PLANE.inertia.units, PLANE.mobility.units, strict=True):
         assert base_unit(light) == {base: -power for base, power in base_unit(heavy).items()}
 
 

@@ -30,6 +30,7 @@ from hapticlink.components.blocks.controller import controller
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.component import Component
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.drives import PDDrive
@@ -76,7 +77,7 @@ def both(tmp_path_factory) -> dict[str, tuple[Path, ...]]:
     }
     made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
     made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
-    made["passive"] = controller(Controller(passivity=True), 0.04)
+    made["passive"] = controller(Controller(passivity=True), PLANE, 0.04)
     made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
     # Several are named virtual_mechanism.
     return {

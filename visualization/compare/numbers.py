@@ -11,6 +11,7 @@ import numpy as np
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
+from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.base.terminal_output import aligned
 from hapticlink.orchestrator.results.numbers import short
@@ -159,9 +160,9 @@ def _point_distances(runs: Sequence[Results]) -> list[Row]:
     time = time[time <= min(table["time"][-1] for table in tables)]
     distances = [NONE]
     for table in others:
-        point = [np.interp(time, table["time"], table[POINT_POSE][:, i]) for i in (0, 1)]
-        offset = np.array(point) - first[POINT_POSE][: len(time), :2].T
-        distances.append(short(1e3 * float(np.hypot(*offset).max())))
+        point = [np.interp(time, table["time"], entry) for entry in table[POINT_POSE].T]
+        offset = PLANE.difference(np.column_stack(point), first[POINT_POSE][: len(time)])
+        distances.append(short(1e3 * float(PLANE.distance(offset).max())))
     if not any(map(float, distances[1:])):
         return []
     label = "operational point from that of the first run, largest (mm)"

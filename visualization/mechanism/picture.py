@@ -72,15 +72,19 @@ class Picture:
         if linkage.loop:
             self.parts.append(_cut(linkage, names, poses))
         ok, margin, gap = (ca.SX.sym(name) for name in ("branch_ok", "margin", "gap"))
-        force = ca.SX.sym("F_env", 3)
+        space, force = linkage.space, ca.SX.sym("F_env", linkage.space.size)
         touching = ca.logic_and(gap < 0, ca.norm_1(force) > 0)
         self.parts.append(_state("", "folded", {"branch_ok": ok}, ok == 0))
         for user in dict.fromkeys(("", *(point.name for point in linkage.point))):
-            self.parts.append(Part(user, "directions", ("P_c",), (9,), directions(), sparse=True))
+            self.parts.append(
+                Part(user, "directions", ("P_c",), (space.size**2,), directions(), sparse=True)
+            )
             self.parts.append(_state(user, "outside", {"margin": margin}, margin < 0))
             self.parts.append(_state(user, "contacts", {"gap": gap, "F_env": force}, touching))
         for user, device in devices.items():
-            self.parts.append(Part(user, "arms", ("handle",), (3,), link_function(device)))
+            self.parts.append(
+                Part(user, "arms", ("handle",), device.space.pose.shape, link_function(device))
+            )
             self.parts.append(_saturated(user, device))
 
     def drawn(self, frame: dict[str, Any]) -> dict[str, Any]:
@@ -166,7 +170,7 @@ def _state(user: str, kind: str, needs: Mapping[str, ca.SX], holds: ca.SX) -> Pa
 
 def _saturated(user: str, device: Device) -> Part:
     """Whether a motor gives its largest torque."""
-    force, pose = ca.SX.sym("F_motor", 3), ca.SX.sym("measured", 3)
+    force, pose = (ca.SX.sym(name, device.space.size) for name in ("F_motor", "measured"))
     torques = torque_function(device)(force, pose)
     most = FULL_TORQUE * device.torque_limit
     return _state(

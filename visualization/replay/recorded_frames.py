@@ -53,7 +53,9 @@ class Recorded:
         self.linkage = linkage
         device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
-        for signal, size in zip(NEEDED, (len(linkage.coordinate_units), 3), strict=True):
+        for signal, size in zip(
+            NEEDED, (len(linkage.coordinate_units), linkage.space.size), strict=True
+        ):
             table = of_block(results, signal, size)
             if table is None:
                 message = "is not recorded: run the scene with record.signals = 'all'"

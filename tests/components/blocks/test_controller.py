@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hapticlink.components.blocks.controller import controller
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.control import topology
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
 from tests.blocks import Running
@@ -26,7 +27,7 @@ pulls = st.tuples(*[moderate] * 3)
 
 
 def block(inputs, parameters=None, **spec):
-    return Running(controller(Controller(**spec), L), inputs, parameters)
+    return Running(controller(Controller(**spec), PLANE, L), inputs, parameters)
 
 
 def names(variables):
@@ -52,7 +53,7 @@ def constrained(length_scale):
 
 
 _symbols = [ca.SX.sym("pull", 3), ca.SX.sym("M", 3, 3), ca.SX.sym("P", 3, 3), ca.SX.sym("L")]
-_wrench = ca.Function("F_T", _symbols, [topology.constraint_wrench(*_symbols)])
+_wrench = ca.Function("F_T", _symbols, [topology.constraint_wrench(PLANE, *_symbols)])
 
 
 def constraint_map(P, length_scale=L):
@@ -156,7 +157,7 @@ def test_without_impedance_the_wrenches_act_as_they_are():
     ],
 )
 def test_a_part_left_out_leaves_nothing(spec, inputs, parameters, outputs):
-    component = controller(Controller(**spec), L)
+    component = controller(Controller(**spec), PLANE, L)
     assert names(component.inputs) == inputs
     assert names(component.parameters) == parameters
     assert names(component.outputs) == outputs
@@ -165,7 +166,7 @@ def test_a_part_left_out_leaves_nothing(spec, inputs, parameters, outputs):
 
 def test_bias_needs_the_impedance_law():
     with pytest.raises(ValueError, match=r"controller\.bias.*controller\.impedance"):
-        controller(Controller(impedance=False, bias="full"), L)
+        controller(Controller(impedance=False, bias="full"), PLANE, L)
 
 
 @settings(max_examples=60)
