@@ -18,7 +18,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import ForeignFmu
 from hapticlink.orchestrator.scene.toml_keys import NAMED
 
-DRAFT = "https://json-types_of_keys.org/draft/2020-12/schema"
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}
 _KEYWORDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 _FRACTION = r"^[0-9]+/[0-9]+$|^[0-9]*\.?[0-9]+([eE][+-]?[0-9]{1,3})?$"

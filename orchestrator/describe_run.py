@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from hapticlink.fmus.versions import installed
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.signal_names import MECHANISM
-from hapticlink.orchestrator.fmi.kind_check import MATRICES
+from hapticlink.orchestrator.fmi.units import MATRICES
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_record import (

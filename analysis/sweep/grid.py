@@ -19,8 +19,7 @@ from typing import Any
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault, shortened
 from hapticlink.orchestrator.scene.overrides import text
-from hapticlink.orchestrator.scene.toml import loads
-from hapticlink.orchestrator.scene.toml_keys import flat
+from hapticlink.orchestrator.scene.toml_keys import flat, loads
 
 Point = dict[str, str]
 Vary = Mapping[str, Iterable[Any]] | Sequence[str]

@@ -27,8 +27,7 @@ from xml.etree.ElementTree import Element
 
 from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.orchestrator.base.errors import unknown
-from hapticlink.orchestrator.fmi.kind_check import misfit
-from hapticlink.orchestrator.fmi.units import Unit
+from hapticlink.orchestrator.fmi.units import Unit, misfit
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 TIMINGS = ("continuous", "sampled")

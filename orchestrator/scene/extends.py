@@ -12,12 +12,12 @@ from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find_scene import find
 from hapticlink.orchestrator.scene.rates import traced
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml import loads
 from hapticlink.orchestrator.scene.toml_keys import (
     Path,
     Place,
     flatten,
     key_lines,
+    loads,
     parts,
     place_of,
     whole,

@@ -8,7 +8,7 @@ from typing import Any
 
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault, near, shortened
-from hapticlink.orchestrator.scene.toml import LARGEST
+from hapticlink.orchestrator.scene.toml_keys import LARGEST
 
 
 def shipped() -> dict[str, Any]:

@@ -10,8 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
-from hapticlink.orchestrator.scene.toml import DEEPEST, loads
-from hapticlink.orchestrator.scene.toml_keys import ASSIGNMENT, Path, parts, whole
+from hapticlink.orchestrator.scene.toml_keys import ASSIGNMENT, DEEPEST, Path, loads, parts, whole
 
 Options = Mapping[str, Any] | Sequence[str]
 """Dotted keys with their Python values, or `key=value` as on the command line."""

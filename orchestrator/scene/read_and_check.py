@@ -15,11 +15,10 @@ from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
 from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
 from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
 from hapticlink.orchestrator.scene.rates import frame_times, traced
-from hapticlink.orchestrator.scene.refused_keys_and_values import beyond, problems
+from hapticlink.orchestrator.scene.refused_keys_and_values import beyond, problems, unsound
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
 from hapticlink.orchestrator.scene.toml_keys import Problem, flat, flatten, reported
-from hapticlink.orchestrator.scene.unrepresentable_values import unsound
 
 
 def read(

@@ -1,11 +1,11 @@
 """What is wrong with the keys and values of a scene: path in the file, fault and remedy, from the
-errors of pydantic."""
+errors of pydantic; and what no value of a scene may be, in a file, an option or an SSP."""
 
 from __future__ import annotations
 
 import copy
 import typing
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Any
 
@@ -15,7 +15,7 @@ from pydantic_core import to_json
 from hapticlink.orchestrator.base.errors import COUNTED, near, shortened, unknown
 from hapticlink.orchestrator.scene import checks, key_descriptions, types_of_keys
 from hapticlink.orchestrator.scene.scene import adapter
-from hapticlink.orchestrator.scene.toml_keys import Path, value
+from hapticlink.orchestrator.scene.toml_keys import DEEPEST, Path, Problem, value
 
 
 def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
@@ -173,3 +173,34 @@ def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
         return f"`{key}` belongs to type {' or '.join(owners)}, not {this!r}"
     known = types_of_keys.keys([kind] if kind else kinds)
     return f"unknown key; {near(key, sorted(known))}"
+
+
+def unsound(value: Any, path: Path = ()) -> Iterator[Problem]:
+    """What no scene can hold, and where: tables without end, whole numbers that no type of FMI
+    can, dates, text that cannot be written to a file."""
+    if len(path) > DEEPEST:
+        yield path, f"more than {DEEPEST} tables or lists within one another: write it flatter"
+    elif isinstance(value, dict):
+        for key, inside in value.items():
+            if not _is_unicode(key):
+                yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
+            yield from unsound(inside, (*path, key))
+    elif isinstance(value, list):
+        for i, inside in enumerate(value):
+            yield from unsound(inside, (*path, i))
+    elif isinstance(value, str):
+        if not _is_unicode(value):
+            yield path, f"{value[:100]!a} is no Unicode text: write it in UTF-8"
+    elif isinstance(value, int):
+        if not -(2**63) <= value < 2**64:
+            yield path, "a whole number of more than 64 bits: write it with a point, as 1.0e30"
+    elif not isinstance(value, float | None):
+        yield path, f"{value} should be a number, a text, true, false, a list or a table"
+
+
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -13,9 +13,9 @@ from xml.etree.ElementTree import Element
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.scene.rates import traced
+from hapticlink.orchestrator.scene.refused_keys_and_values import unsound
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
-from hapticlink.orchestrator.scene.unrepresentable_values import unsound
 from hapticlink.orchestrator.ssp.names import (
     ANNOTATION,
     NOT_IN_ANNOTATION,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
-from hapticlink.orchestrator.fmi.kind_check import misfit
+from hapticlink.orchestrator.fmi.units import misfit
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import PowerPort

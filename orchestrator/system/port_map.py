@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.kind_check import misfit
+from hapticlink.orchestrator.fmi.units import misfit
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:

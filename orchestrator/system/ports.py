@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from hapticlink.components.ports import Kind
 from hapticlink.orchestrator.base.errors import InputFault, unknown
-from hapticlink.orchestrator.fmi.kind_check import MATRICES, turn
+from hapticlink.orchestrator.fmi.units import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import PowerPort

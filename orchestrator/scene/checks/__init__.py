@@ -9,7 +9,7 @@ from itertools import chain, islice
 
 from hapticlink.orchestrator.base.errors import COUNTED
 from hapticlink.orchestrator.scene.blocks import blocks as plan_blocks
-from hapticlink.orchestrator.scene.checks import blocks, contacts, fmus, linkage, numbers, rates
+from hapticlink.orchestrator.scene.checks import blocks, contacts, fmus, linkage, numbers
 from hapticlink.orchestrator.scene.conditions import parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
@@ -24,12 +24,12 @@ def check(scene: Scene) -> list[Problem]:
     planned = plan_blocks(scene)
     rest = chain(
         _condition(scene),
-        rates.check(scene, planned),
-        numbers.delays(scene),
+        numbers.check_rates(scene, planned),
+        numbers.check_delays(scene),
         blocks.missing(scene),
         fmus.check(scene, planned),
         shapes,
-        numbers.check(scene),
+        numbers.check_numbers(scene),
         blocks.check(scene, planned),
     )
     return list(islice(rest, COUNTED))
