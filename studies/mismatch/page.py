@@ -46,7 +46,8 @@ def _answer(found: Found) -> Iterator[str]:
         "Limits: the coupling stays stable, and sampling and holding generate at most "
         f"{SHARE:.0%} of the hand's work at the user's port. A method is advised where it keeps "
         "them in every [draw](../../docs/glossary.md#words); elsewhere nothing keeps them, and the "
-        "best is named with what it does keep. At a rate that is not in a table take the row next to it."
+        "best is named with what it does keep. At a rate that is not in a table take the row next "
+        "to it."
     )
     yield "\n".join(
         paragraph(
