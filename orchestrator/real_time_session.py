@@ -22,7 +22,6 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.arguments import require, require_name
@@ -145,12 +144,11 @@ class LiveRun:
             raise InputFault(unknown("connection with a hold", name, every))
         new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in connections]
         for connection in new:
-            held = make_hold(connection, self._simulation.signals, {})
+            held = self._simulation.make_hold(connection)
             self._loop.change_hold(connection.name, held)
             self._connections[connection.name] = connection
-            sample = self._simulation.signals.values[self._simulation.signals.sources(connection)]
             stamp = self._loop.events.previous(system.fmu[connection.source].clock)
-            self._simulation.holds[connection.name].push(stamp, sample, stamp)
+            held.push(stamp, self._simulation.signals.values[held.places], stamp)
         self._note(f"hold of {name}: {new[0].hold}, delay {delay or 0.0:g} s")
 
     def holds(self) -> dict[str, list[str]]:

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
-from hapticlink.orchestrator.run.compiled.library import Unavailable, load
-from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -15,12 +13,7 @@ from hapticlink.programs.foreign import Foreign, read
 
 
 def of_scene(scene: Scene) -> None:
-    """Raises InputFault for what only Python does, and where there is no compiled loop, on whose
-    structures a program is resolved."""
-    try:
-        load()
-    except Unavailable as why:
-        refuse(scene.title, [f"there is no compiled loop here: {why}"])
+    """Raises InputFault for what only Python does."""
     reasons = []
     if scene.at:
         reasons.append("[[at]]: what happens at given times is done by Python")
@@ -53,12 +46,10 @@ def of_system(system: System, outside: str | None, scene: Scene) -> dict[str, Fo
 
 
 def of_simulation(simulation: Simulation, title: str) -> None:
-    """Raises InputFault for times that are not exact, and for FMUs in processes of their own."""
+    """Raises InputFault for FMUs in processes of their own."""
     reasons = [
         f"{fmu} runs in a process of its own: {why}" for fmu, why in simulation.isolated.items()
     ]
-    if why := too_long(simulation.system):
-        reasons.append(why)
     for name, instance in simulation.instances.items():
         if name in simulation.isolated:
             continue

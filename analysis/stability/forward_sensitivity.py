@@ -18,7 +18,6 @@ operation is differentiated once.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Container
 from dataclasses import dataclass, field
 from typing import Any
@@ -34,8 +33,9 @@ from hapticlink.analysis.stability.state_vector import (
     Coordinate,
     StateVector,
     Template,
+    ages,
+    blocks,
     doubles,
-    keepers,
 )
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.holds import HOLDS
@@ -115,10 +115,10 @@ class ForwardSensitivity:
     def forget(self, fmus: Container[str]) -> None:
         """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
         what they are told is the same with any."""
-        for operation, *ages in list(self._known):
+        for operation, *rest in list(self._known):
             own = isinstance(operation, Step | Get) and operation.fmu in fmus
             if own or isinstance(operation, Repeat):
-                del self._known[operation, *ages]
+                del self._known[operation, *rest]
 
     def begin(self) -> None:
         """A period begins."""
@@ -135,8 +135,8 @@ class ForwardSensitivity:
             call(tick)
             return None
         of_fmu = isinstance(operation, Get | Set | Step)
-        ages = () if of_fmu else reach.state.ages(lambda kept: _ages(kept, tick))
-        found = reach.applied.get(ages)
+        since = b"" if of_fmu else reach.state.ages(tick)
+        found = reach.applied.get(since)
         if found and of_fmu:  # at rest it would change nothing
             return found
         call = self._alone(operation, call)
@@ -148,7 +148,7 @@ class ForwardSensitivity:
         same = SAME if of_fmu else NEARBY
         slopes, after = self._slopes(tick, operation, call, reach, same)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
-        reach.applied[ages] = made = Applied(
+        reach.applied[since] = made = Applied(
             operation, owners, counts, tuple(after), reach.reads, reach.writes, slopes.J, slopes.E
         )
         return made
@@ -201,7 +201,7 @@ class ForwardSensitivity:
         image, (_, written) = state.numbers(after), self._places(reach, after)
         own = zip(state.owners, state.parts(after), strict=True)
         sizes = [len(part) for owner, part in own if owner != SIGNALS]
-        key = operation, len(z), len(image), _ages(template.holds, tick)
+        key = operation, len(z), len(image), ages(template.holds, tick)
         known = self._known.setdefault(key, [])
         wide = same * np.maximum(1.0, np.abs(z[read]))
         for slopes in known:
@@ -325,7 +325,7 @@ class ForwardSensitivity:
             case Push(connection) | Evaluate(connection) | Blend(connection):
                 c = system.connection[connection]
                 shared = HOLDS[c.hold or ""].needs
-                holds = set(keepers(simulation)) - set(simulation.holds) if shared else set()
+                holds = set(blocks(simulation)) - set(simulation.holds) if shared else set()
                 held, derived = every[signals.hold(connection)], signals.derivatives(connection)
                 mean = signals.mean(c) if derived.stop else []
                 writes = sorted({*held, *every[derived], *mean})
@@ -335,7 +335,7 @@ class ForwardSensitivity:
                 return reach(set(), {connection} | holds, reads, written)
             case Repeat(body=body):
                 fmus = {op.fmu for op in flat(body) if isinstance(op, Step)}
-                return reach(fmus, set(keepers(simulation)), every, every)
+                return reach(fmus, set(blocks(simulation)), every, every)
             case _:
                 return None
 
@@ -347,19 +347,3 @@ def decided(exact: Matrix, slope: Matrix, error: Matrix) -> tuple[Matrix, Matrix
     gap = slope - exact
     wider = ~differ & (np.abs(gap) > np.abs(error))
     return np.where(differ, slope, exact), np.where(wider, gap, error)
-
-
-def _ages(value: Any, tick: int) -> Any:
-    """The whole numbers in the attributes of holds: stamps of samples relative to the tick, sizes,
-    which are far smaller, as they are. What is no whole number is left out."""
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, int):
-        return tick - value if 8 * value > tick else value
-    if isinstance(value, dict):
-        return tuple(_ages(v, tick) for v in value.values())
-    if isinstance(value, np.ndarray | float | str | type) or callable(value) or value is None:
-        return None
-    if isinstance(value, list | tuple | deque):
-        return tuple(_ages(v, tick) for v in value)
-    return _ages(vars(value), tick) if hasattr(value, "__dict__") else None

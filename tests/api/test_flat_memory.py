@@ -45,10 +45,8 @@ def test_runs_in_a_loop_stay_flat() -> None:
     assert resident() - before[1] < 6 << 20
 
 
-@pytest.mark.parametrize("loop", ["", "python"])
-def test_states_that_are_saved_over_are_freed(loop: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_that_are_saved_over_are_freed() -> None:
     """One state before each of the 256 steps that may be repeated: 0.6 kB each would be kept."""
-    monkeypatch.setenv("HAPTICLINK_LOOP", loop)
 
     def kept(duration: float) -> int:
         options = {"duration": duration, "faults.discard": "retry"}

@@ -1,5 +1,5 @@
 """FMUs that behave badly on purpose: of FMI 2.0 and FMI 3.0, in C and in Python (pythonfmu,
-pythonfmu3), in the process of the run or in one of their own, in both loops. `hapticlink run` of a
+pythonfmu3), in the process of the run or in one of their own. `hapticlink run` of a
 scene with such an FMU and one that behaves well, which gives to it.
 
 Whatever the FMU does: the command ends with status 1 and a message, or with 0 and a regular end; in
@@ -79,7 +79,7 @@ class Attack(Room):
         self._source = [table[f"source.{port}"].tolist() for port in ("y", "slope")]
 
     def made(
-        self, fmi: str, packed: str, place: str, act: str, step: int, keys: str, loop: str
+        self, fmi: str, packed: str, place: str, act: str, step: int, keys: str
     ) -> tuple[str, str]:
         """One of OUTCOMES, and what was wrong."""
         isolated = "isolate" in keys
@@ -87,7 +87,7 @@ class Attack(Room):
         file = FILES[packed].format(fmi=fmi)
         scene = hostile_scene(self.folder / fmi, name, keys, file)
         hangs = act in NEVER_RETURNS and not isolated
-        status, said = self._ended(scene, loop, BEFORE_SIGNALS if hangs else PATIENCE)
+        status, said = self._ended(scene, BEFORE_SIGNALS if hangs else PATIENCE)
         if status is None:
             return "hung", said[-300:]
         crash = not isolated and act in ENDS_THE_PROCESS
@@ -101,13 +101,12 @@ class Attack(Room):
             return "believed", f"status {status}: {'; '.join(wrong)}: {said[-300:]}"
         return "done" if status == 0 else "told", ""
 
-    def _ended(self, scene: Path, loop: str, patience: float) -> tuple[int | None, str]:
+    def _ended(self, scene: Path, patience: float) -> tuple[int | None, str]:
         """Status and what was said; after `patience` (s) a signal, later another, then None."""
         shutil.rmtree(self.out, ignore_errors=True)
         arguments = ["run", str(scene), "--out", str(self.out), "--no-figures"]
         arguments += ["--set", "faults.timeout=3"]
-        chosen = "python" if loop == "python" else ""
-        return self.started(arguments, HAPTICLINK_LOOP=chosen).ended(patience, interrupts=2)
+        return self.started(arguments).ended(patience, interrupts=2)
 
     def _untrue(self, status: int, said: str, crash: bool) -> Iterator[str]:
         story = self.out / "run.json"
@@ -161,11 +160,10 @@ def attack(number: int, seed: int) -> Iterator[Made]:
             act = PACKED[packed][i // 2 % len(PACKED[packed])]
             place = draw.choice((*PLACES, "step", "step", "step"))
             keys = draw.choice(("", "isolate = true"))
-            loop = draw.choice(("compiled", "python"))
             step = draw.randrange(1, 30)
             if act in ("leave", "child"):
                 keys = "isolate = true"
-            case = (fmi, packed, place, act, step, keys, loop)
+            case = (fmi, packed, place, act, step, keys)
             kind = f"FMI {fmi}.0 in {packed}, {'isolated' if keys else 'in process'}"
             yield Made(kind, str(case), *made.made(*case))
 
