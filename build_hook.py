@@ -56,7 +56,7 @@ class Build(BuildHookInterface):
 
     def _compiled(self, folder: Path, tag: str | None = None) -> Path | None:
         """The compiled loop, in `folder`; None where it cannot be compiled here. It is then
-        compiled at its first use, or runs in Python. Raises ValueError for an unknown `tag`."""
+        compiled at its first use. Raises ValueError for an unknown `tag`."""
         self._build = build = runpy.run_path(str(Path(self.root, LOOP, "build.py")))
         if tag and tag not in build["WHEELS"]:
             raise ValueError(f"HAPTICLINK_WHEEL={tag}: there are {', '.join(build['WHEELS'])}")

@@ -73,12 +73,13 @@ def _versions(requirements: Any, extra: str) -> dict[str, str | None]:
 
 
 def _loop() -> str:
+    from hapticlink.orchestrator.base.errors import Fault
     from hapticlink.orchestrator.run.compiled import library
 
     try:
         library.load()
-    except library.Unavailable as why:
-        return f"no, events run in Python: {why}"
+    except Fault as why:
+        return f"no: {why}"
     return "yes"
 
 

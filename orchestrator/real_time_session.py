@@ -17,7 +17,6 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.arguments import require, require_name
@@ -140,7 +139,7 @@ class LiveRun:
             raise InputFault(unknown("connection with a hold", name, every))
         new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in connections]
         for connection in new:
-            held = make_hold(connection, self._simulation.signals, {})
+            held = self._simulation.make_hold(connection)
             newest = self._loop.events.previous(system.fmu[connection.source].clock)
             self._loop.change_hold(connection.name, held, newest)
             self._connections[connection.name] = connection

@@ -129,16 +129,12 @@ class Regions:
             address = getattr(entry, field)
             if field in APART or not address:
                 continue
-            count = pointer.width * self._number(pointer.count, known)
+            count = pointer.width * structures.evaluate(pointer.count, known, self._counts)
             kind = target(type_, field, entry)
             self._visit(Region(kind, address, count, f"{name}_{field}"), known)
         for field, class_ in embedded(type_):
             if issubclass(class_, ctypes.Structure):
                 self._follow(class_.__name__, getattr(entry, field), f"{name}_{field}", known)
-
-    def _number(self, expression: str, known: tuple[Any, ...]) -> int:
-        """An expression of loop.h in fields of the structures that lead to a pointer."""
-        return int(eval(expression, {"__builtins__": {}}, _Fields(known, self._counts)))
 
     def _merged(self) -> list[Region]:
         order = {key: i for i, key in enumerate(self._reached)}
@@ -153,23 +149,6 @@ class Regions:
             name = before.name if first < order[key] else region.name
             merged[-1] = min(first, order[key]), replace(before, count=count, name=name)
         return [region for _, region in sorted(merged, key=lambda item: item[0])]
-
-
-class _Fields(dict[str, Any]):
-    """Fields of structures by name, the nearest first, then the counts that are known; a pointer to
-    a number is an array of it."""
-
-    def __init__(self, known: tuple[Any, ...], counts: Mapping[str, int]) -> None:
-        super().__init__()
-        self._known, self._given = known, counts
-
-    def __missing__(self, name: str) -> Any:
-        for entry in self._known:
-            if hasattr(entry, name):
-                value = getattr(entry, name)
-                is_pointer = name in POINTERS.get(type(entry).__name__, {})
-                return (ctypes.c_int64 * 1).from_address(value) if is_pointer else value
-        return self._given[name]
 
 
 class TypedData:

@@ -6,12 +6,11 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.holds.energy_account import Account
+from hapticlink.orchestrator.holds.table import TABLE
 from hapticlink.orchestrator.plan.event_kinds import key_of
 from hapticlink.orchestrator.plan.operations import Event, Firing, Record
 from hapticlink.orchestrator.plan.plan import Plan
@@ -19,7 +18,6 @@ from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.instructions import instructions
-from hapticlink.orchestrator.run.make_holds import make_hold
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.changes import (
@@ -86,10 +84,10 @@ def prepare_changes(
     machine: Machine, simulation: Simulation, plan: Plan, kinds: Iterable[Event]
 ) -> PreparedChanges:
     """The changes that are possible in a scene. kinds: of its events."""
-    held = [*_holds(machine, simulation)]
+    held = [*_holds(simulation)]
     pointers = (ctypes.c_void_p * max(len(held), 1))(*(hold.address for _, hold in held))
     possible = PreparedChanges(
-        [choice for choice, _ in held], ctypes.addressof(pointers), kept=pointers
+        [choice for choice, _ in held], ctypes.addressof(pointers), kept=(pointers, held)
     )
     names = [clock.name for clock in simulation.system.timeline.clocks]
     if CLOCK not in names[1:]:
@@ -110,7 +108,7 @@ def prepare_changes(
     return replace(possible, clock=index, families=tuple(families), spare=first, most=most)
 
 
-def _holds(machine: Machine, simulation: Simulation) -> Iterator[tuple[Choice, CompiledHold]]:
+def _holds(simulation: Simulation) -> Iterator[tuple[Choice, CompiledHold]]:
     """The holds that connections can have, each with the connection's own latency, or as if it had
     one."""
     system = simulation.system
@@ -120,9 +118,9 @@ def _holds(machine: Machine, simulation: Simulation) -> Iterator[tuple[Choice, C
         latency = connection.latency or Latency(min=MOST_DELAY)
         for hold in holds:
             other = replace(held_by(connection, hold, None), latency=latency)
-            with suppress(InputFault):  # a hold of a plugin
-                new = machine.other_hold(name, make_hold(other, simulation.signals, {}))
-                longest = MOST_DELAY + (1 / LEAST_RATE if isinstance(new.own, Account) else 0.0)
+            if hold in TABLE:  # no hold of a plugin
+                new = simulation.make_hold(other)
+                longest = MOST_DELAY + (1 / LEAST_RATE if new.account else 0.0)
                 while new.room < math.ceil(longest / haptic) + 8:
                     new.grow()
                 yield Choice(name, hold), new

@@ -366,18 +366,10 @@ static int serve(Model *m, int code) {
         fail(m, fmi2Discard, "the scene's condition to stop holds at t = %.17g s", time);
         return 0;
     case CALL:
-        if (op->code == STEP && l->fmus[op->a].check) {
-            Check *c = l->fmus[op->a].check;
-            if (*c->count == c->room) {
-                add_step_errors(m, op->a);
-                return 1;
-            }
-        }
         if (op->code == RECORD) { /* a table holds the newest row */
             *l->tables[op->a].rows = 0;
             return 1;
         }
-        if ((op->code == SAMPLE || op->code == MOVE) && meter_fold(l->meters[op->a])) return 1;
         if (op->code == STEP && l->fmus[op->a].place->ended) {
             m->now.mode = ENDED;
             m->now.tick = s->events.tick;
@@ -396,6 +388,14 @@ static int serve(Model *m, int code) {
         fail(m, fmi2Error, "%s failed at t = %.17g s", members[fmu_members[op->a]].name, time);
         return 0;
     case GROW:
+        if (op->code == STEP) {
+            add_step_errors(m, op->a);
+            return 1;
+        }
+        if (op->code == SAMPLE || op->code == MOVE) {
+            if (meter_fold(l->meters[op->a])) return 1;
+            break;
+        }
         fail(m, fmi2Error, "the hold of %s has no room for a sample at t = %.17g s", holds[op->a], time);
         return 0;
     }

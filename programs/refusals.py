@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
-from hapticlink.orchestrator.run.compiled.library import Unavailable, load
-from hapticlink.orchestrator.run.compiled.operation_records import too_long
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -14,12 +12,7 @@ from hapticlink.programs.foreign import Foreign, read_foreign
 
 
 def of_scene(scene: Scene) -> None:
-    """Raises InputFault for what only Python does, and where there is no compiled loop, on whose
-    structures a program is resolved."""
-    try:
-        load()
-    except Unavailable as why:
-        refuse(scene.title, [f"there is no compiled loop here: {why}"])
+    """Raises InputFault for what only Python does."""
     reasons = []
     if scene.at:
         reasons.append("[[at]]: what happens at given times is done by Python")
@@ -50,12 +43,10 @@ def of_system(system: System, outside: str | None, scene: Scene) -> dict[str, Fo
 
 
 def of_simulation(simulation: Simulation, title: str) -> None:
-    """Raises InputFault for times that are not exact, and for FMUs in processes of their own."""
+    """Raises InputFault for FMUs in processes of their own."""
     reasons = [
         f"{fmu} runs in a process of its own: {why}" for fmu, why in simulation.isolated.items()
     ]
-    if why := too_long(simulation.system):
-        reasons.append(why)
     refuse(title, reasons)
 
 

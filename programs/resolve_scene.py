@@ -18,7 +18,6 @@ from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.plan.event_kinds import key_of
 from hapticlink.orchestrator.plan.operations import Event, Push
 from hapticlink.orchestrator.plan.plan import Plan, moments
@@ -26,8 +25,6 @@ from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.fmus import Memory
-from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
-from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
@@ -161,20 +158,16 @@ def _rooms(plan: Plan, title: str) -> dict[str, int]:
     with ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
         simulation = Simulation(plan.system, RunResults(), stack)
         refusals.of_simulation(simulation, title)
-        loop = CompiledLoop(plan, simulation, load())
+        loop = CompiledLoop(plan, simulation)
         simulation.start()
         with suppress(FmuFault):  # a scene that fails has the rooms up to there
             loop.run(lambda tick: None)
-        return {
-            name: 2 * hold.room
-            for name, hold in simulation.holds.items()
-            if isinstance(hold, CompiledHold)
-        }
+        return {name: 2 * hold.room for name, hold in simulation.holds.items()}
 
 
 def _accounts(system: System) -> bool:
     """Whether a hold of the system observes its energy."""
-    return any(issubclass(HOLDS[c.hold], Account) for c in system.connections if c.hold)
+    return any(HOLDS[c.hold].needs == "power" for c in system.connections if c.hold)
 
 
 def _resolved(
@@ -190,12 +183,10 @@ def _resolved(
     start_values = simulation.signals.values.copy()
     _as_before_the_start(simulation, outside, changing)
     system = simulation.system
-    machine = Machine(load(), simulation)
+    machine = Machine(simulation)
     for name, room in rooms.items():
-        hold = simulation.holds[name]
-        assert isinstance(hold, CompiledHold)
-        while hold.room < room:
-            hold.grow()
+        while simulation.holds[name].room < room:
+            simulation.holds[name].grow()
     samples: list[Instruction] = [Push(c.name) for c in system.connections if c.hold]
     for name in simulation.meters.of:
         samples += [Sample(name, 0), Move(name, 0)]
@@ -213,11 +204,6 @@ def _resolved(
     setters = (structures.Setter * len(into))()
     kept = [_start_setter(simulation, fmu, c, memory) for c, fmu in zip(setters, into, strict=True)]
     rows = _newest_rows(machine, simulation)
-    meters = (ctypes.POINTER(structures.Meter) * len(machine.names("meter"))).from_address(
-        machine.loop.meters
-    )
-    for pointer in meters:
-        pointer[0].least = pointer[0].full
     return Resolved(
         scene=scene,
         system=system,
@@ -259,12 +245,14 @@ def _as_before_the_start(simulation: Simulation, outside: str | None, changing: 
     for check in simulation.step_checks.values():
         check.estimates = check.estimates[:STEP_CHECKS]
         check.times, check.weights = check.times[:STEP_CHECKS], check.weights[:STEP_CHECKS]
+        check.take_rows()
     for connection, meter in simulation.meters.of.items():
         rows = max(METER_ROWS, 4 * _steps_apart(simulation.system, connection, changing))
         for name in ("stamps", "samples", "ticks", "moves", "efforts"):
             array = getattr(meter, name)
             setattr(meter, name, np.zeros((rows, *array.shape[1:]), array.dtype))
-        meter.counts[:], meter.full = 0, rows
+        meter.counts[:], meter.c.full, meter.c.least = 0, rows, rows
+        meter.take_rows()
 
 
 def _steps_apart(system: System, connection: str, changing: bool) -> int:

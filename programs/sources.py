@@ -33,7 +33,7 @@ def write_sources(
     this project."""
     files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in REPLACED}
     files[COMMON.name] = COMMON.read_text()
-    files["hold_laws.h"] = loop.LAWS["text"]()
+    files["hold_table.h"] = loop.HOLD_TABLE
     files |= {name: (HERE / name).read_text() for name in OWN}
     files |= {name: (HEADERS / name).read_text(errors="replace") for name in FMI2_HEADERS}
     ids, guids = identifiers(resolved.members), {}

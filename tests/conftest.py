@@ -55,7 +55,6 @@ from tests.shared_fixtures import (  # noqa: E402, F401
     emptied_temporary_folder,
     fmus_of_a_room_unpacked_once,
     fmus_unpacked_once,
-    loop,
     own_temporary_folder,
     stamped,
 )

@@ -17,7 +17,6 @@ from hapticlink.fmus.build_fmu import build
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.run.compiled.library import CHOICE, Unavailable, load
 from hapticlink.orchestrator.scene.overrides import Options, written
 from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
@@ -87,25 +86,6 @@ def _once(scene: str, options: tuple[str, ...]) -> hl.Run:
 def run_once(scene: str, options: Options = ()) -> hl.Run:
     """A run of a shipped scene, which all tests of a process share that ask for it."""
     return _once(scene, written(options))
-
-
-try:
-    load()
-    LOOPS = ["python", "compiled"]
-except Unavailable:
-    LOOPS = ["python"]
-
-
-needs_compiled_loop = pytest.mark.skipif(
-    "compiled" not in LOOPS, reason="there is no compiled loop here"
-)
-
-
-@pytest.fixture(params=LOOPS)
-def loop(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The event loop of the test's runs."""
-    monkeypatch.setenv(CHOICE, request.param)
-    return str(request.param)
 
 
 def clock(name: str, timing: str, inputs: Sequence[str]) -> Component:

@@ -21,7 +21,6 @@ operation is differentiated once.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -37,13 +36,12 @@ from hapticlink.analysis.stability.state_vector import (
     Coordinate,
     StateVector,
     Template,
+    ages,
+    blocks,
     doubles,
-    keepers,
 )
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.holds_of_samples import OfSamples, Transition
-from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
 from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
@@ -118,10 +116,10 @@ class ForwardSensitivity:
     def forget(self, fmus: Container[str]) -> None:
         """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
         what they are told is the same with any."""
-        for operation, *ages in list(self._known):
+        for operation, *rest in list(self._known):
             own = isinstance(operation, Step | Get) and operation.fmu in fmus
             if own or isinstance(operation, Repeat):
-                del self._known[operation, *ages]
+                del self._known[operation, *rest]
 
     def begin(self) -> None:
         """A period begins."""
@@ -138,8 +136,8 @@ class ForwardSensitivity:
             call(tick)
             return None
         of_fmu = isinstance(operation, Get | Set | Step)
-        ages = () if of_fmu else reach.state.ages(lambda kept: self._ages(operation, kept, tick))
-        found = reach.applied.get(ages)
+        since = b"" if of_fmu else reach.state.ages(tick, self._gives_sample(operation))
+        found = reach.applied.get(since)
         if found and of_fmu:  # at rest it would change nothing
             return found
         call = self._alone(operation, call)
@@ -150,7 +148,7 @@ class ForwardSensitivity:
         before = reach.state.sizes()
         slopes, after = self._slopes(tick, operation, call, reach)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
-        reach.applied[ages] = made = Applied(
+        reach.applied[since] = made = Applied(
             operation, owners, counts, tuple(after), reach.reads, reach.writes, slopes.J, slopes.E
         )
         return made
@@ -169,11 +167,6 @@ class ForwardSensitivity:
             return False
         hold = HOLDS[self._simulation.system.connection[operation.connection].hold or ""]
         return hold.gives_samples and hold.needs is None
-
-    def _ages(self, operation: Instruction, kept: Any, tick: int) -> Any:
-        """What the slopes of an operation depend on, of the whole numbers of holds: the ages of
-        samples, or only which of them have arrived."""
-        return _whole_numbers(kept, tick, arrived_only=self._gives_sample(operation))
 
     def _alone(self, operation: Instruction, call: Call) -> Call:
         """The call of an operation that can be repeated from a state that was restored."""
@@ -216,7 +209,8 @@ class ForwardSensitivity:
         image, (_, written) = state.numbers(after), self._places(reach, after)
         own = zip(state.owners, state.parts(after), strict=True)
         sizes = [len(part) for owner, part in own if owner != SIGNALS]
-        key = operation, len(z), len(image), self._ages(operation, template.holds, tick)
+        since = ages(template.holds, tick, self._gives_sample(operation))
+        key = operation, len(z), len(image), since
         known = self._known.setdefault(key, [])
         wide = SAME * np.maximum(1.0, np.abs(z[read]))
         anywhere = isinstance(operation, Set) or self._gives_sample(operation)
@@ -277,14 +271,13 @@ class ForwardSensitivity:
         if not isinstance(operation, Evaluate):
             return ()
         hold = self._simulation.holds[operation.connection]
-        while isinstance(hold, Projector | Semidefinite | Unwrapped):
-            hold = hold.hold
-        if not isinstance(hold, OfSamples) or isinstance(hold, Transition):
+        row, own = hold.row, hold.c
+        if row.push != "samples" or row.needs or hold.link:
             return ()
-        if hold.needs or not hold.degree or len(hold.samples) < 2:
+        if not row.degree or own.count < 2:
             return ()
-        newest, period = hold.samples[-1][0], hold.samples.period(-1)
-        nodes = [newest + k * period for k in range(hold.degree + 1)]
+        before, newest = own.stamps[own.count - 2 : own.count]
+        nodes = [newest + k * (newest - before) for k in range(row.degree + 1)]
         return nodes if tick not in nodes else ()
 
     def _in_graph(
@@ -367,7 +360,7 @@ class ForwardSensitivity:
             case Push(connection) | Evaluate(connection) | Blend(connection):
                 c = system.connection[connection]
                 shared = HOLDS[c.hold or ""].needs
-                holds = set(keepers(simulation)) - set(simulation.holds) if shared else set()
+                holds = set(blocks(simulation)) - set(simulation.holds) if shared else set()
                 writes = [*every[signals.hold(connection)]]
                 pushed = isinstance(operation, Push)
                 reads = every if shared else signals.sources(c) if pushed else writes
@@ -375,7 +368,7 @@ class ForwardSensitivity:
                 return reach(set(), {connection} | holds, reads, written)
             case Repeat(body=body):
                 fmus = {op.fmu for op in flat(body) if isinstance(op, Step)}
-                return reach(fmus, set(keepers(simulation)), every, every)
+                return reach(fmus, set(blocks(simulation)), every, every)
             case _:
                 return None
 
@@ -387,20 +380,3 @@ def decided(exact: Matrix, slope: Matrix, error: Matrix) -> tuple[Matrix, Matrix
     gap = slope - exact
     wider = ~differ & (np.abs(gap) > np.abs(error))
     return np.where(differ, slope, exact), np.where(wider, gap, error)
-
-
-def _whole_numbers(value: Any, tick: int, arrived_only: bool) -> Any:
-    """The whole numbers in the attributes of holds: stamps of samples relative to the tick, sizes,
-    which are far smaller, as they are; of either, or with `arrived_only`, whether they are behind
-    it. What is no whole number is left out."""
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, int):
-        return value <= tick if arrived_only else tick - value if 8 * value > tick else value
-    if isinstance(value, dict):
-        return tuple(_whole_numbers(v, tick, arrived_only) for v in value.values())
-    if isinstance(value, np.ndarray | float | str | type) or callable(value) or value is None:
-        return None
-    if isinstance(value, list | tuple | deque):
-        return tuple(_whole_numbers(v, tick, arrived_only) for v in value)
-    return _whole_numbers(vars(value), tick, arrived_only) if hasattr(value, "__dict__") else None

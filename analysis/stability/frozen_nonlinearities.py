@@ -11,13 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from hapticlink.analysis.stability.state_vector import Coordinate
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, MECHANISM
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.passive import Passive
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold, array
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 NEXT_TO_NOTHING = 1e-18
@@ -52,14 +50,14 @@ def without(system: System) -> tuple[System, list[str]]:
 
 def has_friction(c: Connection) -> bool:
     """Whether its hold has a friction, which is taken out."""
-    return c.hold is not None and issubclass(HOLDS[c.hold], Passive)
+    return c.hold == "passive"
 
 
-def without_friction(holds: Iterable[object]) -> None:
+def without_friction(holds: Iterable[CompiledHold]) -> None:
     """Takes the friction beta c out of holds `passive`: beta stays 0."""
     for hold in holds:
-        if isinstance(hold, Passive):
-            hold.beta = np.zeros_like(hold.beta)
+        if hold.parts.name == "passive":
+            array(hold.account.beta, hold.account.n)[:] = 0.0
 
 
 def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:

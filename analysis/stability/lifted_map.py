@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
@@ -25,9 +25,9 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.plan.operations import Event, Operation, Record, Repeat, StopWhen
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.instructions import Feed, Instruction, Move, Sample, instructions
-from hapticlink.orchestrator.run.python_loop import OperationsInPython
-from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline
@@ -70,12 +70,13 @@ class LiftedMap:
         plan: Plan,
         simulation: Simulation,
         sensitivity: ForwardSensitivity,
+        machine: Machine,
         window: tuple[int, int] | None = None,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
         self._known: dict[Event, list[Instruction]] = {}
         self._plan, self.system = plan, plan.system
-        self._carry_out = OperationsInPython(simulation)
+        self._machine, self._calls = machine, dict[Instruction, Call]()
         self._sensitivity = sensitivity
         self._state = StateVector(simulation)
         length = window[1] if window else hyperperiod(time)
@@ -99,7 +100,7 @@ class LiftedMap:
         """The map of the same FMUs on the timeline of another `system`, from the first tick of a
         `window` on and over its length."""
         self._state.restore(self._begin)
-        return LiftedMap(Plan(system), self._simulation, self._sensitivity, window)
+        return LiftedMap(Plan(system), self._simulation, self._sensitivity, self._machine, window)
 
     def image(self, state: Vector) -> Vector:
         """F(state)."""
@@ -120,7 +121,7 @@ class LiftedMap:
         events, known = [], dict[tuple[int, ...], tuple[Applied, ...]]()
         for k, (tick, event) in enumerate(self._moments):
             each = (
-                self._sensitivity.applied(tick, operation, partial(self._carry_out, operation))
+                self._sensitivity.applied(tick, operation, self._call(operation))
                 for operation in self._instructions(event)
             )
             acting = tuple(applied for applied in each if applied)
@@ -197,7 +198,13 @@ class LiftedMap:
 
     def _run(self, tick: int, event: Event) -> None:
         for instruction in self._instructions(event):
-            self._carry_out(instruction, tick)
+            self._call(instruction)(tick)
+
+    def _call(self, instruction: Instruction) -> Call:
+        """One call of the loop that carries out an instruction alone."""
+        if instruction not in self._calls:
+            self._calls[instruction] = self._machine.joined([instruction])
+        return self._calls[instruction]
 
     def _instructions(self, kind: Event) -> list[Instruction]:
         """The instructions of a kind of event, without those that write rows, measure energy or end
@@ -249,4 +256,4 @@ def lifted_map(system: System, scene: Scene | None = None) -> Iterator[LiftedMap
         simulation.start()
         without_friction(simulation.holds.values())
         sensitivity = ForwardSensitivity(simulation, scene)
-        yield LiftedMap(Plan(system), simulation, sensitivity)
+        yield LiftedMap(Plan(system), simulation, sensitivity, Machine(simulation))

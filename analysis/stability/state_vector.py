@@ -1,18 +1,15 @@
 """The state of a co-simulation as one vector of numbers, and back.
 
 Between two events it consists of the states of all FMUs with the inputs that they hold, the signal
-vector, and the samples and accounts that holds and energy tanks keep. Times, counts and whatever
-else is no floating-point number stay those of a template, an instant of the simulation itself.
+vector, and the blocks that holds and energy tanks keep. Times, counts and whatever else is no
+floating-point number stay those of a template, an instant of the simulation itself.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Container, Iterator
-from copy import deepcopy
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +17,10 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import restores_state
-from hapticlink.orchestrator.holds import Hold
-from hapticlink.orchestrator.holds.energy_tank import NearEnd
-from hapticlink.orchestrator.holds.holds_of_samples import History
+from hapticlink.orchestrator.run.compiled.state import Saved, StateBlock
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.latency_and_loss import Link
 from hapticlink.orchestrator.system.system import Fmu, System
 
-Take = Callable[[Vector], Vector]
 SIGNALS = "signals"
 
 
@@ -47,19 +40,13 @@ class Coordinate:
         return f"{self.owner}{joint}{self.variable}"
 
 
-COUNTED = ("premises",)
-"""Attributes of holds that are counted for the results, and that no hold reads: no part of the
-state."""
-
-
 @dataclass(frozen=True)
 class Template:
-    """A saved state: of the FMUs in bytes, by name; the signals; the attributes of holds and
-    tanks."""
+    """A saved state: of the FMUs in bytes, by name; the signals; of holds and tanks."""
 
     fmus: dict[str, bytes]
     signals: Vector
-    holds: list[Any]
+    holds: list[Saved]
 
 
 class StateVector:
@@ -77,11 +64,8 @@ class StateVector:
         holds: Container[str] | None = None,
     ) -> None:
         self._simulation = simulation
-        self._holds: dict[str, Any] = {
-            name: hold
-            for name, hold in keepers(simulation).items()
-            if holds is None or name in holds
-        }
+        every = blocks(simulation)
+        self._holds = {name: every[name] for name in every if holds is None or name in holds}
         self._fmus = [f for f in simulation.system.fmus if fmus is None or f.name in fmus]
         self._taken: dict[str, NDArray[np.intp]] = {}
         for fmu in self._fmus:
@@ -94,15 +78,15 @@ class StateVector:
         return Template(
             {name: simulation.instances[name].serialized() for name in self._taken},
             simulation.signals.values.copy(),
-            [_copied(vars(hold), np.copy) for hold in self._holds.values()],
+            [block.save() for block in self._holds.values()],
         )
 
     def restore(self, template: Template) -> None:
         for name in self._taken:
             self._simulation.instances[name].deserialize(template.fmus[name])
         self._simulation.signals.values[:] = template.signals
-        for hold, kept in zip(self._holds.values(), template.holds, strict=True):
-            vars(hold).update(_copied(kept, np.copy))
+        for block, saved in zip(self._holds.values(), template.holds, strict=True):
+            block.restore(saved, saved.numbers)
 
     def put(self, template: Template, numbers: Vector) -> None:
         """Restores `template` with other numbers."""
@@ -116,14 +100,9 @@ class StateVector:
         signals = self._simulation.signals.values
         signals[:] = numbers[first : first + len(signals)]
         first += len(signals)
-
-        def take(value: Vector) -> Vector:
-            nonlocal first
-            first += value.size
-            return numbers[first - value.size : first].reshape(value.shape).copy()
-
-        for hold, kept in zip(self._holds.values(), template.holds, strict=True):
-            vars(hold).update(_copied(kept, take))
+        for block, saved in zip(self._holds.values(), template.holds, strict=True):
+            block.restore(saved, numbers[first : first + len(saved.numbers)])
+            first += len(saved.numbers)
 
     def now(self) -> Vector:
         """The numbers of the simulation as it is."""
@@ -132,12 +111,12 @@ class StateVector:
             doubles(instances[name].serialized())[taken] for name, taken in self._taken.items()
         ]
         parts.append(self._simulation.signals.values)
-        parts += (value.ravel() for h in self._holds.values() for _, value in _floats(vars(h)))
+        parts += (block.save().numbers for block in self._holds.values())
         return np.concatenate(parts)
 
-    def ages(self, of: Callable[[dict[str, Any]], Any]) -> tuple[Any, ...]:
-        """What `of` tells of each hold as it is."""
-        return tuple(of(vars(hold)) for hold in self._holds.values())
+    def ages(self, tick: int, arrived_only: bool) -> bytes:
+        """The `ages` of the samples of each hold as it is."""
+        return ages([block.save() for block in self._holds.values()], tick, arrived_only)
 
     def sizes(self) -> dict[str, int]:
         """How many numbers each owner has now."""
@@ -152,9 +131,7 @@ class StateVector:
         """The numbers of a saved state, by owner."""
         parts = [doubles(template.fmus[name])[taken] for name, taken in self._taken.items()]
         parts.append(template.signals)
-        for kept in template.holds:
-            parts.append(np.concatenate([[], *(value.ravel() for _, value in _floats(kept))]))
-        return parts
+        return [*parts, *(saved.numbers for saved in template.holds)]
 
     def coordinates(self, template: Template) -> list[Coordinate]:
         simulation = self._simulation
@@ -170,17 +147,27 @@ class StateVector:
         outputs = [_signal(name) for name in columns]
         further = range(len(outputs), len(template.signals))
         coordinates += outputs + [Coordinate("held values", f"[{i}]", "signal") for i in further]
-        for owner, kept in zip(self._holds, template.holds, strict=True):
-            for path, value in _floats(kept, ""):
-                entries = [f"[{i + 1}]" for i in range(value.size)] if value.ndim else [""]
-                coordinates += [Coordinate(owner, path.strip(".") + e, "hold") for e in entries]
+        for owner, saved in zip(self._holds, template.holds, strict=True):
+            names = self._holds[owner].names(saved)
+            coordinates += [Coordinate(owner, name, "hold") for name in names]
         return coordinates
 
 
-def keepers(simulation: Simulation) -> dict[str, Any]:
-    """The holds and the energy tanks of a simulation, by name."""
+def blocks(simulation: Simulation) -> dict[str, StateBlock]:
+    """The states of the holds and the energy tanks of a simulation, by name."""
     tanks = {f"energy tank {i + 1}": tank for i, tank in enumerate(simulation.springs)}
-    return {**simulation.holds, **tanks}
+    holds = simulation.holds.items()
+    found = {name: StateBlock(hold.c, partial(getattr, hold, "own")) for name, hold in holds}
+    return found | {name: StateBlock(tank) for name, tank in tanks.items()}
+
+
+def ages(saved: Iterable[Saved], tick: int, arrived_only: bool) -> bytes:
+    """The whole numbers of saved states: stamps of samples relative to a tick, counts, which are
+    far smaller, as they are; of either, with `arrived_only`, whether they are behind it."""
+    integers = np.concatenate([np.zeros(0, np.int64), *(each.integers for each in saved)])
+    if arrived_only:
+        return (integers <= tick).tobytes()
+    return np.where(8 * integers > tick, tick - integers, integers).tobytes()
 
 
 def size(system: System) -> int:
@@ -225,45 +212,3 @@ def _entries(fmu: Fmu) -> Iterator[tuple[int, str, bool]]:
 def doubles(state: bytes) -> Vector:
     """The doubles that a serialised state ends with, as many as fit."""
     return np.frombuffer(state, offset=len(state) % 8)
-
-
-def _copied(value: Any, take: Take) -> Any:
-    """A copy of nested containers and of the parts of holds, with `take` applied to every number
-    that is a float; what cannot change, functions and shared tanks stay as they are."""
-    match value:
-        case int() | str() | None | NearEnd():
-            return value
-        case np.ndarray():
-            return take(value) if value.dtype.kind == "f" else value.copy()
-        case float():
-            return float(take(np.array(value)))
-        case dict():
-            return {k: v.copy() if k in COUNTED else _copied(v, take) for k, v in value.items()}
-        case list() | tuple():
-            return type(value)(_copied(v, take) for v in value)
-        case deque():
-            return deque((_copied(v, take) for v in value), value.maxlen)
-        case Hold() | History() | Link():
-            other = type(value).__new__(type(value))
-            vars(other).update(_copied(vars(value), take))
-            return other
-    return value if callable(value) else deepcopy(value)
-
-
-def _floats(value: Any, path: str | None = None) -> Iterator[tuple[str, Vector]]:
-    """The floats of what `_copied` copies, in its order and shape, and the place of each, which is
-    not written out for the path None."""
-    match value:
-        case np.ndarray() if value.dtype.kind == "f":
-            yield path or "", value
-        case float():
-            yield path or "", np.array(value)
-        case dict():
-            for k, v in value.items():
-                if k not in COUNTED:
-                    yield from _floats(v, None if path is None else f"{path}.{k}")
-        case list() | tuple() | deque():
-            for i, v in enumerate(value, 1):
-                yield from _floats(v, None if path is None else f"{path}[{i}]")
-        case Hold() | History() | Link():
-            yield from _floats(vars(value), path)

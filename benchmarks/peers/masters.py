@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import ctypes
 import logging
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -41,23 +40,12 @@ def timed(run: Callable[[int], object]) -> Steps:
     return seconds
 
 
-def compiled(ring: Ring) -> Steps:
-    """Our loop in C, which records: each call is a run of its own."""
-    return _ours(ring, "compiled")
-
-
-def plain(ring: Ring) -> Steps:
-    """Our loop in Python."""
-    return _ours(ring, "python")
-
-
-def _ours(ring: Ring, choice: str) -> Steps:
+def ours(ring: Ring) -> Steps:
+    """Our loop, which records: each call is a run of its own."""
     from benchmarks import rings  # only what a master needs is loaded
     from benchmarks.timing import simulated
-    from hapticlink.orchestrator.run.compiled.library import CHOICE
 
     rings.register()
-    os.environ[CHOICE] = choice
 
     def seconds(steps: int) -> float:
         duration = f"duration={steps / 512!r}"
@@ -190,10 +178,9 @@ def bare(ring: Ring) -> Steps:
 
 MASTERS: dict[str, Callable[[Ring], Steps]] = {
     "C loop": bare,
-    "hapticlink": compiled,
+    "hapticlink": ours,
     "Ecos": ecos,
     "libcosim": libcosim,
     "ctypes": calls_by_ctypes,
     "FMPy": fmpy,
-    "hapticlink, loop in Python": plain,
 }

@@ -1,18 +1,16 @@
-"""The base class of holds, the contract that each of them fulfils, and what a hold is made from."""
+"""The base class of the holds of plugins, the contract that every hold fulfils, and what one is
+constructed from."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hapticlink.orchestrator.base.arrays import Vector
 
-if TYPE_CHECKING:
-    from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-
-Needs = Literal["derivative", "integral", "power", "spring"]
+Needs = Literal["derivative", "integral", "power"]
 
 
 @dataclass(frozen=True)
@@ -22,15 +20,13 @@ class HoldContext:
     size: number of entries of the signal. seconds: converts ticks to s. displacement: reads the
     displacement conjugate to the signal, with its sign, so that signal . d(displacement) is the
     work done on the target (J). velocity: reads its time derivative, where the target has it as
-    an output. tank: the energy tank of the spring-damper that the signal sets, and the row of the
-    signal in it (0: set position, 1: set velocity).
+    an output.
     """
 
     size: int
     seconds: Callable[[float], float] = float
     displacement: Callable[[], Vector] | None = None
     velocity: Callable[[], Vector] | None = None
-    tank: tuple[EnergyTank, int] | None = None
 
 
 class Hold(ABC):
@@ -59,8 +55,7 @@ class Hold(ABC):
     needs: ClassVar[Needs | None] = None
     """derivative: a sample is the signal followed by its time derivative (its unit per s).
     integral: by its integral over time, the output of which it is the derivative. power: the
-    connection carries power, and the context reads the conjugate displacement. spring: the
-    connection sets a spring-damper, whose energy tank is in the context."""
+    connection carries power, and the context reads the conjugate displacement."""
     gives_samples: ClassVar[bool] = False
     """Whether every value is one of the samples, unchanged, so that a matrix keeps its kind."""
     degree: ClassVar[int] = 0

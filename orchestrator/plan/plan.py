@@ -29,6 +29,8 @@ from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.system.system import System
 
 Block = tuple[Operation, ...]
+EXACT = 2**53
+"""Up to here every whole number is a double, and the quotient of two is rounded once."""
 
 
 class Moment(NamedTuple):
@@ -58,7 +60,9 @@ class Plan:
 
     def check(self) -> None:
         """Raises InputFault if the scheme cannot order the FMUs, or leaves out the step of one or
-        the rows of a clock. The first event suffices, since all clocks fire there."""
+        the rows of a clock, and for times that are not exact. The first event suffices, since all
+        clocks fire there."""
+        _require_exact_times(self.system)
         event = next(iter(self)).event
         operations = tuple(self.unrolled(event))
         stepped = {op.fmu for op in operations if isinstance(op, Step)}
@@ -82,6 +86,20 @@ class Plan:
 
     def __iter__(self) -> Iterator[Moment]:
         return moments(self.system.timeline)
+
+
+def _require_exact_times(system: System) -> None:
+    """Raises InputFault where the loop's times, tick numerator/(denominator substeps), would be
+    rounded more than once."""
+    timeline, parts = system.timeline, max(system.coupling.substeps.values(), default=1)
+    base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
+    largest = max(last * parts * base.numerator, base.denominator * parts)
+    if largest >= EXACT:
+        raise InputFault(
+            f"its {timeline.end} ticks of {base} s, times {parts} substeps, are {largest:.3g} and "
+            "not below 2^53, up to which times are exact: take a shorter duration, or rates whose "
+            "periods have a longer common divisor"
+        )
 
 
 def moments(timeline: Timeline) -> Iterator[Moment]:

@@ -69,7 +69,9 @@ class RowsFile:
     def read(self) -> Rows:
         """All rows, in memory."""
         count = self._count * len(self.columns)
-        return np.fromfile(self._path, count=count, offset=self._begin).reshape(self._count, -1)
+        return np.fromfile(self._path, count=count, offset=self._begin).reshape(
+            self._count, len(self.columns)
+        )
 
 
 class RowsBeingWritten:

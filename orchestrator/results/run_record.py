@@ -205,8 +205,8 @@ class RunEnding:
     """How often outputs were held since they were not finite."""
     """Number of steps that were repeated with smaller ones."""
     in_python: dict[str, str] = field(default_factory=dict)
-    """The operations that were carried out in Python rather than in C, "everything" if there was no
-    compiled loop, with the reason."""
+    """The operations and holds that were carried out in Python rather than in C, with the
+    reason."""
     real_time: dict[str, Any] | None = None
     """What became of a run in real time (`RealTimeRun.report`)."""
     network: dict[str, dict[str, Any]] = field(default_factory=dict)

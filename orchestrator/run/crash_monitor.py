@@ -10,7 +10,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def watched(folder: Path) -> Iterator[None]:
     # operating system when this process ends.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
         interrupt.add(process.kill)
-        guard = _guard()
+        guard = library.load().guard  # against exit() of C: process_state.c
         exit_at_once = os._exit
         os._exit = lambda status: exit_at_once(status or 1)
         guard(1)
@@ -43,14 +43,6 @@ def watched(folder: Path) -> Iterator[None]:
             os._exit = exit_at_once
             interrupt.remove(process.kill)
             process.kill()
-
-
-def _guard() -> Callable[[int], object]:
-    """Switches the guard against exit() of C on and off (process_state.c)."""
-    with suppress(library.Unavailable):
-        guard: Callable[[int], object] = library.loaded().guard
-        return guard
-    return lambda on: None
 
 
 def record_crash(folder: Path, process: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -17,15 +16,12 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal, delays
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run.compiled.library import Unavailable, load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.compiled.operation_records import too_long
+from hapticlink.orchestrator.run.compiled.operation_records import Stop
 from hapticlink.orchestrator.run.energy.balance import unstable
-from hapticlink.orchestrator.run.python_loop import OperationsInPython, PythonLoop, Stop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
-from hapticlink.orchestrator.system.system import System
 
 Progress = Callable[[float], None]
 PAUSE = 0.02
@@ -104,26 +100,18 @@ def run(
     """
     outcome = Outcome()
     simulation: Simulation | None = None
-    loop: PythonLoop | None = None
+    loop: CompiledLoop | None = None
     try:
         # Non-finite values are detected by 0 x NaN, for which numpy would warn.
         with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
             interrupt.check()
-            library, why = _library(plan.system)
-            if real_time and not library:
-                raise Fault(f"a run in real time needs the compiled loop: {why}")
             simulation = Simulation(plan.system, results, stack)
             if real_time:
                 stack.enter_context(real_time.of(plan, simulation))
-            loop = (
-                CompiledLoop(plan, simulation, library)
-                if library
-                else PythonLoop(plan, OperationsInPython(simulation), {"everything": why})
-            )
+            loop = CompiledLoop(plan, simulation)
             simulation.start()
-            if isinstance(loop, CompiledLoop):
-                coming = loop.events.coming()
-                loop.events.prepare(with_ends(coming) if real_time else coming)
+            coming = loop.events.coming()
+            loop.events.prepare(with_ends(coming) if real_time else coming)
             if real_time:
                 stack.enter_context(real_time.pace.undisturbed())
             _run_events(plan, loop, results, outcome, progress, real_time)
@@ -143,7 +131,7 @@ def run(
 
 def _run_events(
     plan: Plan,
-    loop: PythonLoop,
+    loop: CompiledLoop,
     results: RunResults,
     outcome: Outcome,
     progress: Progress | None,
@@ -156,7 +144,7 @@ def _run_events(
         nonlocal shown
         time = plan.system.timeline.seconds(tick)
         interrupt.check(time)
-        if real_time and isinstance(loop, CompiledLoop):
+        if real_time:
             real_time.turn(loop)
         if progress and perf_counter() - shown > PAUSE:
             shown = perf_counter()
@@ -172,7 +160,7 @@ def _run_events(
 
 
 def _details(
-    plan: Plan, simulation: Simulation, loop: PythonLoop, real_time: RealTimeRun | None
+    plan: Plan, simulation: Simulation, loop: CompiledLoop, real_time: RealTimeRun | None
 ) -> RunEnding:
     """What the objects of a run have counted and measured."""
     system, instances = plan.system, simulation.instances
@@ -213,13 +201,3 @@ def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
         remedy = "take higher rates, weaker gains, another coupling or hold"
         return Diverged(condition.fmu, f"{what} ({remedy})", outcome.end_time, repeatable=True)
     return simulation.balance.judge(outcome.details.meters, outcome.end_time)
-
-
-def _library(system: System) -> tuple[ctypes.CDLL | None, str]:
-    """The compiled loop; None where it cannot run the system, with the reason."""
-    if why := too_long(system):
-        return None, why
-    try:
-        return load(), ""
-    except Unavailable as reason:
-        return None, str(reason)

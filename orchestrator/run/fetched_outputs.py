@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from hapticlink.orchestrator.run.energy.balance import Balance
-from hapticlink.orchestrator.run.energy.meter import Meters
+from hapticlink.orchestrator.run.energy.meter import metered
+from hapticlink.orchestrator.run.hold_parts import describe_holds, describe_spring
 from hapticlink.orchestrator.run.initialize import START_POSE_OUTPUTS
-from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.step_check import StepCheck
 from hapticlink.orchestrator.system.system import Fmu, System
@@ -50,9 +50,11 @@ def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
 def _read(system: System) -> Iterator[str]:
     """The outputs, `fmu.output`, that are read at each communication point."""
     signals = SignalVector(system)
-    Meters(signals)
+    _ = [*metered(signals)]
     Balance(signals)
-    make_holds(signals)
+    for parts in describe_holds(signals).values():
+        if parts.spring:
+            describe_spring(parts.spring, signals)
     for c in system.connections:
         signals.sources(c)
     if system.ends_when:

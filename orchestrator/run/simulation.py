@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.holds import Hold
-from hapticlink.orchestrator.holds.energy_account import Account
-from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
 from hapticlink.orchestrator.results.run_results import Recorder, RunResults
 from hapticlink.orchestrator.run.apply_changes import InputSetter
+from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.hold_structures import (
+    CompiledHold,
+    array,
+    make_hold,
+    make_holds,
+)
+from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meter import Meters
+from hapticlink.orchestrator.run.hold_parts import describe_hold
 from hapticlink.orchestrator.run.initialize import initialize
-from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.step_check import StepCheck
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Connection, System
 
 Call = Callable[[int], object]
 Set = Callable[[Vector], object]
@@ -35,13 +40,16 @@ class Simulation(LoadedFmus):
     setters set the inputs of an FMU from the signals: with held values, or `now` with the newest
     outputs of the sources.
 
-    pace: the schedule of a run in real time. beside: the FMUs whose steps are then taken beside the
-    loop, each with its clock; `sides` and `arrivals`, tables of their samples, are by clock,
-    `frames`, tables of what went to other computers, by FMU. late: ticks by which the current event
-    comes after its own. swept: whether sweeps alone have initialised the FMUs.
+    loop: the structure that the compiled loop, of `library`, works on; a Machine completes it.
+    springs: the energy tanks. pace: the schedule of a run in real time. beside: the FMUs whose
+    steps are then taken beside the loop, each with its clock; `sides` and `arrivals`, tables of
+    their samples, are by clock, `frames`, tables of what went to other computers, by FMU. late:
+    ticks by which the current event comes after its own. swept: whether sweeps alone have
+    initialised the FMUs.
     """
 
     def __init__(self, system: System, results: RunResults, stack: ExitStack) -> None:
+        self.library = library = load()
         super().__init__(system, stack)
         stack.callback(self._dismiss)
         self.pace: Pace | None = None
@@ -55,12 +63,15 @@ class Simulation(LoadedFmus):
         self._results, self._stack = results, stack
         repeated = system.coupling.scheme == "iterated"
         self.step_checks = {
-            fmu.name: StepCheck(self.instances[fmu.name])
+            fmu.name: StepCheck(library, self.instances[fmu.name])
             for fmu in (() if repeated else system.fmus)
             if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
         }
-        self.holds, self.springs = make_holds(self.signals)
-        self.meters = Meters(self.signals)
+        self.loop = structures.Loop()
+        self.loop.fill(system.timeline.base, "numerator", "denominator")
+        self.loop.fill(self.signals, "values")
+        self.holds, self.springs = make_holds(library, self.loop, self.signals)
+        self.meters = Meters(library, self.signals)
         self.balance = Balance(self.signals)
         self.recorders: dict[str, Recorder] = {}
         self.setters: dict[tuple[str, bool], Set] = {}
@@ -74,9 +85,8 @@ class Simulation(LoadedFmus):
         create the recorders."""
         self.swept = initialize(self)
         values = self.signals.values
-        for c in self.system.connections:
-            if c.hold:
-                self.holds[c.name].push(0, values[self.signals.sources(c)], 0)
+        for hold in self.holds.values():
+            hold.push(0, values[hold.places], 0)
         self.meters.start()
         self.balance.start()
         for change in self.system.changes:
@@ -101,6 +111,11 @@ class Simulation(LoadedFmus):
             self.arrivals[side] = self._beside(side, f"{side}_{SAMPLES}", COLUMNS)
         for name in self.remote if self.pace else ():
             self.frames[name] = self._beside(self.beside[name], f"{name}_{FRAMES}", FRAME)
+
+    def make_hold(self, connection: Connection) -> CompiledHold:
+        """A hold that a connection can have in place of its own."""
+        parts = describe_hold(connection, self.signals)
+        return make_hold(self.library, self.loop, parts, connection.name, self.signals)
 
     def _beside(self, clock: str, name: str, columns: Sequence[str]) -> Recorder:
         """A table of what runs beside the loop; its row of t = 0 is there at once."""
@@ -129,28 +144,21 @@ class Simulation(LoadedFmus):
 
     def links(self) -> dict[str, LinkCounts]:
         """Per connection with a latency, the number of samples sent, lost and overtaken."""
-        links = {n: getattr(h, "link", None) for n, h in self.holds.items()}
-        return {n: LinkCounts(k.sent, k.lost, k.overtaken) for n, k in links.items() if k}
+        links = {n: hold.link for n, hold in self.holds.items() if hold.link}
+        return {n: LinkCounts(k.sent, k.lost, k.overtaken) for n, k in links.items()}
 
     def premises(self) -> dict[str, Premises]:
         """Per connection with a hold that observes its energy, what was outside its premises."""
         return {
-            name: Premises(int(steps), int(outside), float(stake))
-            for name, own in self._without_wrappers()
-            if isinstance(own, Account)
-            for steps, outside, stake in [own.premises]
+            name: Premises(int(hold.premises[0]), int(hold.premises[1]), float(hold.premises[2]))
+            for name, hold in self.holds.items()
+            if hold.premises is not None
         }
 
     def overdrawn(self) -> dict[str, float]:
         """Per set position, the energy (J) that the tank of its spring was short of at most."""
         return {
-            name: 0.0 - float(own.tank.least[0])
-            for name, own in self._without_wrappers()
-            if isinstance(own, PassiveSetPosition) and own.row == 0
+            name: 0.0 - float(array(hold.tank.least, 1)[0])
+            for name, hold in self.holds.items()
+            if hold.tank and hold.parts.kind.needs == "spring" and hold.parts.row == 0
         }
-
-    def _without_wrappers(self) -> Iterator[tuple[str, Hold]]:
-        for name, hold in self.holds.items():
-            while inner := getattr(hold, "own", None) or getattr(hold, "hold", None):
-                hold = inner
-            yield name, hold

@@ -1,22 +1,5 @@
-"""Estimates the integration error of plants during a run, by step doubling on a few of their steps.
-
-e_k = |v(t_k + h) - v_2(t_k + h)| / max |v|
-
-v are the outputs that are first derivatives of others, v_2 the same after two steps of h/2 from
-the same FMU state with the same inputs (Hairer, Norsett, Wanner, Solving Ordinary Differential
-Equations I (1993), section II.4, without the factor 1/(1 - 2^-p): a step may be too long for its
-order p to show). e_k of about 1 is a step beyond the stability of its method, as with a stiff drive
-at a light body. The sum of all e_k estimates what the errors of a run add up to where the motion
-neither damps nor amplifies them.
-
-One step in EVERY is checked, so that EVERY e_k stands for the sum. Episodes that are shorter, such
-as an impact or a light body that passes a dead centre, show in the change of v over a step: the
-first step, and each after one that changed v by a multiple JUMP of all before, are checked, too,
-and count once.
-
-The state is restored before the step that counts, so that results do not depend on the check. Only
-FMUs with a hapticlink annotation are checked: others may keep what they do not restore.
-"""
+"""The check of a plant's steps during a run; what it finds, and how, is told in
+run/compiled/step_check.c."""
 
 from __future__ import annotations
 
@@ -30,6 +13,7 @@ from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.results.run_record import StepErrors
+from hapticlink.orchestrator.run.compiled import structures
 
 EVERY = 97
 """One step in so many is checked, which adds two half steps, a saved state and two reads to them. A
@@ -43,29 +27,35 @@ that led to a check, and by more than a SHARE of the largest v."""
 AT_REST = 1e-6
 """Rate (1/s), relative to the magnitude of the output itself, below which it is at rest."""
 
+REGULAR = 1
+"""What the library tells of a step that is one of these."""
 ROOM = 256
 """Checks for which there is room at first."""
 
 
 class StepCheck:
-    """Checks steps of an FMU for which `possible` is true."""
+    """Checks steps of an FMU for which `possible` is true; `c` is its structure."""
 
-    def __init__(self, instance: Instance) -> None:
-        self._instance = instance
+    def __init__(self, library: ctypes.CDLL, instance: Instance) -> None:
+        self._library, self._instance = library, instance
         names = [s.name for s in instance.description.outputs]
         pairs = _first_derivatives(instance.description)
         ports = [_port(rate) for _, rate in pairs]
         self._names = sorted(set(ports))
-        # What follows is shared with the compiled loop; `changed` tells it of new arrays.
-        self.bases = np.array([names.index(base) for base, _ in pairs], dtype=np.int64)
-        self.rates = np.array([names.index(rate) for _, rate in pairs], dtype=np.int64)
-        self.ports = np.array([self._names.index(p) for p in ports], dtype=np.int64)
+        rows = ((names.index(b), names.index(r), self._names.index(_port(r))) for b, r in pairs)
+        self.bases, self.rates, self.ports = np.array([*rows], dtype=np.int64).T.copy()
         self.last = np.full(len(pairs), np.nan)
         self.scales, self.jumps = np.zeros((2, len(self._names)))
         self.steps, self.count, self.size = ctypes.c_int64(), ctypes.c_int64(), ctypes.c_double()
         self.estimates = np.zeros((ROOM, len(self._names)))
         self.times, self.weights = np.zeros((2, ROOM))
-        self.changed: Callable[[], object] = lambda: None
+        self.c = c = structures.Check()
+        c.fill(self, "steps", "count", "bases", "rates", "ports", "scales", "jumps", "last", "size")
+        c.fill(n=len(pairs), n_ports=len(self._names))
+        c.fill(every=EVERY, first=FIRST, at_rest=AT_REST, jump=JUMP, share=SHARE)
+        scratch = np.zeros((2, len(instance.outputs)))
+        c.fill(before=scratch[0], halves=scratch[1])
+        self.take_rows()
 
     @staticmethod
     def possible(description: Description) -> bool:
@@ -78,14 +68,26 @@ class StepCheck:
             and bool(_first_derivatives(description))
         )
 
+    def take_rows(self) -> None:
+        """Tell the loop where its rows are, and how many there can be."""
+        self.c.fill(self, "times", "weights", errors=self.estimates, room=len(self.times))
+
+    def grow(self) -> None:
+        """Make room for as many checks again."""
+        self.estimates = np.concatenate([self.estimates, np.zeros_like(self.estimates)])
+        self.times, self.weights = (np.append(v, 0.0 * v) for v in (self.times, self.weights))
+        self.take_rows()
+
     def around(self, step: Callable[[], object], time: float, end: float) -> None:
-        """Call `step`, which takes the FMU from `time` to `end` (s), and check it if it is due."""
-        self.steps.value += 1
-        regular = self.steps.value % EVERY == FIRST
-        if not self._moved() and not regular:
+        """Call `step`, which takes an FMU that the loop does not call itself from `time` to `end`
+        (s), and check it if it is due."""
+        instance, outputs, check = self._instance, self._instance.outputs, ctypes.addressof(self.c)
+        if self.count.value == len(self.times):
+            self.grow()
+        due = self._library.check_due(check, outputs.ctypes.data)
+        if not due:
             step()
             return
-        instance, outputs = self._instance, self._instance.outputs
         before = outputs.copy()
         instance.save(SLOT)
         halves = self._halves(time, end)
@@ -93,7 +95,8 @@ class StepCheck:
         step()
         instance.read()
         if halves is not None:
-            self._compare(outputs, halves, time, end, EVERY if regular else 1)
+            arrays = outputs.ctypes.data, halves.ctypes.data
+            self._library.check(check, *arrays, time, end, due == REGULAR)
         outputs[:] = before
 
     def _halves(self, time: float, end: float) -> Vector | None:
@@ -106,32 +109,6 @@ class StepCheck:
         except FmuFault:
             return None
         return instance.outputs.copy()
-
-    def _moved(self) -> bool:
-        """Whether this is the first step (v before it is NaN) or the last one changed v by more
-        than those before; records v and the change."""
-        outputs = self._instance.outputs
-        rates, changes = outputs[self.rates], np.zeros(len(self._names))
-        np.maximum.at(changes, self.ports, np.abs(rates - self.last))
-        moved = not np.all((changes <= JUMP * self.jumps) | (changes <= SHARE * self.scales))
-        if moved:
-            np.fmax(self.jumps, changes, out=self.jumps)
-        size = np.fmax(np.abs(rates), AT_REST * np.abs(outputs[self.bases]))
-        np.fmax.at(self.scales, self.ports, size)
-        self.last[:] = rates
-        return moved
-
-    def _compare(self, whole: Vector, halves: Vector, time: float, end: float, weight: int) -> None:
-        estimate = np.zeros(len(self._names))
-        np.maximum.at(estimate, self.ports, np.abs(whole[self.rates] - halves[self.rates]))
-        if not np.all(np.isfinite(estimate)):
-            return
-        if (k := self.count.value) == len(self.times):
-            self.estimates = np.concatenate([self.estimates, np.zeros_like(self.estimates)])
-            self.times, self.weights = (np.append(v, 0.0 * v) for v in (self.times, self.weights))
-            self.changed()
-        self.estimates[k], self.times[k], self.weights[k] = estimate, time, weight
-        self.count.value, self.size.value = k + 1, max(self.size.value, end - time)
 
     def errors(self) -> StepErrors | None:
         """What was found; None before the first check."""

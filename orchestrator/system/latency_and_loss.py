@@ -18,8 +18,6 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.holds import Hold
-from hapticlink.orchestrator.holds.hold import Vector
 from hapticlink.orchestrator.scene.scene_tables import Latency
 
 
@@ -74,23 +72,3 @@ class Link:
                 continue
             self._newest = stamp
             yield arrival, stamp, item
-
-
-class Late(Hold):
-    """A hold that receives its samples through a link."""
-
-    def __init__(self, hold: Hold, link: Link) -> None:
-        self.hold, self.link = hold, link
-        self._started = False
-
-    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        if self._started:
-            self.link.send(stamp, sample.copy(), arrival)
-        else:
-            self.hold.push(stamp, sample, arrival)
-            self._started = True
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        for arrival, stamp, sample in self.link.arrived(tick):
-            self.hold.push(stamp, sample, arrival)
-        return self.hold.value(tick, ahead)

@@ -16,12 +16,8 @@ from hapticlink.orchestrator.run.real_time import RealTimeRun
 from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import scene
 from tests.orchestrator.wall_clock import MS, WallClock
-from tests.shared_fixtures import needs_compiled_loop
 
 Turn = Callable[[hl.RealTime], object]
-
-
-pytestmark = needs_compiled_loop
 
 
 def ran(name: str, turn: Turn, *options: str, clock: WallClock | None = None) -> hl.Run:

@@ -22,7 +22,6 @@ import pytest
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
@@ -91,7 +90,7 @@ def changed_run(scene: Scene, apply: Callable[[LiveRun, Any], None]) -> np.ndarr
     rows, changes = list[np.ndarray](), [*CHANGES]
     with built(scene) as system, ExitStack() as stack:
         simulation = Simulation(system, RunResults(), stack)
-        loop = CompiledLoop(Plan(system), simulation, load())
+        loop = CompiledLoop(Plan(system), simulation)
         simulation.start()
         live = LiveRun(scene)
         vars(live).update(

@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).absolute().parent
-LAWS = runpy.run_path(str(HERE / "generate_laws.py"))
+HOLD_TABLE: str = runpy.run_path(str(HERE.parents[1] / "holds" / "table.py"))["hold_table_h"]()
+"""The header hold_table.h."""
 LINKING = runpy.run_path(str(HERE.parents[2] / "fmus" / "native" / "linking.py"))
 SOURCES = sorted(path.name for path in HERE.glob("*.[ch]"))
 # No contraction: a fused multiply-add rounds once where Python rounds twice.
@@ -61,7 +62,7 @@ def name(tag: str | None = None) -> str:
     sha = hashlib.sha256()
     for source in SOURCES:
         sha.update((HERE / source).read_bytes().replace(b"\r\n", b"\n"))
-    sha.update(LAWS["text"]().encode())
+    sha.update(HOLD_TABLE.encode())
     system = (tag or this_machine() or "").partition("_")[0]
     return f"loop-{sha.hexdigest()[:16]}{_ENDINGS.get(system, '.so')}"
 
@@ -96,7 +97,7 @@ def compile_loop(library: Path, compiler: Compiler) -> None:
             command = [*compiler.command, *FLAGS, *arguments]
             subprocess.run(command, cwd=room, check=True, capture_output=True, env=environment)
 
-        (room / "hold_laws.h").write_text(LAWS["text"](), encoding="utf-8")
+        (room / "hold_table.h").write_text(HOLD_TABLE, encoding="utf-8")
         sources = [HERE / source for source in SOURCES if source.endswith(".c")]
         for source in sources:
             run("-I.", "-c", "-o", f"{source.stem}.o", str(source))

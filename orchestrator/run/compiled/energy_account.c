@@ -1,17 +1,29 @@
-/* The holds that observe the energy that they generate: energy_account.py, passive.py and
- * nearly_energy_preserving.py, operation by operation. */
+/* The holds `passive` and `nepce`: a zero-order hold plus a correction, evaluated once at each tick read,
+ * and the passivity observer of both: the energy that a held effort generates.
+ *
+ * By axis, each held force F_held paired with the displacement dx of the step that it acts over:
+ *
+ * E(t) = sum F_held dx - sum (F_{k-1} + F_k)/2 (x(t_k) - x(t_{k-1})) - F_n (x(t) - x(t_n))
+ *
+ * The ideal force is taken as linear in the displacement between samples (exact for a spring) and,
+ * after the newest sample t_n, as F_n, since later samples are not known yet. A delayed sample is
+ * paired with the target's position at its stamp, interpolated linearly between the target's steps.
+ * Up to t_n this equals what meters.c measures, except for samples that are lost or
+ * overtaken, which the target never sees.
+ *
+ * By axis: motion, the displacement of the last step; steady and predicted, that of the coming step at
+ * the target's present velocity, and with the acceleration of the last step as well (m, rad); largest,
+ * the larger magnitude of the last two samples; swing, the running maximum of the difference between the
+ * source's mean over an interval between stamps and a sample held during it (N, N.m); beta, the trust in
+ * the prediction; travelled, the displacement of the last period. premises: the steps by entry so far,
+ * how many of them were outside the premises of the hold, or of its tank, and the energy (J) that such
+ * steps can have generated beyond what is proved. */
 
 #include "loop.h"
+#include "hold_table.h"
 
 #include <math.h>
 #include <string.h>
-
-static double *vector(const Account *a, int64_t i) { return a->vectors + i * a->n; }
-
-enum {
-    SAMPLE_, HELD, X, X_STAMP, WORK, IDEAL, MOTION, STEADY, PREDICTED, V, GAIN, LARGEST, SWING, NOW,
-    AVERAGE, AT_STAMP, BETA, LAST, TRAVELLED, /* BETA, of `passive`, is the correction of `nepce` */
-};
 
 /* The larger of two as NumPy has it: the first where they are equal, NaN where one is. */
 static double larger(double a, double b) { return a >= b || isnan(a) ? a : b; }
@@ -31,12 +43,14 @@ int account_has_room(const Account *a, int64_t samples) {
     return a->path.count < a->room && a->until.count < a->room && a->fresh.count + samples <= a->room;
 }
 
-void account_push(Account *a, const double *sample, int64_t stamp, int64_t arrival) {
-    queue(&a->fresh, a->n, stamp, sample);
-    a->delayed = arrival > stamp;
+int push_account(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
+    queue(&h->account->fresh, h->n, stamp, y);
+    h->account->delayed = arrival > stamp;
+    return 0;
 }
 
-/* Account._position_at */
+/* The target's position at `stamp`, interpolated linearly between its steps; drops the path before it,
+ * since stamps never decrease. */
 static void position_at(Account *a, int64_t stamp, double *x) {
     const Queue *p = &a->path;
     int64_t passed = 0;
@@ -50,27 +64,30 @@ static void position_at(Account *a, int64_t stamp, double *x) {
     }
 }
 
-/* The part of Account._account for one new sample. */
+/* Adds the ideal work up to a new sample. */
 static void book(Account *a, int64_t stamp, const double *y) {
-    double *sample = vector(a, SAMPLE_), *x_stamp = vector(a, X_STAMP), *there = vector(a, AT_STAMP);
+    double *sample = a->sample, *x_stamp = a->x_stamp, *there = a->at_stamp;
     position_at(a, stamp, there);
     for (int64_t k = 0; k < a->n; k++) {
         const double middle = (sample[k] + y[k]) / 2;
-        vector(a, IDEAL)[k] += middle * (there[k] - x_stamp[k]);
-        vector(a, LARGEST)[k] = larger(fabs(y[k]), fabs(sample[k]));
-        vector(a, AVERAGE)[k] += middle * (double)(stamp - a->stamp);
+        a->ideal[k] += middle * (there[k] - x_stamp[k]);
+        a->largest[k] = larger(fabs(y[k]), fabs(sample[k]));
+        a->average[k] += middle * (double)(stamp - a->stamp);
         x_stamp[k] = there[k];
         sample[k] = y[k];
     }
     a->stamp = stamp;
 }
 
-/* Account._watch */
+/* Counts the entries of the step that has ended, and what is at stake in it: with a tank the work beyond
+ * what was set aside for it; of `passive` (r + c) |dx| of a step that is not as predicted, (1 - beta) C |dx|
+ * of any other; of `nepce` that of a step against the motion of the last period, in which the correction
+ * does the opposite work. */
 static void watch(Account *a) {
     for (int64_t k = 0; k < a->n; k++) {
-        const double moved = vector(a, MOTION)[k], ahead = vector(a, PREDICTED)[k];
-        const double effort = vector(a, HELD)[k], added = fabs(effort - vector(a, SAMPLE_)[k]);
-        const double furthest = fabs(ahead) + fabs(vector(a, STEADY)[k]), way = fabs(moved);
+        const double moved = a->motion[k], ahead = a->predicted[k];
+        const double effort = a->held[k], added = fabs(effort - a->sample[k]);
+        const double furthest = fabs(ahead) + fabs(a->steady[k]), way = fabs(moved);
         double stake = 0.0;
         int outside;
         if (a->tank) {
@@ -78,10 +95,12 @@ static void watch(Account *a) {
             outside = stake > 0.0;
             if (!outside) stake = 0.0;
         } else if (a->passive) {
+            /* Without friction, as a linearisation has it, beta is 0. */
+            const double left_out = a->beta[k] > 0.0 ? 1.0 / a->beta[k] - 1.0 : 0.0;
             outside = moved * ahead < 0.0 || way > furthest;
-            stake = (outside ? vector(a, SWING)[k] + added : (1.0 / vector(a, BETA)[k] - 1.0) * added) * way;
+            stake = (outside ? a->swing[k] + added : left_out * added) * way;
         } else {
-            outside = moved * vector(a, TRAVELLED)[k] < 0.0 && added > 0.0;
+            outside = moved * a->travelled[k] < 0.0 && added > 0.0;
             stake = outside ? added * way : 0.0;
         }
         a->premises[0] += 1.0;
@@ -90,36 +109,37 @@ static void watch(Account *a) {
     }
 }
 
+/* Adds the held work since the last tick, and the ideal work up to each new stamp. */
 static void account(Account *a, const Loop *l, int64_t tick) {
     const int64_t n = a->n;
     const size_t bytes = n * sizeof(double);
-    double *x = vector(a, NOW), *before = vector(a, X), *mean = vector(a, AVERAGE);
+    double *x = a->now, *before = a->x, *mean = a->average;
     read_all(&a->displacement, l->values, x);
     if (a->tick < 0) {
         memcpy(before, x, bytes);
-        memcpy(vector(a, X_STAMP), x, bytes);
+        memcpy(a->x_stamp, x, bytes);
         a->stamp = a->fresh.ticks[0];
-        memcpy(vector(a, SAMPLE_), a->fresh.values, bytes);
+        memcpy(a->sample, a->fresh.values, bytes);
         a->tick = tick;
-        if (a->velocity.n) read_all(&a->velocity, l->values, vector(a, V));
+        if (a->velocity.n) read_all(&a->velocity, l->values, a->v);
     }
     for (int64_t k = 0; k < n; k++) {
-        vector(a, MOTION)[k] = x[k] - before[k];
-        vector(a, WORK)[k] += vector(a, HELD)[k] * vector(a, MOTION)[k];
+        a->motion[k] = x[k] - before[k];
+        a->work[k] += a->held[k] * a->motion[k];
         mean[k] = 0.0;
     }
     a->steps = tick - a->tick;
     if (a->steps) watch(a);
     const int64_t passed = a->stamp;
     if (!a->path.count || tick > a->path.ticks[a->path.count - 1]) queue(&a->path, n, tick, x);
-    if (a->fresh.count) queue(&a->until, n, tick, vector(a, SAMPLE_));
+    if (a->fresh.count) queue(&a->until, n, tick, a->sample);
     for (int64_t i = 0; i < a->fresh.count; i++) book(a, a->fresh.ticks[i], a->fresh.values + i * n);
     if (a->stamp > passed) {
         Queue *u = &a->until;
         for (int64_t k = 0; k < n; k++) {
             mean[k] /= (double)(a->stamp - passed);
             for (int64_t i = 0; i < u->count; i++)
-                vector(a, SWING)[k] = larger(vector(a, SWING)[k], fabs(mean[k] - u->values[i * n + k]));
+                a->swing[k] = larger(a->swing[k], fabs(mean[k] - u->values[i * n + k]));
         }
         int64_t known = 0;
         while (known < u->count && (u->ticks[known] <= a->stamp || !a->delayed)) known++;
@@ -130,55 +150,59 @@ static void account(Account *a, const Loop *l, int64_t tick) {
     memcpy(before, x, bytes);
 }
 
+/* The displacement of the coming step, of `step` ticks or the length of the last one if that is longer.
+ * Without a velocity output, the last displacement is repeated. */
 static void predict(Account *a, const Loop *l, double step) {
     if (!a->velocity.n) {
-        memcpy(vector(a, STEADY), vector(a, MOTION), a->n * sizeof(double));
-        memcpy(vector(a, PREDICTED), vector(a, MOTION), a->n * sizeof(double));
+        memcpy(a->steady, a->motion, a->n * sizeof(double));
+        memcpy(a->predicted, a->motion, a->n * sizeof(double));
         return;
     }
-    double *v = vector(a, NOW);
+    double *v = a->now;
     read_all(&a->velocity, l->values, v);
     if ((double)a->steps > step) step = (double)a->steps;
     const double seconds = step * l->numerator / l->denominator;
     for (int64_t k = 0; k < a->n; k++) {
-        if (a->steps) vector(a, GAIN)[k] = (v[k] - vector(a, V)[k]) / (double)a->steps;
-        vector(a, V)[k] = v[k];
-        vector(a, STEADY)[k] = v[k] * seconds;
-        vector(a, PREDICTED)[k] = vector(a, STEADY)[k] + vector(a, GAIN)[k] * (step / 2 * seconds);
+        if (a->steps) a->gain[k] = (v[k] - a->v[k]) / (double)a->steps;
+        a->v[k] = v[k];
+        a->steady[k] = v[k] * seconds;
+        a->predicted[k] = a->steady[k] + a->gain[k] * (step / 2 * seconds);
     }
 }
 
-/* Account.credit */
-double account_credit(const Account *a, const Loop *l) {
-    double *x = vector(a, NOW), work = 0.0;
+/* The energy (J) that the far side has put in until now, with what was set aside for it. */
+EXPORT double hapticlink_credit(const Account *a, const Loop *l) {
+    double *x = a->now, work = 0.0;
     read_all(&a->displacement, l->values, x);
     for (int64_t k = 0; k < a->n; k++)
-        work += vector(a, WORK)[k] + vector(a, HELD)[k] * (x[k] - vector(a, X)[k]);
+        work += a->work[k] + a->held[k] * (x[k] - a->x[k]);
     return a->promised - work;
 }
 
-/* Account._share */
+/* Limits the held effort to the energy available in the tank, and sets that aside. */
 static void share(Account *a, int64_t tick) {
     if (a->since == tick) {
         a->tank->available += a->promise;
         a->promised -= a->promise;
     }
     a->promise = tank_share(
-        a->tank, vector(a, HELD), vector(a, PREDICTED), vector(a, STEADY),
-        a->passive ? vector(a, BETA) : NULL
+        a->tank, a->held, a->predicted, a->steady,
+        a->beta
     );
     a->promised += a->promise;
     a->since = tick;
 }
 
 static double generated(const Account *a, int64_t k) {
-    const double moved = vector(a, X)[k] - vector(a, X_STAMP)[k];
-    return vector(a, WORK)[k] - vector(a, IDEAL)[k] - vector(a, SAMPLE_)[k] * moved;
+    const double moved = a->x[k] - a->x_stamp[k];
+    return a->work[k] - a->ideal[k] - a->sample[k] * moved;
 }
 
+/* Distance since the stamp of the newest sample: |x - x(t_n)|, or, where samples are delayed and several
+ * may be in transit, the length of the path. */
 static double travelled(const Account *a, int64_t k) {
-    double from = vector(a, X_STAMP)[k], length = 0.0;
-    if (!a->delayed) return fabs(vector(a, X)[k] - from);
+    double from = a->x_stamp[k], length = 0.0;
+    if (!a->delayed) return fabs(a->x[k] - from);
     for (int64_t i = 0; i < a->path.count; i++) {
         if (a->path.ticks[i] <= a->stamp) continue;
         length += fabs(a->path.values[i * a->n + k] - from);
@@ -187,47 +211,98 @@ static double travelled(const Account *a, int64_t k) {
     return length;
 }
 
-static const double STOPPED = 0.01; /* passive.STOPPED */
+/* Passive hold: a zero-order hold with a friction that keeps the energy it generates at or below 0.
+ *
+ * F_held = F_n - beta sign(d) c, by axis, at every step of the target, with d its predicted
+ * displacement over the step, v T + dv T/2 (v its velocity, dv the change of v over the last step):
+ *
+ * c = max(0, r + P/D),    P = E + r |x - x(t_n)|,    D = |d| + |v| T where P <= 0, |d| where P > 0
+ *
+ * The passivity observer gives E, the energy generated (above), and r, the running maximum
+ * of the difference between the source's mean between two stamps and the force held meanwhile. P is
+ * thus an upper bound of the energy generated once the samples to come are known. The series
+ * passivity controller after Hannaford & Ryu (IEEE Trans. Robotics and Automation 18, 2002) keeps a
+ * reserve r D for the worst case of the next step. c is at most the larger of r and the last two
+ * samples.
+ *
+ * Theorem. Let the displacement dx of each step have the predicted sign and |dx| <= D (so that
+ * beta = 1), and let the mean of the source from t_n until the next sample is known differ from F_n by
+ * at most r. Then the energy really generated, m, is at most P, and a step adds at most (r - c) |dx|:
+ * where P <= 0, m' <= P + (r - c) |dx| <= 0; where P > 0, c >= r and m' <= m. So m <= 0 throughout. A
+ * difference R larger than the r so far generates at most (R - r) W until it is known, W the distance
+ * from a stamp until then, so that m <= R W at any time. Each step outside the premises generates at
+ * most (R + C) |dx| in addition, C the largest c, and each other one while beta < 1 at most
+ * (1 - beta) C |dx|, since m' <= m + (r - beta c) |dx|.
+ *
+ * With a latency the premises extend over it: |x - x(t_n)| is then the path length since t_n, as
+ * several samples may be in transit, and W grows with it. The theorem does not cover lost or overtaken
+ * samples, whose effect the target cannot know.
+ *
+ * No hold is passive without such premises. m' - m = (F_held - mean) dx, and mean and dx are only
+ * determined after F_held is chosen: for any choice, even 0, one of mean = F_n +- r with one of
+ * dx = +-d generates r d or more, at every step. Where a step goes back by more than a hundredth of
+ * the prediction, beta is halved (a friction that reverses the target is too large); after that it
+ * grows by a tenth a step. A smaller step back has been stopped, as a friction may, and leaves beta. */
 
-/* Passive.correction */
-static double passive(const Account *a, int64_t k) {
-    double *beta = vector(a, BETA) + k, *last = vector(a, LAST) + k;
-    const double predicted = vector(a, PREDICTED)[k], swing = vector(a, SWING)[k];
-    if (vector(a, MOTION)[k] * *last < -STOPPED * (*last * *last))
+/* A step back by less than this part of the predicted displacement counts as none: a friction that
+ * just stops the target is not too large. */
+static const double STOPPED = 0.01;
+
+/* -beta sign(d) c of entry k. */
+static double friction(const Account *a, int64_t k) {
+    double *beta = a->beta + k, *last = a->last + k;
+    const double predicted = a->predicted[k], swing = a->swing[k];
+    if (a->motion[k] * *last < -STOPPED * (*last * *last))
         *beta /= 2;
     else
         *beta = 1.1 * *beta > 1.0 ? 1.0 : 1.1 * *beta;
     *last = predicted;
     const double bound = generated(a, k) + swing * travelled(a, k);
-    const double distance = fabs(predicted) + (bound > 0.0 ? 0.0 : fabs(vector(a, STEADY)[k]));
-    const double friction = swing + (distance > 0.0 ? bound / distance : 0.0);
-    const double most = larger(swing, vector(a, LARGEST)[k]);
+    const double distance = fabs(predicted) + (bound > 0.0 ? 0.0 : fabs(a->steady[k]));
+    const double size = swing + (distance > 0.0 ? bound / distance : 0.0);
+    const double most = larger(swing, a->largest[k]);
     const double sign = predicted > 0.0 ? 1.0 : predicted < 0.0 ? -1.0 : predicted == 0.0 ? 0.0 : predicted;
-    return -sign * *beta * (friction < 0.0 ? 0.0 : friction > most ? most : friction);
+    return -sign * *beta * (size < 0.0 ? 0.0 : size > most ? most : size);
 }
 
-/* NearlyEnergyPreserving.correction of a new sample */
-static double nearly(const Account *a, int64_t k) {
-    double *last = vector(a, LAST) + k;
-    const double moved = vector(a, X)[k] - *last, most = vector(a, LARGEST)[k];
-    *last = vector(a, X)[k];
-    vector(a, TRAVELLED)[k] = moved;
+/* Nearly energy-preserving hold: a zero-order hold that returns the energy error accumulated so
+ * far, of either sign, over the next period.
+ *
+ * F_held = F_n - E/D by axis, with E the energy generated (above) and D the displacement
+ * over the last period; the correction is limited to the larger magnitude of the last two samples.
+ * On a steady motion it is the half-step lead, F_n + (F_n - F_{n-1})/2. After the nearly
+ * energy-preserving coupling element of Benedikt, Watzenig, Zehetner & Hofer (5th Int. Conf. on
+ * Computational Methods for Coupled Problems, 2013). */
+
+/* The effort that does the work -E over that displacement; 0 where the target does not move. */
+static double repayment(const Account *a, int64_t k) {
+    double *last = a->last + k;
+    const double moved = a->x[k] - *last, most = a->largest[k];
+    *last = a->x[k];
+    a->travelled[k] = moved;
     const double effort = moved != 0.0 ? -generated(a, k) / moved : 0.0;
     return effort < -most ? -most : effort > most ? most : effort;
 }
 
-void account_value(Account *a, const Loop *l, int64_t tick, double ahead, double *value) {
-    double *held = vector(a, HELD);
+static int value(Account *a, const Loop *l, int64_t tick, double ahead, double *value) {
     if (tick > a->tick || a->fresh.count) {
         const int fresh = a->fresh.count > 0;
         account(a, l, tick);
         predict(a, l, 2 * ahead);
         for (int64_t k = 0; k < a->n; k++) {
-            double *correction = vector(a, BETA) + k;
-            if (!a->passive && fresh) *correction = nearly(a, k);
-            held[k] = vector(a, SAMPLE_)[k] + (a->passive ? passive(a, k) : *correction);
+            if (a->passive || fresh) a->correction[k] = a->passive ? friction(a, k) : repayment(a, k);
+            a->held[k] = a->sample[k] + a->correction[k];
         }
         if (a->tank) share(a, tick);
     }
-    memcpy(value, held, a->n * sizeof *value);
+    memcpy(value, a->held, a->n * sizeof *value);
+    return 0;
+}
+
+int value_passive(Hold *h, const Loop *l, int64_t tick, double ahead, double *into) {
+    return value(h->account, l, tick, ahead, into);
+}
+
+int value_nearly_energy_preserving(Hold *h, const Loop *l, int64_t tick, double ahead, double *into) {
+    return value(h->account, l, tick, ahead, into);
 }

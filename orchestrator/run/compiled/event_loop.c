@@ -1,4 +1,4 @@
-/* The order of events: python_loop.py is the specification. In real time each begins when it is due,
+/* The order of events. In real time each begins when it is due,
  * and that of a clock whose steps are taken in a thread once they are done: concurrent_fmus.py. */
 
 #include "loop.h"

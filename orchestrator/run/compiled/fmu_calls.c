@@ -161,7 +161,8 @@ int fmu_step(Fmu *f, double time, double end, double size, At *at) {
     p->time = p->begin = time;
     p->size = size;
     p->end = end;
-    if (p->ended || p->waiting <= time) return CALL;
+    if (p->waiting <= time) return SETTLE;
+    if (p->ended) return CALL;
     const int timed = !f->sparse || f->n_steps % EACH == 0;
     const int64_t begin = timed ? now() : 0;
     at->what = -1;

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
-
-import numpy as np
 
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.transfer import Transfer
-from hapticlink.orchestrator.run import step_check
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.step_check import SLOT, StepCheck
 
@@ -87,23 +83,11 @@ def of_instance(
 
 
 def _fill_with(check: StepCheck, instance: InProcess, fmu: structures.Fmu) -> None:
-    c, saved = structures.Check(), instance.slot(SLOT)
+    c, saved = check.c, instance.slot(SLOT)
     fmu.fill(check=c)
     c.fill(saved, "state", get_state=saved.get, set_state=saved.set)
     if saved.overwrites:
         fmu.fill(saved, "free_state")
-    c.fill(check, "steps", "count", "bases", "rates", "ports", "scales", "jumps", "last", "size")
-    c.fill(n=len(check.ports), n_ports=len(check.scales))
-    c.fill(every=step_check.EVERY, first=step_check.FIRST, at_rest=step_check.AT_REST)
-    c.fill(jump=step_check.JUMP, share=step_check.SHARE)
-    scratch = np.zeros((2, len(instance.outputs)))
-    c.fill(before=scratch[0], halves=scratch[1])
-    check.changed = partial(_fill_check, c, check)
-    check.changed()
-
-
-def _fill_check(c: structures.Check, check: StepCheck) -> None:
-    c.fill(check, "times", "weights", errors=check.estimates, room=len(check.times))
 
 
 def of_setter(setter: Setter, instance: InProcess, c: structures.Setter, memory: Memory) -> None:

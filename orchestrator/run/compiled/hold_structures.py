@@ -1,87 +1,37 @@
-"""Holds in C, made from those in Python, which are their specification."""
+"""Holds and energy tanks as structures of the compiled loop."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.holds.energy_account import Account
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank
-from hapticlink.orchestrator.holds.hold import Hold, Vector
-from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
-from hapticlink.orchestrator.holds.passive import Passive
-from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPosition
+from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.errors import Fault, shortened
+from hapticlink.orchestrator.holds.table import IN_PYTHON, ROWS, HoldRow
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
-from hapticlink.orchestrator.run.make_holds import WithFurther
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
+from hapticlink.orchestrator.run.hold_parts import (
+    HoldParts,
+    SpringParts,
+    describe_holds,
+    describe_spring,
+)
+from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.scene.scene_tables import SetSpring
+from hapticlink.orchestrator.system.latency_and_loss import Link
 
-KINDS: Mapping[type[Hold], int] = {
-    HOLDS[name]: kind
-    for name, kind in {
-        "zoh": structures.ZERO_ORDER,
-        "latest": structures.ZERO_ORDER,
-        "lead": structures.LEAD,
-        "foh": structures.FIRST_ORDER,
-        "foh-derivative": structures.FIRST_ORDER_DERIVATIVE,
-        "second-order": structures.SECOND_ORDER,
-        "hermite": structures.HERMITE,
-        "slope": structures.SLOPE,
-        "delayed": structures.DELAYED,
-        "smooth": structures.SMOOTH,
-        "mean": structures.MEAN,
-        "pspm": structures.PASSIVE_SET_POSITION,
-        "passive": structures.OBSERVED,
-        "nepce": structures.OBSERVED,
-    }.items()
-}
-"""The holds that have C, with their names in loop.h."""
 FEW = 16
 """Samples that there is room for at first."""
-
-
-class Parts(NamedTuple):
-    """What a hold is made of: its own class, and what wraps it."""
-
-    own: Hold
-    angles: Unwrapped | None
-    matrix: Projector | Semidefinite | None
-    link: Link | None
-    further: Reader | None
-    far: tuple[Account, Vector] | None
-    """The account on the far side of the spring that it sets, and where its energy is written."""
-
-
-def parts(hold: Hold) -> Parts:
-    """The parts of a hold that `make_hold` has made; `own` is a wrapper that has no C where one is
-    left."""
-    further, link, angles, matrix, far = None, None, None, None, None
-    if isinstance(hold, WithFurther):
-        further, far, hold = hold.further, hold.account, hold.hold
-    if isinstance(hold, Late):
-        link, hold = hold.link, hold.hold
-    if isinstance(hold, Unwrapped):
-        angles = hold
-        hold = hold.hold
-    elif isinstance(hold, Projector | Semidefinite):
-        matrix = hold
-        hold = hold.hold
-    return Parts(hold, angles, matrix, link, further, far)
-
-
-def can(hold: Hold, repeats: bool) -> bool:
-    """Whether there is C for a hold: not for classes of plugins, not for matrices whose hold needs
-    more than their samples, and not for samples in transit or an energy account where steps are
-    repeated."""
-    pieces = parts(hold)
-    if pieces.matrix and pieces.own.needs:
-        return False
-    grows = pieces.link or isinstance(pieces.own, Account)
-    return type(pieces.own) in KINDS and not (grows and repeats)
+ACCOUNT = (
+    *("now", "average", "at_stamp"),
+    *("sample", "held", "x", "x_stamp", "work", "ideal", "motion", "steady", "predicted", "v"),
+    *("gain", "largest", "swing", "beta", "correction", "last", "travelled"),
+)
+"""The vectors of an energy account."""
 
 
 def _with_arrays(kind: type[structures.Structure], words: Mapping[str, int]) -> Any:
@@ -95,33 +45,16 @@ def _with_arrays(kind: type[structures.Structure], words: Mapping[str, int]) -> 
     return c
 
 
-def compiled_tank(tank: EnergyTank) -> structures.Tank:
-    """An energy tank in C."""
-    n, near = len(tank.stiffness), tank.near
-    assert isinstance(near.position, Reader)
-    several = dict.fromkeys(("newest", "modulated"), 2 * n)
-    several |= dict.fromkeys(("x", "moved", "force", "withheld"), n)
-    c = _with_arrays(structures.Tank, several)
-    c.fill(near, "period", "sampled", n=n, tick=-1)
-    c.fill(tank, "least")
-    constant = {"stiffness": tank.stiffness, "damping": tank.damping, "turns": near.turns}
-    c.fill(near.position, "where", **{k: np.ascontiguousarray(v) for k, v in constant.items()})
-    if near.velocity:
-        assert isinstance(near.velocity, Reader)
-        c.fill(velocity=near.velocity.where)
-    return c
-
-
-def _compiled_account(hold: Account, tank: structures.Tank | None) -> structures.Account:
-    """The energy account of a hold in C."""
-    vectors = np.zeros((19, len(hold.sample)))
-    c = structures.Account(tick=-1, since=-1, passive=isinstance(hold, Passive))
-    vectors[16] = 1.0 if c.passive else 0.0  # beta, or no correction
-    c.fill(hold, "premises", n=len(hold.sample), vectors=vectors, tank=tank)
-    for reader, of in ((hold.displacement, c.displacement), (hold.velocity, c.velocity)):
-        if reader:
-            assert isinstance(reader, Reader)
-            fill_reader(of, reader)
+def make_tank(parts: SpringParts) -> structures.Tank:
+    """The energy tank of a spring-damper."""
+    n = len(parts.stiffness)
+    words = dict.fromkeys(("newest", "modulated"), 2 * n)
+    words |= dict.fromkeys(("x", "moved", "force", "withheld"), n) | {"least": 1}
+    c = _with_arrays(structures.Tank, words)
+    c.fill(parts, "stiffness", "damping", "turns", "period", "sampled", n=n, tick=-1)
+    c.fill(where=parts.position.where)
+    if parts.velocity:
+        c.fill(velocity=parts.velocity.where)
     return c
 
 
@@ -137,61 +70,135 @@ def fill_generator(c: structures.Pcg64, seed: int) -> None:
         words[:] = divmod(number, 2**64)
 
 
-class CompiledHold(Hold):
-    """A hold in C. sources: the indices of its samples in the signal vector; held: where `evaluate`
-    puts its value. loop: the address of the Loop that it runs in."""
+class CompiledHold:
+    """A hold of the loop at address `loop`, whose `evaluate` puts its value into `held`.
+
+    c: its structure, at `address`. places: the indices of a sample's entries among the signals.
+    own: the hold of a plugin that is called back, else None; error: what that has raised. premises:
+    of a hold that observes its energy, the steps by entry so far, how many of them were outside the
+    premises of the hold, or of its tank, and the energy (J) that such steps can have generated
+    beyond what is proved.
+    """
 
     def __init__(
         self,
         library: ctypes.CDLL,
         loop: int,
-        hold: Hold,
-        sources: Sequence[int],
+        parts: HoldParts,
         held: Vector,
+        connection: str = "",
         tank: structures.Tank | None = None,
     ) -> None:
-        self.own, angles, matrix, link, further, self.far = parts(hold)
-        own = self.own
-        n, depth = len(held), getattr(own, "depth", 1)
-        places = [*sources, *(further.where if further else ())]
-        width, turned = len(places), len(angles.angles) if angles else 0
-        rows = matrix.n if matrix else 0
+        self.parts, self.tank, self._connection = parts, tank, connection
+        own = isinstance(parts.kind, HoldRow)
+        self.row = row = parts.kind if isinstance(parts.kind, HoldRow) else IN_PYTHON
+        n, places, turned = len(held), [*parts.sources, *parts.further], len(parts.turns)
+        width, rows = len(places), math.isqrt(n) if parts.matrix else 0
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
-        self._width, self._further = width, further
-        arrays = {"samples": depth * width, "vectors": 8 * n, "last": turned, "scale": 2 * rows}
-        self._c = c = _with_arrays(structures.Hold, arrays)
-        c.fill(kind=KINDS[type(own)], n=n, width=width, depth=depth)
-        c.fill(sources=np.array(places, np.intp), held=held)
-        if angles:
-            turns = np.array(angles.turn, np.float64)
-            c.fill(angles=np.array(angles.angles, np.int64), turns=turns, n_angles=turned)
-        if matrix:
-            c.manifold = 1 if isinstance(matrix, Projector) else 2
-            c.rows, c.rank = rows, -1
+        self.width, self.places = width, np.array(places, np.intp)
+        words = {"samples": row.depth * width, "memory": row.remembers * n, "scratch": 6 * n}
+        words |= {"last": turned, "chosen": rows}
+        words["scale"] = rows if parts.matrix == "semidefinite" else 0
+        self.c = c = _with_arrays(structures.Hold, words)
+        c.fill(row, "depth", "remembers", kind=ROWS.index(row), n=n, width=width)
+        c.fill(sources=self.places, held=held)
+        if turned:
+            angles, turns = np.array([*parts.turns]), np.array([*parts.turns.values()])
+            c.fill(angles=angles.astype(np.int64), turns=turns, n_angles=turned)
+        if parts.matrix:
+            kinds = {"projector": structures.PROJECTOR, "semidefinite": structures.SEMIDEFINITE}
+            c.fill(manifold=kinds[parts.matrix], rows=rows, rank=-1)
         self._growing: list[tuple[structures.Structure, dict[str, int]]] = []
-        self.link = self._account = None
-        if link:
+        self.link: Any = None
+        self.account: Any = None
+        self.premises: Vector | None = None
+        self.own: Any = None
+        if parts.latency:
+            link = Link(parts.latency, parts.base)
             low, spread, unit = link.whole_numbers()
             self.link = structures.Link(low=low, spread=spread, unit=unit, loss=link.latency.loss)
             fill_generator(self.link.generator, link.latency.seed)
             self._growing = [(self.link, {"arrivals": 1, "stamps": 1, "samples": width})]
-        if isinstance(own, Account):
-            self._account = account = _compiled_account(own, tank)
+        if own and row.needs == "power":
+            self.account = account = self._make_account(n, tank)
             queues = account.path, account.until, account.fresh
             self._growing += [(queue, {"ticks": 1, "values": n}) for queue in queues]
-        c.fill(link=self.link, account=self._account)
+        c.fill(link=self.link, account=self.account)
         self.room = 0
         self.grow()
-        if tank and isinstance(own, PassiveSetPosition):
-            c.fill(own, "row", tank=tank)
+        if tank and row.needs == "spring":
+            c.fill(parts, "row", tank=tank)
+        self.error: BaseException | None = None
+        if not own:
+            self._call_back(parts.kind)
         self.address: int = ctypes.addressof(c)
 
-    def join(self, holds: Iterable[CompiledHold]) -> None:
-        """Find the account on the far side of the spring that it sets among `holds`."""
-        if self.far:
-            observer, credit = self.far
-            accounts = {id(h.own): h._account for h in holds}
-            self._c.fill(far=accounts[id(observer)], credit=credit)
+    def _make_account(self, n: int, tank: structures.Tank | None) -> Any:
+        account = _with_arrays(structures.Account, dict.fromkeys(ACCOUNT, n) | {"premises": 3})
+        account.fill(n=n, tick=-1, since=-1, passive=self.row.value == "passive", tank=tank)
+        array(account.beta, n)[:] = 1.0
+        self.premises = array(account.premises, 3)
+        parts = self.parts
+        for reader, of in (
+            (parts.displacement, account.displacement),
+            (parts.velocity, account.velocity),
+        ):
+            if reader:
+                fill_reader(of, reader)
+        return account
+
+    # --- holds of plugins -----------------------------------------------------------------
+
+    def _call_back(self, kind: Any) -> None:
+        """Has the loop call a hold of a plugin, which `kind` makes."""
+        integer, number, pointer = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+
+        def restart() -> None:
+            self.own = kind(self.parts.context)
+
+        def take(stamp: int, sample: int, arrival: int) -> None:
+            self.own.push(stamp, array(sample, self.width), arrival)
+
+        def give(tick: int, ahead: float, value: int) -> None:
+            array(value, self._n)[:] = self._checked(self.own.value(tick, ahead))
+
+        self.own = kind(self.parts.context)
+        self.c.fill(
+            restart=ctypes.CFUNCTYPE(ctypes.c_int)(self._guarded(restart)),
+            take=ctypes.CFUNCTYPE(ctypes.c_int, integer, pointer, integer)(self._guarded(take)),
+            give=ctypes.CFUNCTYPE(ctypes.c_int, integer, number, pointer)(self._guarded(give)),
+        )
+
+    def _guarded(self, call: Callable[..., None]) -> Callable[..., int]:
+        """The call with its status, as no exception passes through C."""
+
+        def guarded(*arguments: Any) -> int:
+            try:
+                call(*arguments)
+            except BaseException as error:
+                self.error = error
+                return 1
+            return 0
+
+        return guarded
+
+    def _checked(self, value: Any) -> Vector:
+        """Raises Fault, which names the hold and its connection, for what is no vector of finite
+        numbers."""
+        if (
+            not isinstance(value, np.ndarray)
+            or value.shape != (self._n,)
+            or value.dtype.kind not in "fiu"
+            or not np.isfinite(value).all()
+        ):
+            raise Fault(
+                f"hold {self.parts.name!r} of {self._connection}: its value is "
+                f"{shortened(' '.join(repr(value).split()))}, where {self._n} finite numbers in "
+                "a NumPy array are needed"
+            )
+        return value
+
+    # --- what the loop needs ----------------------------------------------------------------
 
     def grow(self) -> None:
         """Make room for more samples."""
@@ -202,33 +209,67 @@ class CompiledHold(Hold):
                 if before:
                     array[:before] = c.kept[name]
                 c.fill(**{name: array})
-        for growing in filter(None, (self.link, self._account)):
+        for growing in filter(None, (self.link, self.account)):
             growing.room = self.room
 
-    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        if self._further:
-            sample = np.concatenate([sample, self._further()])
-        own = np.ascontiguousarray(sample, np.float64)
-        assert len(own) == self._width
-        while self._push(self.address, own.ctypes.data, stamp, arrival):
+    def serve(self, code: int) -> None:
+        """Do what `push` or `value` in C have returned for. Raises what the hold of a plugin has
+        raised."""
+        if code == structures.GROW:
             self.grow()
+        else:
+            assert self.error is not None
+            raise self.error
+
+    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
+        """Take a whole sample, with what belongs to it besides: as `Hold.push`."""
+        own = np.ascontiguousarray(sample, np.float64)
+        assert len(own) == self.width
+        while code := self._push(self.address, own.ctypes.data, stamp, arrival):
+            self.serve(code)
 
     def value(self, tick: int, ahead: float = 0.0) -> Vector:
+        """As `Hold.value`."""
         value = np.zeros(self._n)
-        while self._value(self.address, self._loop, tick, ahead, value.ctypes.data):
-            self.grow()
+        while code := self._value(self.address, self._loop, tick, ahead, value.ctypes.data):
+            self.serve(code)
         return value
 
 
-def tanks(holds: Iterable[Hold], repeats: bool) -> dict[int, structures.Tank]:
-    """The energy tanks in C, by the id of the tank, of those all whose holds have C."""
-    shared: dict[int, tuple[EnergyTank, list[Hold]]] = {}
-    for hold in holds:
-        own = parts(hold).own
-        if isinstance(own, PassiveSetPosition | Account) and own.tank:
-            shared.setdefault(id(own.tank), (own.tank, []))[1].append(hold)
-    return {
-        key: compiled_tank(tank)
-        for key, (tank, of) in shared.items()
-        if all(can(hold, repeats) for hold in of)
+def make_holds(
+    library: ctypes.CDLL, loop: structures.Loop, signals: SignalVector
+) -> tuple[dict[str, CompiledHold], list[structures.Tank]]:
+    """The hold of each connection by name, and the energy tanks, each shared by the holds of one
+    spring-damper."""
+    every = describe_holds(signals)
+    set_by_holds = [parts.spring for parts in every.values() if parts.kind.needs == "spring"]
+    tanks: dict[SetSpring | None, structures.Tank] = {
+        of: make_tank(describe_spring(of, signals)) for of in set_by_holds if of
     }
+    holds = {
+        name: make_hold(library, loop, parts, name, signals, tanks.get(parts.spring))
+        for name, parts in every.items()
+    }
+    for hold in holds.values():
+        if hold.parts.far:
+            hold.c.fill(far=holds[hold.parts.far].account)
+            hold.c.fill(credit=signals.values[hold.places[-1:][0] :])
+    return holds, [*tanks.values()]
+
+
+def make_hold(
+    library: ctypes.CDLL,
+    loop: structures.Loop,
+    parts: HoldParts,
+    connection: str,
+    signals: SignalVector,
+    tank: structures.Tank | None = None,
+) -> CompiledHold:
+    """The hold of a connection."""
+    held, address = signals.values[signals.hold(connection)], ctypes.addressof(loop)
+    return CompiledHold(library, address, parts, held, connection, tank)
+
+
+def array(address: int, n: int) -> Vector:
+    """The doubles at an address."""
+    return np.frombuffer(memoryview((ctypes.c_double * n).from_address(address)))

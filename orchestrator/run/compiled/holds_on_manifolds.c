@@ -1,6 +1,20 @@
-/* Holds of matrices: orchestrator/holds/holds_on_manifolds.py in C. Eigenvalues and eigenvectors are found by
- * Jacobi's method with cyclic order (Golub and Van Loan, Matrix Computations, 4th edition, section
- * 8.5.3), whose operations and their order are fixed, unlike those of LAPACK. A hold's vectors 4 and 5 are room for two matrices, its `scale` for as many numbers as one has. */
+/* Holds on manifolds: signals whose entries cannot be extrapolated independently.
+ *
+ * projector: a symmetric matrix with eigenvalues 0 and 1. The extrapolated matrix is replaced by the
+ * nearest projector of the same rank, onto the eigenvectors of its largest eigenvalues (Fan and
+ * Hoffman 1955). When the rank changes, the hold starts anew from the new sample.
+ *
+ * semidefinite: a symmetric matrix with no negative eigenvalue (Lambda^-1, an inertia). The negative
+ * eigenvalues of the extrapolated matrix are set to 0, in coordinates scaled by the newest sample's
+ * diagonal, so that the result does not depend on units.
+ *
+ * angle: an angle (rad, deg, ...) that its FMU wraps. Each sample is unwrapped by whole turns relative
+ * to the sample before.
+ *
+ * Matrices behind a hold that only returns samples (`gives_samples`) need none of this. Eigenvalues and
+ * eigenvectors are found by Jacobi's method with cyclic order (Golub and Van Loan, Matrix Computations, 4th
+ * edition, section 8.5.3), whose operations and their order are fixed, unlike those of LAPACK. Angles are
+ * unwrapped in holds.c. `scratch` has room for two matrices here, and for two more of the caller. */
 
 #include "loop.h"
 
@@ -69,15 +83,15 @@ static void projector(const Hold *h, double *a, double *v, double *value) {
             const double one = a[i * n + i], own = a[k * n + k];
             before += one > own || (one == own && i < k);
         }
-        h->scale[k] = before < h->rank;
+        h->chosen[k] = before < h->rank;
     }
     for (int64_t i = 0; i < n; i++)
-        for (int64_t j = 0; j < n; j++) value[i * n + j] = product(v, h->scale, n, i, j);
+        for (int64_t j = 0; j < n; j++) value[i * n + j] = product(v, h->chosen, n, i, j);
 }
 
 static void semidefinite(const Hold *h, double *a, double *v, double *value) {
     const int64_t n = h->rows;
-    const double *scale = h->scale, *all = h->scale + n;
+    const double *scale = h->scale;
     for (int64_t i = 0; i < n; i++)
         for (int64_t j = 0; j < n; j++)
             a[i * n + j] = (value[i * n + j] + value[j * n + i]) / (2 * (scale[i] * scale[j]));
@@ -85,10 +99,11 @@ static void semidefinite(const Hold *h, double *a, double *v, double *value) {
     for (int64_t k = 0; k < n; k++) {
         const double root = sqrt(a[k * n + k] > 0.0 ? a[k * n + k] : 0.0);
         for (int64_t i = 0; i < n; i++) v[i * n + k] *= root;
+        h->chosen[k] = 1.0;
     }
     for (int64_t i = 0; i < n; i++)
         for (int64_t j = 0; j < n; j++)
-            value[i * n + j] = product(v, all, n, i, j) * (scale[i] * scale[j]);
+            value[i * n + j] = product(v, h->chosen, n, i, j) * (scale[i] * scale[j]);
 }
 
 /* Notes the rank or the scale of a sample; whether the hold starts anew from it. */
@@ -98,7 +113,6 @@ int manifold_push(Hold *h, const double *y) {
         for (int64_t i = 0; i < n; i++) {
             const double size = sqrt(fabs(y[i * (n + 1)]));
             h->scale[i] = size > 0.0 ? size : 1.0;
-            h->scale[n + i] = 1.0;
         }
         return 0;
     }
@@ -110,6 +124,6 @@ int manifold_push(Hold *h, const double *y) {
 }
 
 void manifold_value(const Hold *h, double *value) {
-    double *a = h->vectors + 4 * h->n, *v = h->vectors + 5 * h->n;
+    double *a = h->scratch, *v = h->scratch + h->n;
     (h->manifold == SEMIDEFINITE ? semidefinite : projector)(h, a, v, value);
 }

@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 import ctypes
-import os
+import platform
 import subprocess
 from functools import cache
 from pathlib import Path
 
 from hapticlink.fmus import cache as fmu_cache
 from hapticlink.fmus.versions import install_command
+from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.run.compiled import build
-
-CHOICE = "HAPTICLINK_LOOP"
-"""Environment variable: with the value "python" no compiled loop is used."""
-
-
-class Unavailable(Exception):
-    """There is no compiled loop here; the text says why."""
-
-
-def load() -> ctypes.CDLL:
-    """The library. Raises Unavailable where it is switched off, or can neither be found nor be
-    compiled."""
-    if os.environ.get(CHOICE) == "python":
-        raise Unavailable(f"{CHOICE}=python")
-    return loaded()
 
 
 @cache
-def loaded() -> ctypes.CDLL:
-    """The library, whatever CHOICE says. Raises Unavailable where it can neither be found nor
-    be compiled."""
+def load() -> ctypes.CDLL:
+    """The library. Raises Fault, with the remedy, where it can neither be found nor be compiled, or
+    does not load."""
     built = build.HERE / build.name()
-    library = ctypes.CDLL(str(built if built.exists() else _compiled()))
+    path = built if built.exists() else _compiled()
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise _unavailable(f"{path} does not load: {error}") from error
     pointer, integer, number = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
     for name, arguments in {
         "events": (pointer, pointer),
@@ -42,6 +32,12 @@ def loaded() -> ctypes.CDLL:
         "value": (pointer, pointer, integer, number, pointer),
         "change_rate": (pointer, pointer),
         "change_hold": (pointer, integer, pointer, integer),
+        "credit": (pointer, pointer),
+        "meter_start": (pointer, pointer),
+        "meter_room": (pointer, integer),
+        "energy": (pointer, pointer),
+        "check_due": (pointer, pointer),
+        "check": (pointer, pointer, pointer, number, number, ctypes.c_int),
         "watch": (ctypes.c_int,),
         "guard": (ctypes.c_int,),
         "now": (),
@@ -51,7 +47,7 @@ def loaded() -> ctypes.CDLL:
         function = library[f"hapticlink_{name}"]
         function.argtypes = arguments
         setattr(library, name, function)
-    library.now.restype = integer
+    library.now.restype, library.credit.restype = integer, number
     api = ctypes.pythonapi
     calls = (api.PyGILState_Ensure, api.PyErr_Occurred, api.PyGILState_Release)
     library.python(*(ctypes.cast(call, pointer) for call in calls))
@@ -61,11 +57,11 @@ def loaded() -> ctypes.CDLL:
 def _compiled() -> Path:
     root = fmu_cache.folder()
     if root is None:
-        raise Unavailable("it is not built, and there is no cache folder to compile it to")
+        raise _unavailable("it is not built, and there is no cache folder to compile it to")
     library = root / build.name()
     if library.exists():
         return library
-    why = f"it is not built, and there is no C compiler: {install_command('native')}"
+    why = "it is not built, and there is no C compiler"
     for compiler in build.compilers():
         try:
             fmu_cache.private(root)
@@ -77,4 +73,12 @@ def _compiled() -> Path:
             why = f"it could not be compiled: {error}"
         else:
             return library
-    raise Unavailable(why)
+    raise _unavailable(why)
+
+
+def _unavailable(why: str) -> Fault:
+    machine = f"{platform.system()} on {platform.machine()}"
+    return Fault(
+        f"the event loop, a library of C, is not there for {machine}: {why}; take a wheel for "
+        f"this machine, or a C compiler: {install_command('native')}"
+    )

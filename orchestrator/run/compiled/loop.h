@@ -45,7 +45,7 @@ typedef struct {
 
 enum { DOUBLE, FLOAT, INT64, INT32, INT16, INT8, UINT64, UINT32, UINT16, UINT8, BOOL2, BOOL3 };
 
-/* Of an FMU whose steps are checked: step_check.py. `count` of `steps` steps were, with `errors`
+/* Of an FMU whose steps are checked: step_check.c. `count` of `steps` steps were, with `errors`
  * (room, n_ports) at `times`; `bases`, `rates`, `ports` and `last` are of n outputs, `scales` and
  * `jumps` of n_ports. */
 typedef struct {
@@ -95,7 +95,11 @@ typedef struct {
     double *whole;
 } Setter;
 
-/* --- holds ------------------------------------------------------------------------------------ */
+/* --- holds ------------------------------------------------------------------------------------
+ *
+ * What stands behind the line "state:" of a structure is all that a hold goes on from: state.py
+ * copies it, restores it, and reads its numbers, by these declarations alone. [n | m]: m of the n
+ * entries are in use. */
 
 /* PCG64 as NumPy has it, with a state and an increment of 128 bits each, the high words first. */
 typedef struct {
@@ -105,24 +109,28 @@ typedef struct {
 /* Samples in transit: latency_and_loss.py. A sample is lost with a probability `loss`; the latency of another
  * is (low + spread u)/unit ticks, rounded up, u uniform from 0 to 1. */
 typedef struct {
-    int64_t started, newest, sent, lost, overtaken;
-    int64_t low, spread, unit;
+    int64_t low, spread, unit, room, sent, lost, overtaken;
     double loss;
     Pcg64 generator;
-    int64_t *arrivals /* [room] */, *stamps /* [room] */;
-    double *samples /* [room * width] */;
-    int64_t n, room;
+    /* state: */
+    int64_t started, newest, n;
+    int64_t *arrivals /* [room | n] */, *stamps /* [room | n] */;
+    double *samples /* [room * width | n * width] */;
 } Link;
 
-/* Of a spring-damper: energy_tank.py. `velocity` is NULL where the near end has none. */
+/* Of a spring-damper: energy_tank.c. `velocity` is NULL where the near end has none. */
 typedef struct {
-    int64_t n, tick, sampled;
+    int64_t n, sampled;
     const double *stiffness /* [n] */, *damping /* [n] */, *turns /* [n] */;
     const int64_t *where /* [n] */, *velocity /* [n] */;
-    double period, available, needed, credited;
-    double *newest /* [2 * n] */, *modulated /* [2 * n] */;
-    double *x /* [n] */, *moved /* [n] */, *force /* [n] */, *withheld /* [n] */;
+    double period;
+    double *moved /* [n] */;
     double *least /* [1] */;              /* least energy available so far, at most 0 */
+    /* state: */
+    int64_t tick;
+    double available, needed, credited;
+    double *newest /* [2 * n] */, *modulated /* [2 * n] */;
+    double *x /* [n] */, *force /* [n] */, *withheld /* [n] */;
 } Tank;
 
 /* factor board[where] + offset; factor is NULL where it is 1 and offset 0. */
@@ -143,65 +151,73 @@ static inline void read_all(const Reader *r, const double *board, double *into) 
 
 /* Vectors with their ticks, oldest first. */
 typedef struct {
-    int64_t count, *ticks /* [room] */;
-    double *values /* [room * n] */;
+    /* state: */
+    int64_t count, *ticks /* [room | count] */;
+    double *values /* [room * n | count * n] */;
 } Queue;
 
-/* Of a hold that observes its energy: energy_account.py. `passive` or `nepce`. path: of the target,
- * until: samples and until when they were held, fresh: samples that are not accounted for; each has
- * `room`. vectors: (19, n). velocity has n = 0 where the target does not have it. */
+/* Of a hold that observes its energy: energy_account.c, where the vectors are explained. path: of the
+ * target, until: samples and until when they were held, fresh: samples that are not accounted for;
+ * each has `room`. velocity has n = 0 where the target does not have it. */
 typedef struct {
-    int64_t n, passive, tick, stamp, steps, delayed, room;
+    int64_t n, passive, room;
     Reader displacement, velocity;
-    double *vectors /* [19 * n] */;
-    Queue path, until, fresh;
     Tank *tank;                           /* of a spring on whose far side it is, or NULL */
+    double *premises /* [3] */;           /* steps of entries, those outside, energy at stake */
+    double *now /* [n] */, *average /* [n] */, *at_stamp /* [n] */;
+    /* state: */
+    int64_t tick, stamp, steps, delayed;
     double promised, promise;
     int64_t since;                        /* of the promise */
-    double *premises /* [3] */;           /* steps of entries, those outside, energy at stake */
+    double *sample /* [n] */, *held /* [n] */, *x /* [n] */, *x_stamp /* [n] */;
+    double *work /* [n] */, *ideal /* [n] */, *motion /* [n] */, *steady /* [n] */;
+    double *predicted /* [n] */, *v /* [n] */, *gain /* [n] */, *largest /* [n] */;
+    double *swing /* [n] */, *beta /* [n] */, *correction /* [n] */, *last /* [n] */;
+    double *travelled /* [n] */;
+    Queue path, until, fresh;
 } Account;
 
-/* A hold of any kind. `samples`: (depth, width), oldest first; `width` is 2 n where a sample is
- * followed by its derivative or integral. `vectors`: (8, n), what else the kind remembers, and
- * `hold_scratch`: arrays of any size are no place for the stack. */
+/* A hold of any kind, the row of hold_table.h with that index. `samples`: (depth, width), oldest first;
+ * `width` is 2 n where a sample is followed by its derivative or integral. `memory`: (remembers, n),
+ * what else the kind remembers. `scratch`: (6, n), since the stack is no place for arrays of any size: for matrices and
+ * a sample that is unwrapped, for the caller, for the kind.
+ * restart, take, give: of a hold in Python. */
 typedef struct {
-    int64_t kind, n, width, depth, count;
-    int64_t stamps[3];
-    double *samples /* [depth * width] */, *vectors /* [8 * n] */;
-    int64_t arrival, span, interval, begun;
+    int64_t kind, n, width, depth, remembers;
     const int64_t *sources /* [width] */;
     double *held /* [n] */;               /* where `evaluate` puts the value */
+    double *scratch /* [6 * n] */;
     int64_t n_angles;
     const int64_t *angles /* [n_angles] */;
     const double *turns /* [n_angles] */;
-    double *last /* [n_angles] */;
-    int64_t unwrapped;
-    Link *link;
     Tank *tank;
     int64_t row;
-    Account *account;
     const Account *far;                   /* on the far side of the spring that it sets, or NULL */
     double *credit;                       /* where what that has put in belongs */
-    int64_t manifold, rows, rank;         /* of a matrix: its kind, its rows, a projector's rank */
-    double *scale /* [2 * rows] */;
+    int64_t manifold, rows;               /* of a matrix: its kind, its rows */
+    double *chosen /* [rows] */;
+    void *restart, *take, *give;
+    /* state: */
+    int64_t count, stamps[3], arrival, span, interval, begun, unwrapped, rank;
+    double *samples /* [depth * width | count * width] */, *memory /* [remembers * n] */;
+    double *last /* [n_angles] */;        /* as they were unwrapped */
+    double *scale /* [rows * (manifold == 2)] */; /* of a semidefinite matrix */
+    Link *link;
+    Account *account;
 } Hold;
 
 enum { NO_MATRIX, PROJECTOR, SEMIDEFINITE };
 
-enum {
-    ZERO_ORDER, LEAD, FIRST_ORDER, FIRST_ORDER_DERIVATIVE, SECOND_ORDER, HERMITE, DELAYED, SMOOTH,
-    MEAN, PASSIVE_SET_POSITION, OBSERVED, SLOPE, SMOOTH_SLOPE /* of SMOOTH, no hold */
-};
-
 /* --- meters, tables --------------------------------------------------------------------------- */
 
-/* The rows of meter.py; counts: of stamps, ticks, efforts. */
+/* The rows of meters.c; counts: of stamps, ticks, efforts. */
 typedef struct {
     Reader source, held, x;
-    int64_t *counts /* [3] */, *stamps /* [room] */, *ticks /* [full] */;
-    double *samples /* [room * source.n] */, *moves /* [full * x.n] */, *efforts /* [full * x.n] */;
+    int64_t *counts /* [3] */, *stamps /* [room] */, *ticks /* [rows] */;
+    double *samples /* [room * source.n] */, *moves /* [rows * x.n] */, *efforts /* [rows * x.n] */;
     double *totals /* [3] */;
-    int64_t room, full, least;            /* of stamps and samples; of the others; these at least */
+    int64_t room, rows;                   /* there is for stamps and samples, and for the others */
+    int64_t full, least;                  /* rows at which they are added up; these at least */
 } Meter;
 
 /* Of `n` signals, at `where`, or side by side from `view` on where that is NULL, each `every`-th of
@@ -321,13 +337,16 @@ enum {
     JUDGE,       /* outputs are not finite, or beyond a bound */
     FAILED,      /* call number `what` of a get or set returned `status` */
     RAISED,      /* call `what`, -1 for doStep, has left a Python exception, which ctypes raises */
+    UNSAVED,     /* an FMU's state cannot be saved: `status` */
     STEPPED,     /* doStep returned `status`, asks to end or is cut short */
     UNRESTORED,  /* the state before a step that was checked could not be restored */
     STOP,        /* the condition to stop holds */
     KIND,        /* an event of a kind that is new */
     STARTS,      /* of clock `what`: its next window */
     PAUSE,
-    GROW,        /* a hold has no room for a sample */
+    GROW,        /* a hold, a meter or a check has no room left */
+    SETTLE,      /* settings wait for a step of the FMU */
+    REFUSED,     /* a hold in Python has raised an exception */
 };
 
 static inline double tick_time(const Loop *l, int64_t tick) { /* s */
@@ -354,6 +373,14 @@ EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t
 EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 EXPORT void hapticlink_change_rate(Clock *c, const Rate *rate);
 EXPORT int hapticlink_change_hold(Loop *l, int64_t place, Hold *h, int64_t stamp);
+EXPORT double hapticlink_credit(const Account *a, const Loop *l);
+EXPORT int hapticlink_meter_start(Meter *m, const double *board);
+EXPORT int hapticlink_meter_room(Meter *m, int64_t rows);
+EXPORT void hapticlink_energy(const Meter *m, double energy[5]);
+EXPORT int hapticlink_check_due(Check *c, const double *outputs);
+EXPORT void hapticlink_check(
+    Check *c, const double *outputs, const double *halves, double time, double end, int regular
+);
 EXPORT void hapticlink_guard(int on); /* while it is on, exit() ends the process with status 1 */
 EXPORT void hapticlink_python(int (*ensure)(void), void *(*occurred)(void), void (*release)(int));
 
@@ -385,17 +412,19 @@ int signal_came(void);
 int exception_left(void);
 void note_arithmetic(void);      /* how numbers are rounded from here on */
 void keep_arithmetic(Place *p);  /* restored where an FMU has changed it, and counted */
-double *hold_scratch(const Hold *h); /* (2, n) */
+double *hold_scratch(const Hold *h); /* (2, n), of the caller of a hold */
 int manifold_push(Hold *h, const double *y);
 void manifold_value(const Hold *h, double *value);
-void tank_credit(Tank *t, double total);
-void tank_modulate(Tank *t, const Loop *l, int64_t tick);
 double tank_share(
     Tank *t, double *effort, const double *predicted, const double *steady, const double *beta
 );
-double account_credit(const Account *a, const Loop *l);
 int account_has_room(const Account *a, int64_t samples);
-void account_push(Account *a, const double *sample, int64_t stamp, int64_t arrival);
-void account_value(Account *a, const Loop *l, int64_t tick, double ahead, double *value);
+
+/* A kind of hold: what takes a sample, and what gives the value; both return 0 or REFUSED. A row of
+ * orchestrator/holds/table.py names them, of which hold_table.h is made. */
+typedef int Push(Hold *h, const double *y, int64_t stamp, int64_t arrival);
+typedef int Value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
+
+Push push_samples; /* keeps the newest `depth` of them */
 
 #endif

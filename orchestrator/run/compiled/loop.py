@@ -14,12 +14,14 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.event_kinds import event, key_of, keyed_events
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import fill_generator
 from hapticlink.orchestrator.run.compiled.operation_records import PATIENCE, Machine
 from hapticlink.orchestrator.run.concurrent_fmus import Side
+from hapticlink.orchestrator.run.fixed_point import total
+from hapticlink.orchestrator.run.instructions import instructions
 from hapticlink.orchestrator.run.pace import Pace
-from hapticlink.orchestrator.run.python_loop import PythonLoop
 from hapticlink.orchestrator.run.simulation import Simulation
 
 WINDOW = 4096
@@ -134,17 +136,18 @@ class Events:
         self._c.fill(keys=np.array(keys, np.int64), kinds=blocks, n_kinds=len(keys))
 
 
-class CompiledLoop(PythonLoop):
-    """The same operations, in C where there is C for them; alone in real time.
+class CompiledLoop:
+    """The loop of a plan.
 
-    events: the clocks and the kinds of events. change_hold: see Machine.
+    events: the clocks and the kinds of events. complete: number of events that are complete.
+    in_python: what is carried out in Python, with the reason. change_hold: see Machine.
     """
 
-    def __init__(self, plan: Plan, simulation: Simulation, library: ctypes.CDLL) -> None:
-        self._machine = machine = Machine(library, simulation)
-        super().__init__(plan, machine.operations, machine.in_python)
+    def __init__(self, plan: Plan, simulation: Simulation) -> None:
+        self._plan, self._simulation = plan, simulation
+        self._machine = machine = Machine(simulation)
         timeline, pace = plan.system.timeline, simulation.pace
-        self.change_hold = machine.change_hold
+        self.change_hold, self.in_python, self.complete = machine.change_hold, machine.in_python, 0
         self.events = Events(machine, timeline, self._block, pace, simulation.sides)
 
     def run(self, turn: Callable[[int], object]) -> None:
@@ -158,4 +161,8 @@ class CompiledLoop(PythonLoop):
             self.complete = self.events.complete
 
     def _block(self, event: Event) -> tuple[int, int]:
-        return self._machine.block(self._instructions(event))
+        return self._machine.block([*instructions(self._plan.block(event), self._simulation)])
+
+    def iterations(self) -> Iterations | None:
+        """The counts of all fixed-point iterations together; None where there is none."""
+        return total(loop.counts for loop in self._machine.operations.loops.values())

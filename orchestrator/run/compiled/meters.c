@@ -1,16 +1,29 @@
-/* The rows of the energy meters and their sums: orchestrator/run/energy/meter.py. All of NumPy's sums
- * are taken here one after the other. */
+/* The energy that sampling and holding an effort generates: work of the held effort minus work of
+ * the ideal source.
+ *
+ * held      = sum F_held,j . (x_{j+1} - x_j)                  over the target's steps
+ * ideal     = sum (F_n + F_{n+1})/2 . (x(t_{n+1}) - x(t_n))   over the source's samples
+ * generated = held - ideal,   peak = the largest value of generated at any sample
+ *
+ * Each held effort is paired with the displacement of the step that it acts over: a spring K sampled
+ * with a zero-order hold generates 1/2 K sum dx^2 (paired with the displacement before, the same
+ * energy would appear dissipated). The ideal effort is linear in the displacement between samples,
+ * which is exact for a spring on any path; x is linear between the target's steps. An effort that
+ * changes over the substeps of a step counts with its mean.
+ *
+ * Rows are added to the sums from time to time: `totals` are the held work, the ideal work and the peak
+ * up to the first row and sample that are kept. */
 
 #include "loop.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Meter.sample; CALL where there is no room, which Python then makes. */
+/* The source's new sample. GROW where there is no room. */
 int meter_sample(Meter *m, const double *board, int64_t stamp) {
     int64_t *count = m->counts;
     if (!*count || m->stamps[*count - 1] != stamp) {
-        if (*count == m->room) return CALL;
+        if (*count == m->room) return GROW;
         m->stamps[(*count)++] = stamp;
     }
     read_all(&m->source, board, m->samples + (*count - 1) * m->source.n);
@@ -119,14 +132,32 @@ int meter_fold(Meter *m) {
     return m->counts[0] < m->room && m->counts[1] < m->full;
 }
 
-/* Meter._fold; CALL where the arrays are to grow, or a sum is not finite, which Python sees to. */
-static int fold_within_room(Meter *m) {
-    const int64_t ticks = m->counts[1];
-    if (!m->counts[0] || m->full != m->least || m->counts[2] < ticks - 1) return CALL;
-    const Sums s = sums_of(m);
-    if (2 * (ticks - s.rows) > m->least || !isfinite(s.held) || !isfinite(s.ideal)) return CALL;
-    fold(m, &s);
+/* Room for so many further rows: adds rows to the sums and drops them where there is none. GROW where a
+ * slow source still needs more than there can be. */
+EXPORT int hapticlink_meter_room(Meter *m, int64_t rows) {
+    const int64_t *counts = m->counts;
+    if (counts[1] + rows <= m->full) return 0;
+    if (counts[0]) {
+        const Sums s = sums_of(m);
+        fold(m, &s);
+    }
+    const int64_t full = 2 * counts[1] > m->least ? 2 * counts[1] : m->least;
+    if (full > m->rows) return GROW;
+    m->full = full;
     return 0;
+}
+
+/* The energy (J) generated until now, the work of the held and that of the ideal effort, the largest
+ * energy generated at any sample, and that sample's stamp (ticks), up to which all are. */
+EXPORT void hapticlink_energy(const Meter *m, double energy[5]) {
+    memset(energy, 0, 5 * sizeof *energy);
+    if (!m->counts[0] || !m->counts[1]) return;
+    const Sums s = sums_of(m);
+    energy[1] = m->totals[0] + s.held;
+    energy[2] = m->totals[1] + s.ideal;
+    energy[0] = energy[1] - energy[2];
+    energy[3] = m->totals[2] < s.peak ? s.peak : m->totals[2];
+    energy[4] = (double)m->stamps[s.samples];
 }
 
 void meter_work(const Meter *m, double work[2]) {
@@ -146,7 +177,8 @@ double meter_energy(const Meter *m) {
 int meter_move(Meter *m, const double *board, int64_t tick) {
     int64_t *count = m->counts + 1;
     if (*count && m->ticks[*count - 1] == tick) return 0;
-    if (*count >= m->full && fold_within_room(m)) return CALL;
+    const int code = hapticlink_meter_room(m, 1);
+    if (code) return code;
     m->ticks[*count] = tick;
     read_all(&m->x, board, m->moves + *count * m->x.n);
     ++*count;
@@ -164,4 +196,10 @@ void meter_feed(Meter *m, const double *board, double share) {
         row[i] = fresh ? part : row[i] + part;
     }
     *count += fresh;
+}
+
+/* The first row and sample. */
+EXPORT int hapticlink_meter_start(Meter *m, const double *board) {
+    const int code = meter_sample(m, board, 0);
+    return code ? code : meter_move(m, board, 0);
 }

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
-from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
@@ -25,15 +22,8 @@ from hapticlink.orchestrator.plan.operations import (
 )
 from hapticlink.orchestrator.run.compiled import fmus, structures
 from hapticlink.orchestrator.run.compiled.fmus import Memory
-from hapticlink.orchestrator.run.compiled.hold_structures import (
-    CompiledHold,
-    can,
-    fill_reader,
-    parts,
-    tanks,
-)
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.structures import Structure
-from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
 from hapticlink.orchestrator.run.instructions import (
     Collect,
     Feed,
@@ -42,44 +32,34 @@ from hapticlink.orchestrator.run.instructions import (
     Move,
     Sample,
 )
-from hapticlink.orchestrator.run.python_loop import OperationsInPython, Stop
+from hapticlink.orchestrator.run.python_operations import OperationsInPython
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
-from hapticlink.orchestrator.system.system import System
 
 Op: Any = structures.Op
-EXACT = 2**53
-"""Up to here every whole number is a double, and the quotient of two is rounded once."""
 PATIENCE = 20_000_000
 """ns after which Python gets a turn: signals, progress."""
 KINDS = ("fmu", "setter", "hold", "meter", "table")
 """Of objects that operations refer to by the index in an array of `loop`."""
 
 
-def too_long(system: System) -> str:
-    """Why the times of a run are not exact in the compiled loop, "" where they are."""
-    timeline, parts = system.timeline, max(system.coupling.substeps.values(), default=1)
-    base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
-    if max(last * parts * base.numerator, base.denominator * parts) < EXACT:
-        return ""
-    return "its ticks, times the substeps, are more than 2^53"
+class Stop(Exception):
+    """Raised when the scene's stop condition holds."""
 
 
 class Machine:
-    """The structures of a run. Holds that have C replace those of the simulation; `in_python` are
-    the operations that are carried out in Python, with the reason."""
+    """The operations of a simulation for the compiled loop; `in_python` are those that are carried
+    out in Python, with the reason."""
 
-    def __init__(self, library: ctypes.CDLL, simulation: Simulation) -> None:
-        self.library, self._simulation = library, simulation
+    def __init__(self, simulation: Simulation) -> None:
+        self.library, self._simulation = simulation.library, simulation
         self.in_python: dict[str, str] = {}
         system = simulation.system
-        self.loop = structures.Loop()
-        self.loop.fill(system.timeline.base, "numerator", "denominator")
-        self.loop.fill(simulation.signals, "values")
+        self.loop = simulation.loop
         self._memory = Memory()
         self._kept: list[object] = []
         self._instructions: list[Instruction] = []
-        self.operations = OperationsInPython(simulation, self._joined)
+        self.operations = OperationsInPython(simulation, self.joined)
         self._points: list[tuple[float, float]] = []
         self._fmus = self._array("fmus", structures.Fmu, len(system.fmus))
         self._setters = self._array("setters", structures.Setter, 2 * len(system.fmus))
@@ -89,53 +69,18 @@ class Machine:
         self._indices: dict[str, dict[Any, int]] = {kind: {} for kind in KINDS}
         self._records: dict[Instruction, Structure] = {}
         self._ops: list[Structure] = []
-        self._make_holds()
 
     def _array(self, name: str, kind: Any, n: int) -> Any:
         array = (kind * max(n, 1))()
         self.loop.fill(**{name: array})
         return array
 
-    def _make_holds(self) -> None:
-        simulation, system = self._simulation, self._simulation.system
-        repeats = system.coupling.scheme == "iterated"
-        shared = tanks(simulation.holds.values(), repeats)
-        for name, hold in simulation.holds.items():
-            needed = getattr(parts(hold).own, "tank", None)
-            tank = shared.get(id(needed))
-            if can(hold, repeats) and (tank or not needed):
-                simulation.holds[name] = self._compiled(name, hold, tank)
-        compiled = [h for h in simulation.holds.values() if isinstance(h, CompiledHold)]
-        for hold in compiled:
-            hold.join(compiled)
-
-    def _compiled(self, name: str, hold: Hold, tank: structures.Tank | None = None) -> CompiledHold:
-        signals = self._simulation.signals
-        sources = signals.sources(self._simulation.system.connection[name])
-        values, loop = signals.values[signals.hold(name)], ctypes.addressof(self.loop)
-        return CompiledHold(self.library, loop, hold, sources, values, tank)
-
-    def change_hold(self, name: str, hold: Hold, stamp: int) -> None:
-        """Replace the hold of a connection; it begins with the newest sample, of tick `stamp`.
-        Raises InputFault where the old or the new one has no C."""
-        self._require_compiled(name, self._simulation.holds[name])
-        self._simulation.holds[name] = compiled = self.other_hold(name, hold)
-        index, loop = self._index("hold", name, lambda index: compiled), ctypes.addressof(self.loop)
-        while self.library.change_hold(loop, index, compiled.address, stamp):
-            compiled.grow()
-
-    def other_hold(self, name: str, hold: Hold) -> CompiledHold:
-        """A hold that a connection can have in place of its own. Raises InputFault where it has no
-        C."""
-        self._require_compiled(name, hold)
-        compiled = self._compiled(name, hold)
-        self._kept.append(compiled)
-        return compiled
-
-    def _require_compiled(self, name: str, hold: Hold) -> None:
-        if not isinstance(hold, CompiledHold) and not can(hold, repeats=False):
-            kind = type(parts(hold).own).__name__
-            raise InputFault(f"hold of {name}: there is no C for {kind}: take `reset`")
+    def change_hold(self, name: str, hold: CompiledHold, stamp: int) -> None:
+        """Replace the hold of a connection; it begins with the newest sample, of tick `stamp`."""
+        self._simulation.holds[name] = hold
+        index, loop = self._index("hold", name, lambda index: hold), ctypes.addressof(self.loop)
+        while code := self.library.change_hold(loop, index, hold.address, stamp):
+            hold.serve(code)
 
     # --- what the arrays of `loop` hold -----------------------------------------------------
 
@@ -162,7 +107,7 @@ class Machine:
         self.loop.fill(ops=(Op * len(self._ops))(*self._ops))
         return first, len(self._instructions)
 
-    def _joined(self, sequence: Sequence[Instruction]) -> Call:
+    def joined(self, sequence: Sequence[Instruction]) -> Call:
         """One call that carries out a sequence of instructions at a tick."""
         first, last = self.block(sequence)
         position, run = structures.At(), self.library.block
@@ -198,15 +143,15 @@ class Machine:
                 size = float(dticks * (system.timeline.base / count))
                 over = 0 if system.fmu[fmu].sampled and count == 1 else dticks
                 return Op(structures.STEP, index, part * dticks, count, over, size)
-            case Push(connection, ahead) if (index := self._hold(connection)) is not None:
-                return Op(structures.PUSH, index, ahead)
-            case Evaluate(connection, ahead) if (index := self._hold(connection)) is not None:
-                return Op(structures.EVALUATE, index, x=float(ahead))
-            case Blend(connection, points) if (index := self._hold(connection)) is not None:
+            case Push(connection, ahead):
+                return Op(structures.PUSH, self._hold(connection), ahead)
+            case Evaluate(connection, ahead):
+                return Op(structures.EVALUATE, self._hold(connection), x=float(ahead))
+            case Blend(connection, points):
                 first = len(self._points)
                 self._points += [(weight, float(ahead)) for weight, ahead in points]
                 self.loop.fill(points=np.array(self._points))
-                return Op(structures.BLEND, index, first, len(self._points))
+                return Op(structures.BLEND, self._hold(connection), first, len(self._points))
             case Sample(connection, ahead):
                 return Op(structures.SAMPLE, self._meter(connection), ahead)
             case Move(connection, ahead):
@@ -221,9 +166,6 @@ class Machine:
                 place = simulation.signals.scalar(condition.fmu, condition.variable)
                 comparison = [*COMPARISONS].index(condition.comparison)
                 return Op(structures.STOP_WHEN, place, comparison, x=condition.value)
-            case Push(connection) | Evaluate(connection) | Blend(connection):
-                kind = type(parts(simulation.holds[connection]).own).__name__
-                return f"there is no C for {kind}, or none that takes samples back"
             case Collect():
                 return "its FMUs run beside the loop, in a thread"
             case Finish():
@@ -265,10 +207,10 @@ class Machine:
             lambda index: fmus.of_setter(setter, instance, self._setters[index], self._memory),
         )
 
-    def _hold(self, connection: str) -> int | None:
+    def _hold(self, connection: str) -> int:
         hold = self._simulation.holds[connection]
-        if not isinstance(hold, CompiledHold):
-            return None
+        if hold.own:
+            self.in_python[f"hold of {connection}"] = f"{hold.parts.name} is a plugin's"
 
         def make(index: int) -> object:
             self._holds[index] = hold.address
@@ -277,16 +219,11 @@ class Machine:
         return self._index("hold", connection, make)
 
     def _meter(self, connection: str) -> int:
-        meter, c = self._simulation.meters.of[connection], structures.Meter()
+        meter = self._simulation.meters.of[connection]
 
         def make(index: int) -> object:
-            self._meters[index] = ctypes.addressof(c)
-            for kind in ("source", "held", "x"):
-                fill_reader(getattr(c, kind), getattr(meter, kind))
-            c.fill(meter, "counts")
-            meter.changed = partial(_fill_meter, c, meter)
-            meter.changed()
-            return c
+            self._meters[index] = ctypes.addressof(meter.c)
+            return meter
 
         return self._index("meter", connection, make)
 
@@ -329,12 +266,16 @@ class Machine:
             self.operations(instruction, tick)
         elif code == structures.STOP:
             raise Stop
-        elif code == structures.GROW:
-            assert isinstance(instruction, Push | Evaluate | Blend)
-            hold = simulation.holds[instruction.connection]
-            assert isinstance(hold, CompiledHold)
-            hold.grow()
+        elif code in (structures.GROW, structures.REFUSED):
+            self._make_room(instruction, code)
             return
+        elif code == structures.SETTLE:
+            assert isinstance(instruction, Step)
+            instance, now = simulation.instances[instruction.fmu], simulation.seconds(tick)
+            if instance.place.waiting <= now:
+                instance.settle(now)
+                return
+            self.operations(instruction, tick)  # what waits for a time within this step
         else:
             assert isinstance(instruction, Get | Set | Step)
             instance = simulation.instances[instruction.fmu]
@@ -347,10 +288,25 @@ class Machine:
                 raise instance.failed(called, position.status)
             if code == structures.JUDGE:
                 instance.judge()
-            else:
-                assert code == structures.STEPPED
+            elif code == structures.STEPPED:
                 instance.after_step(position.status)
+            else:
+                assert code == structures.UNSAVED
+                called = f"fmi{instance.description.fmi}GetFMUstate"
+                raise instance.failed(called, position.status)
         position.op += 1
+
+    def _make_room(self, instruction: Instruction, code: int) -> None:
+        """Give what an instruction works on what it lacks."""
+        simulation = self._simulation
+        match instruction:
+            case Push(connection) | Evaluate(connection) | Blend(connection):
+                simulation.holds[connection].serve(code)
+            case Sample(connection) | Move(connection):
+                simulation.meters.of[connection].grow()
+            case _:
+                assert isinstance(instruction, Step)
+                simulation.step_checks[instruction.fmu].grow()
 
     def _called(self, instruction: Instruction, number: int, instance: InProcess) -> str:
         """The name of the failed call of a get, a set or a step."""
@@ -361,8 +317,3 @@ class Machine:
         setter = self._simulation.setters[instruction.fmu, instruction.now]
         assert isinstance(setter, Setter)
         return setter.transfers[number].name
-
-
-def _fill_meter(c: structures.Meter, meter: Meter) -> None:
-    c.fill(meter, "stamps", "samples", "ticks", "moves", "efforts", "totals", "full")
-    c.fill(room=len(meter.stamps), least=ROWS)

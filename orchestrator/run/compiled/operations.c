@@ -39,7 +39,7 @@ static int blend(const Loop *l, const Op *op, int64_t tick) {
 /* The newest sample of the source of a hold. */
 int push_sample(const Loop *l, Hold *h, int64_t stamp, int64_t arrival) {
     double *sample = hold_scratch(h);
-    if (h->far) *h->credit = account_credit(h->far, l);
+    if (h->far) *h->credit = hapticlink_credit(h->far, l);
     for (int64_t k = 0; k < h->width; k++) sample[k] = l->values[h->sources[k]];
     return hapticlink_push(h, sample, stamp, arrival);
 }

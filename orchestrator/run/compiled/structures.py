@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from types import CodeType, MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +16,8 @@ from hapticlink.orchestrator.fmi.instance import Place
 from hapticlink.orchestrator.run.compiled.build import HERE
 
 _COUNT = re.compile(r"/\* \[(.*?)\] \*/")
+_NO_COUNTS: Mapping[str, int] = MappingProxyType({})
+_STATE = "@"
 _COMMENT = re.compile(r"/\*.*?\*/", re.S)
 _DECLARED = re.compile(
     r"typedef struct \{(?P<fields>.*?)\} (?P<name>\w+);|enum \{(?P<numbers>[^=]*?)\}", re.S
@@ -26,16 +30,19 @@ _FIELD = re.compile(
 @dataclass(frozen=True)
 class Pointer:
     """A field that is a pointer: to `count` entries, an expression in fields, each of `width`
-    times `type`, or a pointer to that where it has two stars."""
+    times `type`, or a pointer to that where it has two stars. used: of these, those in use."""
 
     type: str
     stars: int
     width: int
     count: str
+    used: str
 
 
 POINTERS: dict[str, dict[str, Pointer]] = {}
 """The pointers of each structure, by field."""
+STATE: dict[str, list[str]] = {}
+"""The fields of each structure that are its state, those behind the comment `state:`."""
 
 
 class Structure(ctypes.Structure):
@@ -74,18 +81,24 @@ def _declared(text: str) -> dict[str, Any]:
     }  # fmt: skip
 
     def fields(name: str, body: str) -> Iterator[tuple[str, Any]]:
-        for declaration in body.split(";")[:-1]:
+        constant, _, state = body.partition(_STATE)
+        n_constant = constant.count(";")
+        for i, declaration in enumerate((constant + state).split(";")[:-1]):
             kind, names = declaration.replace("const ", "").split(maxsplit=1)
             for field in map(_FIELD.fullmatch, re.split(r",\s*", names)):
                 assert field, declaration
                 entry = types[kind] if not field["stars"] else ctypes.c_void_p
                 several = field["n"] and not field["stars"]
+                if _STATE in body and i >= n_constant:
+                    STATE.setdefault(name, []).append(field["name"])
                 if stars := len(field["stars"]):
-                    of = Pointer(kind, stars, int(field["n"] or 1), field["count"] or "1")
+                    count, _, used = (field["count"] or "1").partition("|")
+                    of = Pointer(kind, stars, int(field["n"] or 1), count, used or count)
                     POINTERS.setdefault(name, {})[field["name"]] = of
                 yield field["name"], entry * int(field["n"]) if several else entry
 
-    for declared in _DECLARED.finditer(_COMMENT.sub("", _COUNT.sub(r"<\1>", text))):
+    text = _COUNT.sub(r"<\1>", text.replace("/* state: */", _STATE))
+    for declared in _DECLARED.finditer(_COMMENT.sub("", text)):
         if name := declared["name"]:
             rows = [*fields(name, declared["fields"])]
             types[name] = type(name, (Structure,), {"_fields_": rows})
@@ -93,6 +106,31 @@ def _declared(text: str) -> dict[str, Any]:
             names = re.findall(r"\w+", declared["numbers"])
             types |= {name: number for number, name in enumerate(names)}
     return types
+
+
+def evaluate(expression: str, known: Sequence[Any], counts: Mapping[str, int] = _NO_COUNTS) -> int:
+    """The number that an expression of loop.h gives: in fields of structures, the nearest first,
+    and in `counts`; a pointer to a number is an array of it."""
+    return int(eval(_compiled(expression), {"__builtins__": {}}, _Fields(known, counts)))
+
+
+@cache
+def _compiled(expression: str) -> CodeType:
+    return compile(expression.strip(), "loop.h", "eval")
+
+
+class _Fields(dict[str, Any]):
+    def __init__(self, known: Sequence[Any], counts: Mapping[str, int]) -> None:
+        super().__init__()
+        self._known, self._given = known, counts
+
+    def __missing__(self, name: str) -> Any:
+        for entry in self._known:
+            if hasattr(entry, name):
+                value = getattr(entry, name)
+                is_pointer = name in POINTERS.get(type(entry).__name__, {})
+                return (ctypes.c_int64 * 1).from_address(value) if is_pointer else value
+        return self._given[name]
 
 
 _TYPES = _declared((HERE / "loop.h").read_text(encoding="utf-8"))

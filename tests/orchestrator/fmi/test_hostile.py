@@ -16,12 +16,10 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.results import read_results
-from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, RUN, hostile_scene, process
 from tests.orchestrator.hostile_slave import hostile_slave
 from tests.orchestrator.run.test_interrupt import children, waited_for
-from tests.shared_fixtures import LOOPS
 
 pytest.importorskip("resource")  # the FMU needs POSIX
 
@@ -33,16 +31,15 @@ ACTS = [
 
 
 @pytest.mark.parametrize(
-    ("fmi", "loop", "isolate", "place", "act"),
+    ("fmi", "isolate", "place", "act"),
     [
-        *((fmi, loop, "", *act) for fmi in "23" for loop in LOOPS for act in ACTS),
-        # Python steps it in either loop, and its worker, which is the same for every version of
-        # FMI, passes on any status of a call alike.
-        *(("2", LOOPS[-1], ISOLATED, place, act) for place, act in dict(ACTS).items()),
+        *((fmi, "", *act) for fmi in "23" for act in ACTS),
+        # Python steps it, and its worker, which is the same for every version of FMI, passes on any
+        # status of a call alike.
+        *(("2", ISOLATED, place, act) for place, act in dict(ACTS).items()),
     ],
 )
-def test_only_ok_and_warning_are_success(tmp_path, monkeypatch, fmi, loop, isolate, place, act):
-    monkeypatch.setenv(CHOICE, loop)
+def test_only_ok_and_warning_are_success(tmp_path, fmi, isolate, place, act):
     hostile_fmu(tmp_path, fmi)
     scene = hostile_scene(tmp_path, f"{place}_{act}_20", isolate)
     outcome = simulate(scene, tmp_path / "out").outcome
@@ -109,7 +106,7 @@ def test_runs_in_threads_leave_the_current_directory_alone(tmp_path, monkeypatch
     [("step", "upward"), ("step", "zero"), ("step", "flush"), ("get", "upward"), ("set", "zero"),
      ("enter", "upward"), ("make", "upward")],
 )  # fmt: skip
-def test_another_rounding_mode_is_restored_and_told(tmp_path, loop, fmi, place, act, caplog):
+def test_another_rounding_mode_is_restored_and_told(tmp_path, fmi, place, act, caplog):
     """The numbers of the other FMU are the same to the bit."""
     hostile_fmu(tmp_path, fmi)
     good = simulate(hostile_scene(tmp_path, "good_none_0"), tmp_path / "good").results.haptics
@@ -131,20 +128,19 @@ EARLY = {
 
 
 @pytest.mark.parametrize(
-    ("fmi", "loop", "isolate", "act"),
+    ("fmi", "isolate", "act"),
     [
-        *((fmi, loop, "", act) for loop in LOOPS for fmi, act in EARLY),
-        *((fmi, LOOPS[-1], ISOLATED, act) for fmi in "23" for act in ("finish", "middle")),
+        *((fmi, "", act) for fmi, act in EARLY),
+        *((fmi, ISOLATED, act) for fmi in "23" for act in ("finish", "middle")),
     ],
 )
 def test_a_step_that_ends_early_ends_the_run_at_the_last_whole_step(
-    tmp_path, fmi, loop, isolate, act, monkeypatch
+    tmp_path, fmi, isolate, act, monkeypatch
 ):
     """As it requests, which is no fault, or unasked, which is not allowed to it (FMI 3.0, section
     4.2.1); the rows of all FMUs end there."""
     log, name, end = tmp_path / "log", f"step_{act}_20", EARLY[fmi, act]
     monkeypatch.setenv(HOSTILE_LOG, str(log))
-    monkeypatch.setenv(CHOICE, loop)
     hostile_fmu(tmp_path, fmi)
     coupling = "coupling=jacobi" if fmi == "3" else "coupling=gauss-seidel"
     ended = simulate(hostile_scene(tmp_path, name, isolate), tmp_path / "out", [coupling])
@@ -174,12 +170,11 @@ def test_what_a_python_fmu_changes_of_the_interpreter_is_restored(tmp_path):
         assert (sys.getrecursionlimit(), np.geterr()) == (limit, errors)
 
 
-@pytest.mark.parametrize("loop", ["compiled", "python"])
 @pytest.mark.parametrize("fmi", ["2", "3"])
-def test_exit_of_c_is_no_success(tmp_path, fmi, loop):
+def test_exit_of_c_is_no_success(tmp_path, fmi):
     hostile_fmu(tmp_path, fmi)
     out = tmp_path / "out"
-    ended = process(hostile_scene(tmp_path, "step_exit_20"), out, HAPTICLINK_LOOP=loop)
+    ended = process(hostile_scene(tmp_path, "step_exit_20"), out)
     assert ended.returncode == 1
     assert "the process of the run ended after t = 0.296875 s" in ended.stderr
     found = read_results.load(out)

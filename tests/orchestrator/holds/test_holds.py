@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -10,16 +11,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds import HOLDS, HoldContext
-from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
+from tests.orchestrator.holds.bench import Bench
 
 Vector = NDArray[np.float64]
 stamps = st.lists(st.integers(1, 40), min_size=3, max_size=8).map(np.cumsum)
 EXTRAPOLATING = ["lead", "foh", "second-order", "delayed", "smooth", "mean"]
 
 
-def fed(hold: Hold, times: Vector, signal: Callable[[float], Vector]) -> Hold:
+def held(name: str, size: int = 1, **parts: object) -> CompiledHold:
+    return Bench().hold(name, size, **parts)
+
+
+def fed(hold: CompiledHold, times: Vector, signal: Callable[[float], Vector]) -> CompiledHold:
     """Every sample pushed at its stamp, the hold asked at each."""
     for t in times:
         hold.push(int(t), signal(t), int(t))
@@ -42,33 +47,33 @@ def test_a_polynomial_of_the_holds_degree_is_continued_exactly(times, later, ahe
     true = signal(tick + ahead)
     for name, exact_to in (("zoh", 0), ("foh", 1), ("second-order", 2)):
         if degree <= exact_to:
-            value = fed(HOLDS[name](HoldContext(1)), times, signal).value(tick, ahead)
+            value = fed(held(name), times, signal).value(tick, ahead)
             np.testing.assert_allclose(value, true, rtol=1e-9, atol=1e-9)
     if degree <= 1:
-        own = HOLDS["foh-derivative"](HoldContext(1))
+        own = held("foh-derivative")
         own.push(int(times[0]), np.concatenate([signal(times[0]), slope(times[0])]), int(times[0]))
         np.testing.assert_allclose(own.value(tick, ahead), true, rtol=1e-9, atol=1e-9)
         period = times[-1] - times[-2]
-        lead = fed(HOLDS["lead"](HoldContext(1)), times, signal).value(tick)
+        lead = fed(held("lead"), times, signal).value(tick)
         np.testing.assert_allclose(lead, signal(times[-1] + period / 2), rtol=1e-9, atol=1e-9)
 
 
 @given(stamps, st.integers(0, 40), st.floats(0, 20), st.floats(1, 20))
 def test_a_slope_is_the_rate_of_what_foh_makes_of_the_pose(times, later, ahead, apart):
     pose = lambda t: np.array([np.sin(0.3 * t), t * t])  # noqa: E731
-    held = fed(HOLDS["foh"](HoldContext(2)), times, pose)
+    poses = fed(held("foh", 2), times, pose)
     slope = fed(
-        HOLDS["slope"](HoldContext(2, lambda ticks: ticks / 512)),
+        Bench(base=Fraction(1, 512)).hold("slope", 2),
         times,
         lambda t: np.concatenate([np.array([np.nan, np.nan]), pose(t)]),
     )
     tick = int(times[-1]) + later
-    moved = held.value(tick, ahead + apart) - held.value(tick, ahead)
+    moved = poses.value(tick, ahead + apart) - poses.value(tick, ahead)
     np.testing.assert_allclose(slope.value(tick, ahead), moved * 512 / apart, rtol=1e-6, atol=1e-6)
 
 
 def test_until_the_second_sample_a_slope_is_zero_as_the_pose_is_constant():
-    slope = HOLDS["slope"](HoldContext(2))
+    slope = held("slope", 2)
     slope.push(0, np.array([3.0, 4.0, 1.0, 2.0]), 0)
     np.testing.assert_array_equal(slope.value(5, 2.5), [0.0, 0.0])
 
@@ -79,14 +84,14 @@ def test_delayed_and_smooth_reach_each_sample_a_period_later(times):
     arrival = int(times[-1])
     period = arrival - int(times[-2])
     for name in ("delayed", "smooth"):
-        hold = fed(HOLDS[name](HoldContext(2)), times, signal)
+        hold = fed(held(name, 2), times, signal)
         np.testing.assert_allclose(hold.value(arrival + period), signal(arrival), atol=1e-9)
 
 
 @given(st.integers(1, 40), st.floats(0, 1), st.integers(0, 2**32 - 1))
 def test_delayed_goes_from_sample_to_sample_at_a_fixed_period(period, share, seed):
     samples = np.random.default_rng(seed).normal(size=(6, 2))
-    hold = HOLDS["delayed"](HoldContext(2))
+    hold = held("delayed", 2)
     for n, sample in enumerate(samples):
         hold.push(n * period, sample, n * period)
         expected = samples[max(n - 1, 0)] * (1 - share) + sample * share
@@ -102,7 +107,7 @@ def test_delayed_goes_from_sample_to_sample_at_a_fixed_period(period, share, see
 def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(name, rows, seed):
     """Nor has `smooth` a kink. The arrivals are as irregular as the stamps, and never fall."""
     samples = iter(np.random.default_rng(seed).normal(size=(len(rows) + 1, 1)))
-    hold, eps = HOLDS[name](HoldContext(1)), 1e-6
+    hold, eps = held(name), 1e-6
     hold.push(0, next(samples), 0)
     stamp = arrival = 0
     for period, late in rows:
@@ -120,7 +125,7 @@ def test_delayed_and_smooth_have_no_jump_at_any_stamps_and_arrivals(name, rows, 
 
 def test_delayed_where_periods_vary():
     """Samples at 0, 20, 40, 50: at 50 it stands halfway between the two before."""
-    hold = HOLDS["delayed"](HoldContext(1))
+    hold = held("delayed")
     for stamp, sample in ((0, 0.0), (20, 1.0), (40, 2.0), (50, 3.0)):
         hold.push(stamp, np.array([sample]), stamp)
     assert [float(hold.value(50, s)[0]) for s in (0, 5, 10, 20)] == [1.5, 2.25, 3.0, 3.0]
@@ -128,7 +133,7 @@ def test_delayed_where_periods_vary():
 
 @given(stamps)
 def test_mean_over_a_slow_step_is_the_integral_of_the_samples(times):
-    hold = HOLDS["mean"](HoldContext(1))
+    hold = held("mean")
     hold.push(0, np.array([0.0]), 0)
     assert hold.value(0) == 0.0
     for t in times.tolist():
@@ -145,7 +150,7 @@ UNAIDED = [name for name, hold in HOLDS.items() if hold.needs is None]
 @given(times=stamps, asked=st.booleans())
 def test_a_second_sample_of_a_stamp_replaces_the_first(name, times, asked):
     """Before the hold is asked for a value at its tick."""
-    once, twice = (HOLDS[name](HoldContext(1)) for _ in range(2))
+    once, twice = (held(name) for _ in range(2))
     for stamp in (0, *times.tolist()):
         sample = np.array([np.sin(stamp)])
         twice.push(stamp, sample + 5.0, stamp)
@@ -158,7 +163,7 @@ def test_a_second_sample_of_a_stamp_replaces_the_first(name, times, asked):
 
 
 def test_a_mean_that_has_been_read_stays():
-    hold = HOLDS["mean"](HoldContext(1))
+    hold = held("mean")
     for stamp in (0, 10, 20):
         hold.push(stamp, np.array([float(stamp)]), stamp)
     assert hold.value(20) == 10.0
@@ -176,7 +181,7 @@ def projector(generator: np.random.Generator, rank: int) -> Vector:
 @given(seed=st.integers(0, 2**32 - 1), ahead=st.floats(0, 30))
 def test_a_projector_stays_a_projector_of_the_newest_rank(name, seed, ahead):
     generator = np.random.default_rng(seed)
-    hold = Projector(lambda: HOLDS[name](HoldContext(9)), 9)
+    hold = held(name, 9, matrix="projector")
     rank = int(generator.integers(0, 4))
     for k in range(6):
         new = k == 0 or k == 3
@@ -193,7 +198,7 @@ def test_a_projector_stays_a_projector_of_the_newest_rank(name, seed, ahead):
 
 def test_a_turning_direction_is_continued_not_frozen():
     """A first-order hold between lines at 0 and 10 degrees points near 15 half a period later."""
-    hold = Projector(lambda: HOLDS["foh"](HoldContext(4)), 4)
+    hold = held("foh", 4, matrix="projector")
     for stamp, angle in ((0, 0.0), (10, np.radians(10))):
         line = np.array([np.cos(angle), np.sin(angle)])
         hold.push(stamp, np.outer(line, line).ravel(), stamp)
@@ -207,7 +212,7 @@ def test_a_turning_direction_is_continued_not_frozen():
 def test_a_mobility_stays_semidefinite_in_any_units(name, seed, ahead, scale):
     generator = np.random.default_rng(seed)
     units = np.outer(u := np.array([1.0, 1.0, 10**scale]), u).ravel()
-    plain, scaled = (Semidefinite(lambda: HOLDS[name](HoldContext(9)), 9) for _ in range(2))
+    plain, scaled = (held(name, 9, matrix="semidefinite") for _ in range(2))
     for k in range(4):
         root = generator.normal(size=(3, 2))
         sample = (root @ root.T).ravel()
@@ -227,7 +232,7 @@ def test_a_turn_is_one_in_the_unit_of_each_angle(turn, seed):
     """A walk in steps below half a turn, wrapped, is the walk again."""
     walk = np.cumsum(np.random.default_rng(seed).uniform(-0.49, 0.49, size=30)) * turn
     walk -= walk[0]
-    hold = Unwrapped(lambda: HOLDS["zoh"](HoldContext(2)), [0, 1], [turn, 2 * np.pi])
+    hold = held("zoh", 2, turns={0: turn, 1: 2 * np.pi})
     for k, angle in enumerate(walk.tolist()):
         both = np.array([(angle + turn / 2) % turn - turn / 2, 0.0])
         hold.push(k, both, k)
@@ -246,7 +251,7 @@ def test_lead_has_order_two_where_rates_divide(rates, order):
     for name, finer in itertools.product(errors, (4, 8, 16, 32)):
         ticks = math.lcm(*rates) * finer
         source, target = (ticks // (rate * finer) for rate in rates)
-        hold, total, worst = HOLDS[name](HoldContext(1, lambda t, of=ticks: t / of)), 0.0, 0.0
+        hold, total, worst = Bench(base=Fraction(1, ticks)).hold(name), 0.0, 0.0
         for tick in sorted({*range(0, ticks, source), *range(0, ticks, target)}):
             if tick % source == 0:
                 hold.push(tick, np.array([np.sin(3 * tick / ticks)]), tick)

@@ -3,7 +3,7 @@ they prove, what no hold can, and what they know where samples are late, against
 knows all."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -12,12 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds import HOLDS, HoldContext
-from hapticlink.orchestrator.holds.energy_account import Account
-from hapticlink.orchestrator.holds.passive import Passive
-from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Link
+from tests.orchestrator.holds.bench import Bench, generated, vector
 
 Vector = NDArray[np.float64]
 
@@ -25,8 +22,8 @@ Vector = NDArray[np.float64]
 def account(name: str, forces: Vector, motion: Vector, every: int) -> Vector:
     """What a hold of forces renewed every so many ticks has made at each renewal (J)."""
     x = np.concatenate([[0.0], np.cumsum(motion)])
-    now = np.zeros(1)
-    hold = HOLDS[name](HoldContext(1, displacement=lambda: now))
+    bench = Bench()
+    now, hold = bench.values, bench.hold(name, displacement=bench.reader([0]))
     held, made, ideal = 0.0, [], 0.0
     for tick in range(len(x)):
         now[:] = x[tick]
@@ -80,9 +77,10 @@ def test_a_step_back_by_a_nanometre_costs_next_to_nothing(reversals, apart):
     steps[50 : 50 + apart * reversals : apart] = -1e-9
     made, swing = {}, 0.0
     for name in ("zoh", "passive"):
-        now = np.zeros(1)
-        context = HoldContext(1, displacement=lambda at=now: at, velocity=lambda: np.full(1, 1e-4))
-        hold = HOLDS[name](context)
+        bench = Bench(2)
+        bench.values[1] = 1e-4
+        now, readers = bench.values[:1], [bench.reader([i]) for i in (0, 1)]
+        hold = bench.hold(name, displacement=readers[0], velocity=readers[1])
         work = ideal = peak = force = at_sample = 0.0
         for tick, step in enumerate(steps):
             if tick % 5 == 0:
@@ -108,8 +106,10 @@ def test_what_passive_makes_is_at_stake_or_the_first_of_a_swing(seed, every):
     at any renewal is at most what the hold says is at stake and, where a force differs more from
     the one before than any did, that difference times the distance until it is known."""
     generator = np.random.default_rng(seed)
-    now, v = np.zeros(1), np.zeros(1)
-    hold = HOLDS["passive"](HoldContext(1, displacement=lambda: now, velocity=lambda: v))
+    bench = Bench(2)
+    now, v = bench.values[:1], bench.values[1:]
+    readers = {"displacement": bench.reader([0]), "velocity": bench.reader([1])}
+    hold = bench.hold("passive", **readers)
     work = ideal = swing = allowed = force = begun = way = 0.0
     for tick in range(200):
         if tick % every == 0:
@@ -142,24 +142,6 @@ SWING = 2 * LARGEST
 
 
 @dataclass
-class Told:
-    """A hold, and a meter that is told no more than the hold."""
-
-    hold: Account
-    sample: Vector = field(default_factory=lambda: np.zeros(1))
-    meter: Meter | None = None
-
-    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        self.sample[:] = sample
-        if self.meter:
-            self.meter.sample(stamp)
-        self.hold.push(stamp, sample, arrival)
-
-    def value(self, tick: int, ahead: float = 0.0) -> Vector:
-        return self.hold.value(tick, ahead)
-
-
-@dataclass
 class Line:
     """A force sampled every so many ticks, held behind a link by a target that steps every so many
     ticks and is straight between: `truth` is told every sample, `told` those that arrived."""
@@ -170,19 +152,22 @@ class Line:
     step: int
 
     def __post_init__(self) -> None:
-        self.x, self.v, self.force, self.held = (np.zeros(1) for _ in range(4))
-        hold = HOLDS[self.name](
-            HoldContext(1, displacement=lambda: self.x, velocity=lambda: self.v)
-        )
-        assert isinstance(hold, Account)
-        self.hold = hold
-        arrived = Told(hold)
-        self.late = Late(arrived, Link(self.latency, Fraction(1)))
-        self.truth, self.told = (
-            Meter(source.copy, self.held.copy, self.x.copy)
-            for source in (self.force, arrived.sample)
-        )
-        arrived.meter = self.told
+        bench = Bench(5)
+        self.x, self.v, self.force, self.held, self._arrived = np.split(bench.values, 5)
+        readers = {"displacement": bench.reader([0]), "velocity": bench.reader([1])}
+        self.hold = bench.hold(self.name, **readers)
+        self.link, self._sent = Link(self.latency, Fraction(1)), False
+        self.truth, self.told = (bench.meter([source], [3], bench.reader([0])) for source in (2, 4))
+
+    def _arrive(self, stamp: int, sample: Vector, arrival: int) -> None:
+        self._arrived[:] = sample
+        self.told.sample(stamp)
+        self.hold.push(stamp, sample, arrival)
+
+    def value(self, tick: int, ahead: float) -> Vector:
+        for arrival, stamp, sample in self.link.arrived(tick):
+            self._arrive(stamp, sample, arrival)
+        return self.hold.value(tick, ahead)
 
     def run(
         self, ticks: int, force: Callable[[], float], go: Callable[[int], float], begin: int = 0
@@ -198,7 +183,11 @@ class Line:
             if (tick - begin) % self.every == 0:
                 self.force[:] = force()
                 self.truth.sample(tick)
-                self.late.push(tick, self.force, tick)
+                if self._sent:
+                    self.link.send(tick, self.force.copy(), tick)
+                else:
+                    self._arrive(tick, self.force, tick)
+                self._sent = True
             if stands:
                 moved = go(tick)
                 self.truth.hold(1.0)
@@ -226,13 +215,13 @@ def test_its_account_is_the_meters(name, seed, every, step, least, spread, loss)
     def go(tick):
         moves = tick < 200
         line.v[:] = generator.normal() * moves
-        line.held[:] = line.late.value(tick, step / 2)
+        line.held[:] = line.value(tick, step / 2)
         return float(generator.normal()) * step * moves
 
     line.run(500, lambda: generator.uniform(-LARGEST, LARGEST), go)
-    made, scale = float(line.hold.generated.sum()), 5.0 * 200
+    made, scale = generated(line.hold), 5.0 * 200
     assert made == pytest.approx(line.told.energy(1.0).generated, abs=1e-12 * scale)
-    link = line.late.link
+    link = line.link
     if not link.lost and not link.overtaken:
         assert made == pytest.approx(line.truth.energy(1.0).generated, abs=1e-12 * scale)
 
@@ -271,7 +260,7 @@ def test_passive_makes_nothing_where_the_way_is_foreseen(seed, rates, least, kno
         xs.append(float(line.x[0]))
         before = float(line.v[0])
         line.v[:] = generator.normal()
-        line.held[:] = line.late.value(tick, step / 2)
+        line.held[:] = line.value(tick, step / 2)
         gained = float(line.v[0]) - before if known or tick > begin else 0.0
         share = generator.choice([1.0, generator.uniform(0.0, 1.0)])
         return float(share * (line.v[0] + gained / 2) * step)
@@ -295,18 +284,17 @@ def test_what_passive_makes_of_white_noise_is_bounded(seed, rates, least, known)
     every, step = rates
     line = Line("passive", Latency(min=least, max=least + every - 1, seed=seed % 1000), every, step)
     hold, xs, allowed = line.hold, [], 0.0
-    assert isinstance(hold, Passive)
 
     def go(tick):
         nonlocal allowed
         xs.append(float(line.x[0]))
         line.v[:] = generator.normal()
-        line.held[:] = line.late.value(tick, step / 2)
+        line.held[:] = line.value(tick, step / 2)
         way = (float(line.v[0]) if known else 0.0) + generator.normal() * generator.choice([0.1, 1])
-        moved, ahead = way * step, float(hold.predicted[0])
-        limit = abs(ahead) + abs(float(hold.predicted_steady[0]))
+        moved, ahead = way * step, float(vector(hold, "predicted")[0])
+        limit = abs(ahead) + abs(float(vector(hold, "steady")[0]))
         foreseen = moved * ahead > 0 and abs(moved) <= limit
-        allowed += ((1.0 - hold.beta[0]) if foreseen else 2.0) * SWING * abs(moved)
+        allowed += ((1.0 - vector(hold, "beta")[0]) if foreseen else 2.0) * SWING * abs(moved)
         return moved
 
     line.run(250, lambda: generator.uniform(-LARGEST, LARGEST), go)

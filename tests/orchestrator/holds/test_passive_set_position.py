@@ -1,6 +1,6 @@
 """Passive set-position modulation: a spring whose far end is held gives no more than it got."""
 
-from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -14,28 +14,27 @@ from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from hapticlink.orchestrator.holds import HOLDS, HoldContext
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
-from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.run.make_holds import make_holds
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
+from hapticlink.orchestrator.run.hold_parts import describe_holds, describe_spring
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.build_system import built
 from tests.orchestrator.foreign_fmus import slave
 from tests.orchestrator.foreign_scenes import fmu_table, ran, run, wire_table
+from tests.orchestrator.holds.bench import Bench
 
 Vector = NDArray[np.float64]
 TICK = 1e-3
 
 
 def held(
-    stiffness: Vector, damping: Vector, longest: int, position: Callable[[], Vector]
-) -> tuple[Hold, Hold]:
-    """The holds of set position and set velocity."""
+    stiffness: Vector, damping: Vector, longest: int
+) -> tuple[Vector, CompiledHold, CompiledHold]:
+    """The position of the near end, and the holds of set position and set velocity."""
     n = len(stiffness)
-    near = NearEnd(position, np.zeros(n), longest * TICK, lambda tick: tick * TICK)
-    shared = EnergyTank(stiffness, damping, near)
-    first, second = (HOLDS["pspm"](HoldContext(n, tank=(shared, row))) for row in (0, 1))
-    return first, second
+    bench = Bench(n, Fraction(1, 1000))
+    tank = bench.tank(stiffness, damping, range(n), period=longest * TICK)
+    first, second = (bench.hold("pspm", n, tank, row=row) for row in (0, 1))
+    return bench.values, first, second
 
 
 @settings(max_examples=150)
@@ -50,8 +49,8 @@ def test_nothing_is_created_at_any_instant_on_any_motion_from_any_samples(
     n = 3
     stiffness = 10 ** generator.uniform(-1, 3, n)
     damping = 10 ** generator.uniform(-4, 1, n) * damped
-    x = generator.normal(size=n)
-    holds = held(stiffness, damping, longest, lambda: x)
+    near, *holds = held(stiffness, damping, longest)
+    x = near[:] = generator.normal(size=n)
 
     def stored(at):
         return float(stiffness @ (y - at) ** 2) / 2
@@ -79,15 +78,14 @@ def test_nothing_is_created_at_any_instant_on_any_motion_from_any_samples(
                 moved = w * seconds * generator.uniform(0.0, 1.0)
             at = x + moved
             work += stored(x) - stored(at) + float(damping @ (w * moved - moved**2 / seconds))
-            x = at
+            x = near[:] = at
             scale = max(scale, abs(work), stored(x))
             assert work <= begin - stored(x) + 1e-12 * scale
         tick += step
 
 
 def test_a_sample_that_costs_no_more_than_there_is_passes_unchanged():
-    x = np.array([0.0])
-    position, velocity = held(np.array([100.0]), np.array([20.0]), 1, lambda: x)
+    x, position, velocity = held(np.array([100.0]), np.array([20.0]), 1)
     position.push(0, np.array([0.1]), 0)  # 0.5 J to begin with
     velocity.push(0, np.array([0.0]), 0)
     assert position.value(0) == 0.1
@@ -105,10 +103,10 @@ def test_a_set_position_that_pumps_a_mass_pumps_nothing():
     to the last. 1 kg on 100 N/m, solved exactly in each step."""
 
     def swing(name):
-        x, v, y = np.array([0.05]), 0.0, np.zeros(1)
-        near = NearEnd(lambda: x, np.zeros(1), TICK, lambda t: t * TICK)
-        shared = EnergyTank(np.array([100.0]), np.zeros(1), near)
-        hold = HOLDS[name](HoldContext(1, tank=(shared, 0)))
+        bench = Bench(1, Fraction(1, 1000))
+        x, v, y = bench.values, 0.0, np.zeros(1)
+        x[:] = 0.05
+        hold = bench.hold(name, 1, bench.tank(np.array([100.0]), np.zeros(1), [0]))
         cos, sin, largest = np.cos(10 * TICK), np.sin(10 * TICK), 0.0
         for tick in range(10000):
             if tick % 20 == 0:
@@ -179,9 +177,10 @@ def test_a_near_end_that_is_an_angle_is_known_as_one():
     """Its tank unwraps what it reads (tests of the tank have what becomes of it)."""
     options = ["hold=pspm", "kinds.haptic_device.x=angle"]
     with built(open_scene.load("closed-loop-direct", options)) as system:
-        _, (tank,) = make_holds(SignalVector(system))
-    assert isinstance(tank, EnergyTank)
-    np.testing.assert_allclose(tank.near.turns, [0.0, 0.0, 2 * np.pi])
+        signals = SignalVector(system)
+        (of,) = {parts.spring for parts in describe_holds(signals).values() if parts.spring}
+        spring = describe_spring(of, signals)
+    np.testing.assert_allclose(spring.turns, [0.0, 0.0, 2 * np.pi])
 
 
 SHARED = {"hold": "pspm", "holds.controller.F_drift": "passive", "duration": 0.2}

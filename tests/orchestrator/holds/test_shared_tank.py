@@ -9,14 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds import HOLDS, HoldContext
-from hapticlink.orchestrator.holds.energy_account import Account
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
-from hapticlink.orchestrator.holds.hold import Hold
-from hapticlink.orchestrator.holds.holds_on_manifolds import Unwrapped
-from hapticlink.orchestrator.run.make_holds import WithFurther
+from hapticlink.orchestrator.run.compiled.hold_structures import array
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
+from tests.orchestrator.holds.bench import Bench, credit, vector
 
 Vector = NDArray[np.float64]
 N, TICK, TURN = 3, 1e-3, 2 * np.pi
@@ -31,31 +26,24 @@ class Coupling:
         self, stiffness: Vector, damping: Vector, every: int, latency: Latency, wrapped: bool
     ) -> None:
         self.K, self.B, self.every, self.wrapped = stiffness, damping, every, wrapped
-        self.x, self.v, self.y, self.w = (np.zeros(N) for _ in range(4))
+        self.bench = bench = Bench(5 * N, Fraction(1, 1000))
+        self.seen, self.v, self.y, self.w = np.split(bench.values[: 4 * N], 4)
+        self.x = np.zeros(N)
+        near, speed, body, moving = (range(i * N, (i + 1) * N) for i in range(4))
         turns = np.array([0.0, 0.0, TURN * wrapped])
-        near = NearEnd(
-            lambda: self.read(self.x), turns, TICK, lambda t: t * TICK, lambda: self.v, True
+        self.tank = bench.tank(
+            stiffness, damping, near, turns=turns, velocity=bench.reader(speed), sampled=True
         )
-        self.tank = EnergyTank(stiffness, damping, near)
-        far = HoldContext(N, lambda t: t * TICK, lambda: -self.y, lambda: -self.w)
-        found = HOLDS["passive"](far)
-        assert isinstance(found, Account)
-        self.back, self.back.tank = found, self.tank
-        self.credit = np.zeros(1)
-        self.ends = [self._held(row, latency) for row in (0, 1)]
+        far = {"displacement": bench.reader(body, -1.0), "velocity": bench.reader(moving, -1.0)}
+        self.back = bench.hold("passive", N, self.tank, **far)
+        turned = {2: TURN} if wrapped else {}
+        self.ends = [
+            bench.hold("pspm", N, self.tank, latency=latency, turns=turned, further=(0,)),
+            bench.hold("pspm", N, self.tank, latency=latency, row=1),
+        ]
         self.near = self.far = 0.0
         self.surplus = self.unforeseen = self.beyond = self.most = 0.0
         self.force, self.effort = np.zeros(N), np.zeros(N)
-
-    def _held(self, row: int, latency: Latency) -> Hold:
-        def make() -> Hold:
-            return HOLDS["pspm"](HoldContext(N, tank=(self.tank, row)))
-
-        held = Unwrapped(make, [2], [TURN]) if self.wrapped and row == 0 else make()
-        late = Late(held, Link(latency, Fraction(1, 1000)))
-        if row:
-            return late
-        return WithFurther(late, lambda: self.credit.copy(), (self.back, self.credit))
 
     def read(self, pose: Vector) -> Vector:
         wrapped = pose.copy()
@@ -65,8 +53,9 @@ class Coupling:
 
     def tick(self, tick: int) -> None:
         """Sample, hold and couple; the force of this tick then acts until the next."""
+        self.seen[:] = self.read(self.x)
         if tick % self.every == 0:
-            self.ends[0].push(tick, self.read(self.y), tick)
+            self.ends[0].push(tick, np.append(self.read(self.y), credit(self.back)), tick)
             self.ends[1].push(tick, self.w, tick)
         y, w = (hold.value(tick).copy() for hold in self.ends)
         self.force = self.K * (y - self.read(self.x)) + self.B * (w - self.v)
@@ -85,8 +74,8 @@ class Coupling:
 
     def go(self, dy: Vector) -> None:
         """The body's step; beside the premise, its work is counted as unforeseen."""
-        predicted, d = -self.back.predicted, np.abs(self.back.predicted)
-        furthest = d + np.abs(self.back.predicted_steady)
+        predicted, d = -vector(self.back, "predicted"), np.abs(vector(self.back, "predicted"))
+        furthest = d + np.abs(vector(self.back, "steady"))
         drawn = -self.effort * dy
         driven = -self.effort * predicted > 0.0
         right = np.where(driven, np.abs(dy) <= furthest, drawn <= 0.0)
@@ -110,7 +99,7 @@ class Coupling:
             if tick == 0:
                 self.start = float(self.K @ (self.y - self.x) ** 2) / 2
             if tick % self.every == 0:
-                d = -self.back.predicted
+                d = -vector(self.back, "predicted")
                 step = d * generator.choice([1.0, generator.uniform()])
                 if generator.random() < against:
                     step = generator.normal(size=N) * np.abs(d).max()
@@ -147,4 +136,4 @@ def test_the_coupling_gives_both_sides_no_more_than_it_got(seed, every, wrapped,
     steps, outside, stake = coupling.back.premises
     assert stake <= coupling.beyond + 1e-9 * (1.0 + scale)
     assert outside <= steps <= N * 200
-    assert coupling.most <= stake - coupling.tank.least[0] + 1e-9 * (1.0 + scale)
+    assert coupling.most <= stake - array(coupling.tank.least, 1)[0] + 1e-9 * (1.0 + scale)

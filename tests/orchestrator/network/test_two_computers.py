@@ -34,11 +34,10 @@ from tests.orchestrator.network.served import (
     server,
     until,
 )
-from tests.shared_fixtures import needs_compiled_loop, sets, status
+from tests.shared_fixtures import sets, status
 
 pytest.importorskip("zmq")
 pytest.importorskip("msgpack")
-pytestmark = needs_compiled_loop
 OPTIONS = ("hold=foh", "duration=0.75")
 SETS = sets(OPTIONS)
 

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from hapticlink.orchestrator.run.energy.meter import ROWS, Meter
+from hapticlink.orchestrator.run.energy.meter import ROWS
 from tests.orchestrator.foreign_fmus import entries, slave, with_units
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
+from tests.orchestrator.holds.bench import Bench
 
 FORCE = "hand.F -> virtual_mechanism.F_hand"
 
@@ -40,8 +41,9 @@ def test_a_spring_renewed_more_rarely_than_the_target_steps(every, seed, sign):
     """1/2 K sum dx^2 over the renewals, on any path between them, and over folded rows."""
     path = np.cumsum(np.random.default_rng(seed).normal(size=(4 * ROWS + 1, 3)), axis=0)
     stiffness = np.array([100.0, 50.0, 2.0])
-    source, held, x = np.zeros(3), np.zeros(3), np.zeros(3)
-    meter = Meter(source.copy, held.copy, lambda: sign * x)
+    bench = Bench(9)
+    source, held, x = bench.values.reshape(3, 3)
+    meter = bench.meter(range(3), range(3, 6), bench.reader(range(6, 9), sign))
     for tick, place in enumerate(path):
         x[:] = place
         meter.move(tick)
@@ -63,8 +65,9 @@ def test_a_fast_spring_held_by_a_slow_target(every, seed):
     """The target moves in straight lines over `every` samples: it gets the newest only."""
     generator = np.random.default_rng(seed)
     frames = np.cumsum(generator.normal(size=2 * ROWS // every + 2))
-    source, held, x = np.zeros(1), np.zeros(1), np.zeros(1)
-    meter = Meter(source.copy, held.copy, x.copy)
+    bench = Bench(3)
+    source, held, x = bench.values.reshape(3, 1)
+    meter = bench.meter([0], [1], bench.reader([2]))
     for n, (here, there) in enumerate(pairwise(frames)):
         x[:] = here
         meter.move(n * every)
@@ -86,8 +89,9 @@ def test_a_constant_force_generates_nothing(between):
     """It does F dx, held or not, from the first sample to the last, between two of the target's
     steps, and over folded rows."""
     path = np.cumsum(np.random.default_rng(5).normal(size=3 * ROWS))
-    force, x = np.array([3.0]), np.zeros(1)
-    meter = Meter(force.copy, force.copy, x.copy)
+    bench = Bench(2)
+    bench.values[0] = 3.0
+    x, meter = bench.values[1:], bench.meter([0], [0], bench.reader([1]))
     for n, place in enumerate(path):
         x[:] = place
         meter.move(3 * n)

@@ -19,7 +19,6 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import read_results
-from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
 from tests.orchestrator.foreign_fmus import SLAVE, edited_entries, python_fmu, python_fmu_of, slave
 from tests.orchestrator.foreign_scenes import (
@@ -36,7 +35,6 @@ from tests.orchestrator.foreign_scenes import (
 )
 from tests.orchestrator.run.test_interrupt import children, waited_for
 from tests.plugins import hapticlink, server
-from tests.shared_fixtures import LOOPS
 
 resource = pytest.importorskip("resource")  # these are the signals and limits of POSIX
 
@@ -105,11 +103,8 @@ def test_an_exception_in_a_python_fmu(tmp_path, isolate):
 
 
 @pytest.mark.parametrize(
-    ("fmi", "isolate", "loop"),
-    [
-        *((fmi, "", loop) for fmi in "23" for loop in LOOPS),
-        ("2", ISOLATED, LOOPS[-1]),  # a worker is the same for every version of FMI
-    ],
+    ("fmi", "isolate"),
+    [("2", ""), ("3", ""), ("2", ISOLATED)],  # a worker is the same for every version of FMI
 )
 @pytest.mark.parametrize(
     ("act", "calls"),
@@ -120,13 +115,12 @@ def test_an_exception_in_a_python_fmu(tmp_path, isolate):
         ("fatal", []),
     ],
 )
-def test_every_status(tmp_path, fmi, act, calls, isolate, loop, monkeypatch):
+def test_every_status(tmp_path, fmi, act, calls, isolate, monkeypatch):
     """What is called after a fault: FMI 2.0.5 sections 2.1.3 and 4.2.4, FMI 3.0 section 2.3.1.
     After an error only freeing is allowed, after a fatal error nothing; a discarded step leaves the
     FMU as it was, and a warning is no fault."""
     log, name = tmp_path / "log", f"step_{act}_4"
     monkeypatch.setenv(HOSTILE_LOG, str(log))
-    monkeypatch.setenv(CHOICE, loop)
     hostile_fmu(tmp_path, fmi)
     python_fmu(tmp_path, "Other")
     experiment, found = run(tmp_path, fmu_table(name, "hostile", isolate) + OTHER)

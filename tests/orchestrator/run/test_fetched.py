@@ -42,7 +42,7 @@ LIST = '["hand", "virtual_mechanism.x", "virtual_environment.P_c[1,2]"]'
 @pytest.mark.parametrize(
     ("signals", "every"), [("all", 7), ("connected", 1), ("none", 7), (LIST, 7)]
 )
-def test_recorded_columns_are_those_of_the_whole_table(whole, tmp_path, signals, every, loop):
+def test_recorded_columns_are_those_of_the_whole_table(whole, tmp_path, signals, every):
     """Each column in each row to the byte, and all else that a run tells."""
     found = ran(tmp_path, f"record.signals={signals}", f"record.every={every}")
     for rate, table in columns(tmp_path).items():
@@ -71,7 +71,7 @@ def test_only_what_is_used_is_fetched(tmp_path):
     assert "iota" not in kept["virtual_environment"]
 
 
-def test_calls_of_an_event(tmp_path, loop):
+def test_calls_of_an_event(tmp_path):
     """One get, set and step of each FMU at each communication point; a checked step adds two half
     steps and two gets, with the state saved and restored."""
     outcome = ran(tmp_path).outcome
@@ -93,7 +93,7 @@ FOREIGN = fmu_table("source", "Steady") + fmu_table("eats", "Eats")
 FOREIGN += wire_table("source.y", "eats.u")
 
 
-def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(tmp_path, loop):
+def test_an_fmu_that_uses_up_its_input_gets_it_at_each_step(tmp_path):
     """FMI has inputs keep their values, but FMUs of others need not, so that these are set though
     they have not changed."""
     python_fmu(tmp_path, "Steady", "self.y = 1.0")
@@ -113,7 +113,7 @@ HELD = (
 )
 
 
-def test_unchanged_inputs_are_not_set_again(tmp_path, loop):
+def test_unchanged_inputs_are_not_set_again(tmp_path):
     """A block of this project gets a held value once: at 0 s, and as each of 4 steps has ended."""
     python_fmu(tmp_path, "Source")
     found = simulate(str(scene(tmp_path, HELD)), tmp_path / "out")

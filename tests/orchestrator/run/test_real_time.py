@@ -18,7 +18,6 @@ from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import read_table
 from hapticlink.orchestrator.run import concurrent_fmus, pace
-from hapticlink.orchestrator.run.compiled.library import CHOICE
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.visualization.figures.real_time_figure import exceedance
 from hapticlink.visualization.figures.run_figures import figures
@@ -26,9 +25,7 @@ from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, scene
 from tests.orchestrator.results.records import tables_of
 from tests.orchestrator.wall_clock import MS, WallClock
-from tests.shared_fixtures import needs_compiled_loop
 
-pytestmark = needs_compiled_loop
 HAPTIC, GRAPHICS = Fraction(1, 512), Fraction(1, 60)
 FAST = ("duration=0.3", "graphics.rate=60")
 Made = tuple[dict[str, Any], dict[str, bytes]]
@@ -99,13 +96,6 @@ def test_late_samples_arrive_with_their_stamps(tmp_path, hold):
     told = run["real_time"]["samples"]["graphics"]
     assert (told["taken"], told["late"]) == (len(want) - 1, (np.diff(want) > 0).sum())
     assert told["largest_lateness"] == samples["lateness"].max() > 0.03
-
-
-def test_without_the_compiled_loop_there_is_no_real_time(tmp_path, monkeypatch):
-    monkeypatch.setenv(CHOICE, "python")
-    ended = simulate("closed-loop", tmp_path, FAST, real_time=WallClock().run())
-    assert ended.outcome.reason == "fault"
-    assert "needs the compiled loop: HAPTICLINK_LOOP=python" in ended.run["fault"]["message"]
 
 
 def test_deadlines_that_are_missed_are_counted(tmp_path):

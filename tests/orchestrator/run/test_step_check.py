@@ -5,7 +5,6 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.run import step_check
-from hapticlink.orchestrator.run.compiled.library import CHOICE
 from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import run_once
 
@@ -116,12 +115,10 @@ def test_results_do_not_depend_on_the_check(scene, tmp_path, monkeypatch):
     assert tables_of(checked.folder) == tables_of(plain.folder)
 
 
-@pytest.mark.parametrize("loop", ["python", "compiled"])
-def test_what_is_found_does_not_depend_on_loop_and_room(loop, monkeypatch):
+def test_what_is_found_does_not_depend_on_room(monkeypatch):
     expected = run_once("obstacles", {"duration": 1.0}).run["step_errors"]
-    monkeypatch.setenv(CHOICE, loop)
     monkeypatch.setattr(step_check, "ROOM", 1)  # as many checks as grow the arrays three times
     found = hl.run("obstacles", {"duration": 1.0})
-    assert (found.run["in_python"] == {}) == (loop == "compiled")
+    assert found.run["in_python"] == {}
     assert found.run["step_errors"] == expected
     assert expected["virtual_mechanism"]["checked"] > 4

@@ -1,4 +1,4 @@
-"""What happens at given times: in both loops, against closed forms and the run's own signals."""
+"""What happens at given times: against closed forms and the run's own signals."""
 
 import math
 
@@ -7,7 +7,6 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
-from tests.orchestrator.results.records import tables_of
 
 K, B = np.array([100.0, 100.0, 0.5]), np.array([70.0, 70.0, 0.375])  # of F_drift, by default
 
@@ -29,13 +28,6 @@ def seen(run):
     force = vectors(run, "controller.F_drift")
     v_D = vectors(run, "haptic_device.v")
     return known[0] - (force - B * (known[1] - v_D)) / K
-
-
-def test_both_loops_write_the_same_bytes(tmp_path, monkeypatch):
-    compiled = hl.run("scenario", out=tmp_path / "c", figures=False)
-    monkeypatch.setenv("HAPTICLINK_LOOP", "python")
-    python = hl.run("scenario", out=tmp_path / "python", figures=False)
-    assert tables_of(compiled.folder) == tables_of(python.folder)
 
 
 @pytest.mark.parametrize(
