@@ -31,6 +31,7 @@ BUILDINGS = {
     "fmus": (".", "native", "engine"),
     "orchestrator": (
         "base",
+        "host",
         "fmi",
         "holds",
         "scene",

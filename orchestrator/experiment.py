@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, nullcontext
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interpreter_state, interrupt
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.describe_run import setup
+from hapticlink.orchestrator.host import crash_monitor, host_state
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.results import folder_lock
+from hapticlink.orchestrator.results import folder_lock, record_crash
 from hapticlink.orchestrator.results.read_results import (
     IN_MEMORY,
     Results,
@@ -31,7 +32,7 @@ from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.results.write_files import remove_rows
-from hapticlink.orchestrator.run import crash_monitor
+from hapticlink.orchestrator.run.compiled import library
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
 from hapticlink.orchestrator.run.fetched_outputs import with_fetched
@@ -110,6 +111,14 @@ def _fits_in_memory(system: System, columns: Mapping[str, Sequence[str]]) -> boo
     return 8 * written <= IN_MEMORY
 
 
+def _watch(folder: Path) -> AbstractContextManager[None]:
+    """Context in which a crash of this process is recorded in a folder."""
+    guard: Callable[[int], object] = lambda on: None  # noqa: E731
+    with suppress(Fault):  # which the run itself reports
+        guard = library.load().guard
+    return crash_monitor.watch_for_crash(folder, record_crash.__name__, guard)
+
+
 @interrupt.held()
 def simulate(
     scene: str | Path | Scene,
@@ -152,7 +161,7 @@ def simulate(
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         if in_memory and not foreign and _fits_in_memory(system, tables):
             memory = RunResults()
-            with interpreter_state.restored():
+            with host_state.restore_interpreter():
                 outcome = run(plan, memory, progress, real_time)
             return Experiment(
                 read, system, outcome, folder, before, outcome.ending(build_time), memory
@@ -161,9 +170,9 @@ def simulate(
         csv = csv and read.record.format == "csv"
         with RunFolder(folder, before, csv) as results:
             with (
-                crash_monitor.watched(folder) if foreign else nullcontext(),
-                interpreter_state.directory_restored(*foreign),
-                interpreter_state.restored(),
+                _watch(folder) if foreign else nullcontext(),
+                host_state.restore_directory(*foreign),
+                host_state.restore_interpreter(),
             ):
                 outcome = run(plan, results, progress, real_time)
             try:

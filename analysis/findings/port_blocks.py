@@ -67,39 +67,42 @@ def by_block(
     shaping, mechanism = np.zeros(len(stored)), stored.copy()
 
     def add(name: str, energy: Vector) -> None:
-        blocks[name] = blocks.get(name, 0.0) + energy
+        blocks[name] = np.add(blocks.get(name, 0.0), energy, out=energy)
 
-    def on(signal: str, position: str) -> tuple[Vector, Vector] | None:
-        if of_block(results, signal, 3) is None or of_block(results, position, 3) is None:
-            return None
-        return works.of(signal, position)
+    def ideal(signal: str, position: str) -> Vector | None:
+        there = of_block(results, signal, 3) and of_block(results, position, 3)
+        return works.of(signal, position)[1] if there else None
+
+    def made_by_hold(signal: str, position: str) -> Vector | None:
+        there = of_block(results, signal, 3) and of_block(results, position, 3)
+        return np.subtract(*works.of(signal, position)) if there else None
 
     for user, done in put_in.items():
         point, handle = poses(user)
-        shaping = shaping - done
+        shaping -= done
         for name, signal in WRENCHES.items():
-            if wrench := on(signal_of_user(signal, user), handle):
-                add(name, wrench[1])
-                shaping = shaping - wrench[1]
+            if (energy := ideal(signal_of_user(signal, user), handle)) is not None:
+                shaping -= energy
+                add(name, energy)
         driven = signal_of_user(MOTOR_WRENCH, user)
-        if motors := on(driven, handle):
-            add(f"hold of {driven}", motors[0] - motors[1])
-            shaping = shaping - (motors[0] - motors[1])
-        if contact := on(signal_of_user(ENVIRONMENT_WRENCH, user), point):
-            add("environment", -contact[1])
-            shaping = shaping + contact[1]
+        if (energy := made_by_hold(driven, handle)) is not None:
+            shaping -= energy
+            add(f"hold of {driven}", energy)
+        if (energy := ideal(signal_of_user(ENVIRONMENT_WRENCH, user), point)) is not None:
+            shaping += energy
+            add("environment", np.negative(energy, out=energy))
         for source, target in _sources(results, user):
             if not (table_of(results, source) and of_block(results, point, 3)):
                 continue
             sign = -1.0 if target.endswith("F_drift") else 1.0
-            name = f"{source} -> {target}"
-            held, ideal = works.of(source, point, sign, name)
-            mechanism = mechanism - held
+            held, energy = works.of(source, point, sign, f"{source} -> {target}")
+            mechanism -= held
             if source == signal_of_user(DRIFT_WRENCH, user):
-                add("drift", ideal)
-                add(f"hold of {source} on the mechanism", held - ideal)
+                held -= energy
+                add("drift", energy)
+                add(f"hold of {source} on the mechanism", held)
             else:
-                shaping = shaping + held
+                shaping += held
     return {"shaping": shaping, **blocks, "mechanism": mechanism}
 
 

@@ -138,10 +138,8 @@ def user_port(results: Results) -> UserPort | None:
     rows = rows_until(mechanism, device["time"][-1])
     time = mechanism["time"][rows]
     works = Works(results, time)
-    stored = mechanism[MECHANISM_ENERGY][rows]
-    stored = stored - float(mechanism[MECHANISM_ENERGY][0])
     put_in = {"": works.of(HAND_WRENCH, HANDLE_POSE)[0]}
-    further = np.zeros(len(time))
+    further: Vector | float = 0.0
     for name in results.record.connections:
         hand, _, target = name.partition(" -> ")
         point = target.removesuffix(".F_hand").removeprefix(f"{MECHANISM}.")
@@ -158,11 +156,13 @@ def user_port(results: Results) -> UserPort | None:
         if with_device:
             put_in[point] = done
         else:
-            further += done
-    generated = stored - further - sum(put_in.values())
+            further = further + done
+    stored = mechanism[MECHANISM_ENERGY]
+    stored = stored[rows] - float(stored[0]) - further
     lacks = needed(results, put_in) & {*results.record.not_recorded}
-    blocks = {} if lacks else by_block(results, works, stored - further, put_in)
-    hands = further + sum(put_in.values())
+    blocks = {} if lacks else by_block(results, works, stored, put_in)
+    on_handles: Vector = sum(put_in.values(), start=np.zeros(len(time)))
+    generated, hands = stored - on_handles, on_handles + further
     single = _works(results, works, device, time)
     return UserPort(time, hands, generated, blocks, single, hand_work(results))
 
@@ -195,11 +195,10 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
         and of_block(results, handle := signal_of_user(HANDLE_POSE, user), 3)
     }
     if contact := of_block(results, ENVIRONMENT_WRENCH, 3):
-        force = contact[ENVIRONMENT_WRENCH]
-        done = work_of_source(time, contact, force, contact, POINT_POSE)
+        done = work_of_source(time, contact, ENVIRONMENT_WRENCH, contact, POINT_POSE)
         found["F_env on the mechanism"] = last(done)
     if (added := _held_mobility(results, device)) is not None:
-        done = work_as_held(time, added, device["time"], device, HANDLE_POSE)
+        done = work_as_held(time, added.__getitem__, device["time"], device, HANDLE_POSE)
         found["held mobility"] = last(done)
     return found
 

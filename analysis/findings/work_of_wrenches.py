@@ -6,6 +6,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
@@ -56,43 +57,55 @@ def _sums(rows: int, steps: Callable[[Table], Vector], table: Table) -> Vector:
     return sums
 
 
+def _at(times: Vector, known: Vector, series: Vector) -> Vector:
+    """A series at other times, linear between those at which it is known."""
+    return series if np.array_equal(times, known) else np.interp(times, known, series)
+
+
 def work_as_held(
-    times: Vector, force: Vector, known: Vector, moved: Table, position: str
+    times: Vector,
+    force_at: Callable[[NDArray[np.intp]], Vector],
+    known: Vector,
+    moved: Table,
+    position: str,
 ) -> Vector:
-    """The work (J), until some times (s), of the newest of the forces (n, 3), which are known from
-    some times on, over the steps of a position. A force that comes after a newer one does not
-    act."""
-    order = np.argsort(known, kind="stable")
-    newest = np.maximum.accumulate(order)
-    known = known[order]
+    """The work (J), until some times (s), of the newest of the forces of some rows, (n, 3), which
+    are known from some times on, over the steps of a position. A force that comes after a newer one
+    does not act."""
+    newest = None
+    if (known[1:] < known[:-1]).any():
+        order = np.argsort(known, kind="stable")
+        known, newest = known[order], np.maximum.accumulate(order)
 
     def steps(block: Table) -> Vector:
         rows = np.searchsorted(known, block["time"][:-1] + 1e-12, "right") - 1
-        held = force[newest[np.maximum(rows, 0)]]
+        rows = np.maximum(rows, 0)
+        held = force_at(rows if newest is None else newest[rows])
         work: Vector = (held * np.diff(block[position], axis=0)).sum(axis=1)
         return work
 
-    return np.interp(times, moved["time"], _sums(len(moved.rows), steps, moved))
+    return _at(times, moved["time"], _sums(len(moved.rows), steps, moved))
 
 
 def work_of_source(
-    times: Vector, wrench: Table, force: Vector, moved: Table, position: str
+    times: Vector, wrench: Table, signal: str, moved: Table, position: str, sign: float = 1.0
 ) -> Vector:
-    """The work (J), until some times (s), of forces (n, 3) that are linear in the displacement
-    between their stamps."""
-    path, place = moved["time"], moved[position]
-    stamps, first = wrench["time"], 0
+    """The work (J), until some times (s), of a wrench that is linear in the displacement between
+    its stamps."""
+    elsewhere = None if moved is wrench else (moved["time"], moved[position])
 
     def steps(block: Table) -> Vector:
-        nonlocal first
-        span = slice(first, first + len(block.rows))
-        first = span.stop - 1
-        at_stamps = np.stack([np.interp(stamps[span], path, x) for x in place.T], axis=1)
-        mean = (force[span][:-1] + force[span][1:]) / 2
+        if elsewhere is None:
+            at_stamps = block[position]
+        else:
+            path, place = elsewhere
+            at_stamps = np.stack([np.interp(block["time"], path, x) for x in place.T], axis=1)
+        force = sign * block[signal]
+        mean = (force[:-1] + force[1:]) / 2
         work: Vector = (mean * np.diff(at_stamps, axis=0)).sum(axis=1)
         return work
 
-    return np.interp(times, stamps, _sums(len(stamps), steps, wrench))
+    return _at(times, wrench["time"], _sums(len(wrench.rows), steps, wrench))
 
 
 def absolute_work(results: Results, signal: str, position: str) -> float:
@@ -108,16 +121,19 @@ def absolute_work(results: Results, signal: str, position: str) -> float:
     return float(sums[-1]) if len(sums) else 0.0
 
 
-def _passing(series: Vector, times: Vector, until: float, value: float) -> Vector:
-    """A series changed in proportion to its own path so that it passes `value` at a time that is
-    among its times."""
-    path = np.concatenate([[0.0], np.abs(np.diff(series)).cumsum()])
-    at = int(np.searchsorted(times, until))
-    to = float(path[at])
+def _passing(series: Vector, times: Vector, at: int, value: float) -> Vector:
+    """A series changed in proportion to its own path so that it passes `value` at the time with the
+    number `at`."""
+    path = np.zeros(len(series))
+    np.subtract(series[1:], series[:-1], out=path[1:])
+    np.cumsum(np.abs(path, out=path), out=path)
+    to, change = float(path[at]), value - float(series[at])
     if not to:
-        path, to = times - times[0], max(until - float(times[0]), 1e-300)
-    changed: Vector = series + (value - float(series[at])) * path / to
-    return changed
+        path, to = times - times[0], max(float(times[at] - times[0]), 1e-300)
+    path *= change
+    path /= to
+    path += series
+    return path
 
 
 class Works:
@@ -140,17 +156,27 @@ class Works:
             raise KeyError(f"work needs the signals {signal} and {position}")
         meters, start = results.record.meters, f"{signal} -> {position.partition('.')[0]}."
         name = connection or next((each for each in meters if each.startswith(start)), None)
-        meter = meters[name] if name else None
-        force = sign * table[signal]
         known = arrivals(results.record, name, table, table is moved) if name else table["time"]
-        if meter:  # where the meter stops may be between or after the times
-            times = np.unique(np.append(times, meter.until))
-        acts = work_as_held(times, force, known, moved, position)
-        source = work_of_source(times, table, force, moved, position)
+
+        def force_at(rows: NDArray[np.intp]) -> Vector:
+            if not len(rows):
+                return np.zeros((0, 3))
+            first = int(rows.min())
+            part = table.part(slice(first, int(rows.max()) + 1))
+            return sign * part[signal][rows - first]
+
+        meter = meters[name] if name else None
+        at = int(np.searchsorted(times, meter.until)) if meter else 0
+        if between := meter and not (at < len(times) and times[at] == meter.until):
+            times = np.insert(times, at, meter.until)
+        acts = work_as_held(times, force_at, known, moved, position)
         if meter:
-            asked = np.searchsorted(times, self._times)
-            acts = _passing(acts, times, meter.until, meter.held)[asked]
-            source = _passing(source, times, meter.until, meter.ideal)[asked]
+            acts = _passing(acts, times, at, meter.held)
+        source = work_of_source(times, table, signal, moved, position, sign)
+        if meter:
+            source = _passing(source, times, at, meter.ideal)
+        if between:
+            acts, source = np.delete(acts, at), np.delete(source, at)
         if connection is None:
             self._last[signal, position] = last(acts)
         return acts, source

@@ -19,10 +19,9 @@ from typing import Any
 import numpy as np
 from fmpy import fmi2
 
-from hapticlink.orchestrator.base import interpreter_state
 from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries, rounding_mode
+from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.instance import Instance
@@ -41,6 +40,7 @@ from hapticlink.orchestrator.fmi.status import (
 )
 from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, as_signal, transfers
 from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
+from hapticlink.orchestrator.host import host_state
 
 
 class InProcess(Instance):
@@ -66,7 +66,7 @@ class InProcess(Instance):
     def _load(self) -> None:
         try:
             self._folder = process_cache.unpack(self.description, self._folder)
-            with interpreter_state.directory_restored(self.name):
+            with host_state.restore_directory(self.name):
                 self.slave = self._instantiate()
             self._keep_arithmetic()
         except Exception as error:  # FMPy raises bare Exception
@@ -206,7 +206,7 @@ class InProcess(Instance):
 
     def _keep_arithmetic(self) -> None:
         """Restores how this process rounds numbers where an FMU of others has changed it."""
-        if self.description.block is None and rounding_mode.restored():
+        if self.description.block is None and host_state.restore_rounding():
             self.place.altered += 1
 
     # --- the loop -------------------------------------------------------------------------

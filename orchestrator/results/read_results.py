@@ -26,7 +26,7 @@ TABLES = (".csv", rows_file.SUFFIX)
 """Endings of the names of tables."""
 IN_MEMORY = 1 << 24
 """Bytes of the rows of a table, above which they stay in their file."""
-BLOCK = 1 << 15
+BLOCK = 1 << 13
 """Rows of a long run that are in memory at a time."""
 
 
@@ -73,7 +73,13 @@ class Table(Mapping[str, Vector]):
             yield self
             return
         for first in range(0, len(self.rows) - more, BLOCK):
-            yield Table(self.columns, self.rows[first : first + BLOCK + more])
+            yield self.part(slice(first, first + BLOCK + more))
+
+    def part(self, span: slice) -> Table:
+        """The table of some rows."""
+        part = Table(self.columns, self.rows[span])
+        vars(part).update(_places=self._places, _arrays=self._arrays)
+        return part
 
     def by_row(self, of_rows: Callable[..., Vector], *names: str) -> Vector:
         """What a function gives for the rows of signals, (k, ...) -> (k,) or (n, k). Of a long run

@@ -9,9 +9,10 @@ from time import perf_counter
 
 import numpy as np
 
-from hapticlink.orchestrator.base import interpreter_state, interrupt, plugins
+from hapticlink.orchestrator.base import interrupt, plugins
 from hapticlink.orchestrator.base.errors import AsksToEnd, Diverged, Fault, Interrupted
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.host import host_state
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal, delays
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
@@ -151,7 +152,9 @@ def _run_events(
             progress(time)
 
     try:
-        with interpreter_state.restored():  # tables are written with all the depth that there is
+        with (
+            host_state.restore_interpreter()
+        ):  # tables are written with all the depth that there is
             loop.run(turn)
     finally:
         outcome.wall_time = perf_counter() - begin

@@ -4,7 +4,7 @@ from contextlib import nullcontext
 
 import pytest
 
-from hapticlink.orchestrator.run import crash_monitor
+from hapticlink.orchestrator.host import crash_monitor
 
 
 @pytest.fixture(autouse=True)
@@ -12,7 +12,7 @@ def crash_monitor_of_runs(monkeypatch):
     """Runs in the process of the tests start no watchdog, which acts only where that process
     crashes. The tests of run/test_faults.py and run/test_interrupt.py, which have it, replace
     this fixture."""
-    monkeypatch.setattr(crash_monitor, "watched", lambda folder: nullcontext())
+    monkeypatch.setattr(crash_monitor, "watch_for_crash", lambda *_: nullcontext())
 
 
 @pytest.fixture(scope="module", autouse=True)
