@@ -173,7 +173,11 @@ class _Tuning:
             if reached < self._margin * (1 - 2 * FINE):
                 scales = {law: s * reached / self._margin for law, s in scales.items()}
                 reached = judge.margin(scales)
-                self._require_limits(feel, scales)
+                try:
+                    self._require_limits(feel, scales)
+                except InputFault as fault:
+                    why = f"no gains keep the margin at the scene's own rates and limits: {fault}"
+                    raise InputFault(f"{why}; {REMEDY}") from None
             self.result.margins["tuned"] = reached
             self._take(feel, scales)
         return scales
