@@ -24,7 +24,6 @@ from hapticlink.analysis.advise.advise_method import (
     advise,
     all_methods,
     on_draws,
-    within,
 )
 from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.sweep.row import METRIC, Row
@@ -81,7 +80,8 @@ def judged(seed: int, folder: Path, processes: int) -> Judged:
     read = open_scene.load(name, options)
     apart = list(draws(read, DRAWS, SEED))
     rows = on_draws(name, options, all_methods(read), apart, folder / "apart", processes=processes)
-    kept = {method: sum(map(within, found)) for method, found in rows.items()}
+    limits = advice.limits
+    kept = {method: sum(not limits.why_not(row) for row in found) for method, found in rows.items()}
     able = [method for method in rows if kept[method] == DRAWS]
     best = min(able, key=lambda m: _error(rows[m])) if able else None
     taken = advice.taken.method

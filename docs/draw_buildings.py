@@ -44,7 +44,17 @@ BUILDINGS = {
         ".",
     ),
     "programs": (".",),
-    "analysis": ("findings", "stability", "sweep", "maps", "tune", "transparency", "advise", "fit"),
+    "analysis": (
+        "findings",
+        "sweep",
+        "search",
+        "stability",
+        "maps",
+        "tune",
+        "transparency",
+        "advise",
+        "fit",
+    ),
     "visualization": (
         ".",
         "mechanism",

@@ -13,12 +13,10 @@ from scipy.optimize import brentq
 from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep.grid import Axis, Point
 from hapticlink.analysis.sweep.job import Job, job
-from hapticlink.analysis.sweep.row import REFUSED, Row
-from hapticlink.orchestrator.base import plugins
+from hapticlink.analysis.sweep.row import DONE, REFUSED, Row
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 
-DONE = "done"
 FINE = 2e-4
 """Of a value at the boundary, relative."""
 
@@ -115,9 +113,9 @@ def judged(session: SceneVariants, at: str, options: Sequence[str]) -> Row:
     }
 
 
-def work(each: Line) -> Row:
+def judge(each: Line, _: Path) -> Row:
+    """The row of a line, with those of its points."""
     assert each.scene is not None
-    plugins.load(each.plugins)
     rows: list[Row] = []
     with SceneVariants(each.scene) as session:
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.maps.boundary_lines import COLUMNS, DONE, Line, judged, line
+from hapticlink.analysis.maps.boundary_lines import COLUMNS, Line, judged, line
 from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep.grid import Point
-from hapticlink.analysis.sweep.row import Row
+from hapticlink.analysis.sweep.row import DONE, Row
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import plugins, temporary_folders
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import JOINT_RATES, POINT_VELOCITY
@@ -65,10 +65,9 @@ def jobs(scene: str | Path | Scene, options: Sequence[str], points: Sequence[Poi
     return made
 
 
-def work(each: Line) -> Row:
+def judge(each: Line, _: Path) -> Row:
     """The row of a check: the map's verdict, and that of a run of the scene."""
     assert each.scene is not None
-    plugins.load(each.plugins)
     with SceneVariants(each.scene) as session:
         row = judged(session, "check", [])
     if "growth_rate" not in row:

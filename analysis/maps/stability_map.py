@@ -5,20 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
-from typing import Any
 
 from hapticlink.analysis.maps import boundary_lines, run_checks
-from hapticlink.analysis.maps.boundary_lines import DONE
-from hapticlink.analysis.sweep import pool, table
-from hapticlink.analysis.sweep.grid import Axis, number
-from hapticlink.analysis.sweep.job import Job
+from hapticlink.analysis.maps.boundary_lines import Line
+from hapticlink.analysis.sweep.grid import Axis, grid, number
 from hapticlink.analysis.sweep.row import Row
-from hapticlink.analysis.sweep.run_sweep import Unfinished
+from hapticlink.analysis.sweep.run_sweep import Judge, tabulate
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 
 
@@ -38,6 +34,7 @@ class Map:
         return [row for row in self.rows if row.get("at") == at]
 
 
+@interrupt.held()
 def compute_map(
     scene: str | Path | Scene,
     options: Sequence[str],
@@ -65,66 +62,35 @@ def compute_map(
     plane = numeric[:2]
     others = [axis for axis in axes if axis not in plane]
     x, y = plane[0], plane[1] if len(plane) == 2 else None
-    panels = [dict(zip((a.key for a in others), v, strict=True)) for v in _combined(others)]
-    keep = _Kept(folder, tell)
-    with interrupt.held():
-        rows = keep.all(
-            [
-                line
-                for panel in panels
-                for line in boundary_lines.along(scene, options, panel, y or x, y and x)
-            ],
-            boundary_lines.work,
+    panels = grid(others)
+
+    def add(lines: Sequence[Line], judge: Judge, before: Sequence[Row]) -> list[Row]:
+        return tabulate(
+            lines,
+            folder,
+            judge,
             processes,
+            tell=lambda done: tell(done, len(lines)),
+            before=before,
+            name="map.csv",
+            each_time=True,
         )
-        if y:
-            rows = keep.all(
-                boundary_lines.across(scene, options, rows, x, y), boundary_lines.work, processes
-            )
-        if check:
-            points = run_checks.chosen(rows, check, seed)
-            rows = keep.all(run_checks.jobs(scene, options, points), run_checks.work, processes)
+
+    lines = [
+        line
+        for panel in panels
+        for line in boundary_lines.along(scene, options, panel, y or x, y and x)
+    ]
+    rows = add(lines, boundary_lines.judge, ())
+    if y:
+        across = boundary_lines.across(scene, options, rows, x, y)
+        rows = add(across, boundary_lines.judge, rows)
+    if check:
+        points = run_checks.chosen(rows, check, seed)
+        rows = add(run_checks.jobs(scene, options, points), run_checks.judge, rows)
     first = open_scene.load(scene, options)
     return Map(first, rows, x.key, y.key if y else None, tuple(a.key for a in others))
 
 
-class _Kept:
-    """Does jobs that are not done yet, and writes the rows of all."""
-
-    def __init__(self, folder: Path, tell: Callable[[int, int], None]) -> None:
-        self._folder, self._tell = folder, tell
-        self._rows = table.Rows(folder / "rows")
-        self._done: list[Row] = []
-
-    def all(self, jobs: Sequence[Job], work: Callable[[Any], Row], processes: int) -> list[Row]:
-        """The rows of all jobs so far. A job that failed for a reason other than its scene is
-        repeated by the next call."""
-        found = {j.key: kept for j in jobs if (kept := self._rows.find(j.key))}
-        missing = list({j.key: j for j in jobs if j.key not in found}.values())
-        try:
-            for each, row in pool.in_processes(work, missing, processes):
-                if row["end"] == DONE:
-                    self._rows.keep(each.key, row)
-                found[each.key] = row
-                self._tell(len(found), len(jobs))
-                self._write(jobs, found)
-        except Interrupted:
-            raise Unfinished(len(found), len(jobs), self._folder, "map.csv") from None
-        self._done = self._write(jobs, found)
-        return self._done
-
-    def _write(self, jobs: Sequence[Job], found: dict[str, Row]) -> list[Row]:
-        rows = [*self._done]
-        for each in jobs:
-            for row in found.get(each.key, {"rows": ()}).get("rows", (found.get(each.key),)):
-                rows.append({**each.point, **row})
-        table.write(self._folder / "map.csv", rows)
-        return rows
-
-
 def _numeric(axis: Axis) -> bool:
     return len(axis.values) > 1 and all(number(value) is not None for value in axis.values)
-
-
-def _combined(axes: Sequence[Axis]) -> list[tuple[str, ...]]:
-    return list(product(*(axis.values for axis in axes)))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD, free, holds
 from hapticlink.analysis.stability.linear_period import LinearPeriod

@@ -17,6 +17,7 @@ from typing import Annotated
 
 import numpy as np
 
+from hapticlink.analysis.search.acceptance import broken_limit
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import in_poses
 from hapticlink.analysis.stability.hands import FREE, HANDS, OWN, OWN_FREE, UNHELD, holds, own_hand
@@ -43,6 +44,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, shortened
 from hapticlink.orchestrator.fmi import process_cache
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -89,13 +91,16 @@ def stability(
     read, rounded = short(with_quicker_fmus(read))
     with interrupt.held(), process_cache.unpacked_once():
         (progress or _silent)("the scene's own run", 0, poses + 2)
-        own, own_fault = _visited(read, poses, grid)
+        own, own_run = _visited(read, poses, grid)
+        own_fault = fault_of(own_run)
 
-        def visits(changed: Scene) -> list[Pose]:
-            found, fault = (own, own_fault) if changed is read else _visited(changed, poses, grid)
-            if fault and not own_fault:
+        def visits(changed: Scene) -> tuple[list[Pose], str]:
+            if changed is read:
+                return own, ""
+            found, run = _visited(changed, poses, grid)
+            if (fault := fault_of(run)) and not own_fault:
                 raise InputFault(fault)
-            return found
+            return found, broken_limit(changed, run)
 
         judged = _judged(read, visits, hands, bounds, progress, rounded)
     return replace(judged, run_fault=own_fault)
@@ -143,8 +148,8 @@ def hands_of(hand: Hand) -> dict[str, Hand]:
     return {**HANDS, (OWN_FREE if damped else FREE): own_hand(hand)}
 
 
-def _visited(read: Scene, count: int, grid: int) -> tuple[list[Pose], str]:
-    """The poses that a scene's own run visits, and how that failed, "" where it did not."""
+def _visited(read: Scene, count: int, grid: int) -> tuple[list[Pose], Results]:
+    """The poses that a scene's own run visits, and that run."""
     assert read.linkage is not None
     run = simulated(read, {"duration": SPAN, "stop_when": ""})
     poses = evenly_spaced(run, read.linkage, count)
@@ -153,7 +158,7 @@ def _visited(read: Scene, count: int, grid: int) -> tuple[list[Pose], str]:
             poses += settled(read, read.linkage)
     if grid:
         poses += grid_poses(run, read, read.linkage, grid)
-    return poses, fault_of(run)
+    return poses, run
 
 
 def _judged_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> Stability:
@@ -173,12 +178,12 @@ def _judged_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> S
         ) from None
 
 
-def _at_rest(read: Scene) -> list[Pose]:
+def _at_rest(read: Scene) -> tuple[list[Pose], str]:
     """Where the run of a scene comes to rest."""
     if read.linkage is None:
         raise InputFault("no linkage: nothing that comes to rest in a pose")
     with interrupt.held():
-        return [rest(read, read.linkage)]
+        return [rest(read, read.linkage)], ""
 
 
 def _judged(
@@ -190,7 +195,7 @@ def _judged(
     rounded: str,
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
-    step, visited = progress or _silent, visits(read)
+    step, (visited, _) = progress or _silent, visits(read)
     with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(
             read, visited, hands, bounds, lambda done, of: step("poses", done + 1, of + 2)

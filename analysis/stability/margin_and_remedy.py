@@ -10,10 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from fractions import Fraction
 
-from hapticlink.analysis.stability.bisection import largest
-from hapticlink.analysis.stability.gains import LAWS
+from hapticlink.analysis.search.search import (
+    Largest,
+    judge_best_first,
+    largest_count,
+    largest_scale,
+)
+from hapticlink.analysis.search.settings import LAWS, REMEDIES, set_rate
 from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.modes import Bounds
@@ -24,18 +28,14 @@ from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.base.signal_names import CONTROLLER
-from hapticlink.orchestrator.base.ticks import exact, written
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
 
 FINE = 0.1
 """Of the logarithm of the factor on all stiffnesses."""
-FINEST = 2
-"""Of a count, the part to which it is found."""
 LATEST, SLOWEST = 8, 64
 """Haptic periods up to which a further delay, and a frame, are tried."""
-HOLDS = ("zoh", "foh", "lead", "mean")
-"""That are tried as a remedy."""
 SAFE = 1.25
 """By how much gains that are advised stay below their limit."""
 DAMPINGS = (0.5, 2.0)
@@ -48,8 +48,9 @@ DECAY = 0.05
 """Rate (1/s) at which a scene with a remedy decays at least, lest what is frozen takes it back."""
 
 
-Visited = Callable[[Scene], Sequence[Pose]]
-"""The poses in which a scene is judged."""
+Visited = Callable[[Scene], tuple[Sequence[Pose], str]]
+"""The poses in which a scene is judged, and which limit of `search/acceptance.py` its run
+breaks."""
 
 
 @dataclass(frozen=True)
@@ -63,18 +64,22 @@ class Margin:
     """The further delay (s) of all that the controller reads."""
     rate: float | None
     """The lowest graphics rate (Hz) down to which it is stable; infinite where it is with none."""
+    not_searched_further: tuple[str, ...] = ()
+    """The quantities that are stable as far as they were searched: at least these."""
 
 
 @dataclass(frozen=True)
 class Remedy:
     """Options, and the growth rate (1/s) of the worst case in all poses and hands with them, those
     aside that are marginal or only drift. stable: whether it decays by DECAY at least; marginal:
-    the hands in which small motions neither grow nor decay in some pose."""
+    the hands in which small motions neither grow nor decay in some pose; breaks: the limit that the
+    run with them breaks."""
 
     options: tuple[str, ...]
     growth: float
     stable: bool
     marginal: tuple[str, ...] = ()
+    breaks: str = ""
 
 
 def improvements(
@@ -118,35 +123,40 @@ class _Search:
         return at_pose(read, self._pose, held=self._hands.keys() != {UNHELD})
 
     def margin(self, place: RestingScene) -> Margin:
-        stiffness = None
+        found: dict[str, Largest] = {}
         if place.gains.laws:
-            try:
-                stiffness = largest(lambda s: self._stable(place, s), FINE)
-            except InputFault:
-                stiffness = 0.0
-        stable = (stiffness is not None and stiffness >= 1.0) or self._stable(place)
-        delay = None
+            found["stiffness"] = largest_scale(lambda s: self._stable(place, s), FINE)
+        stable = ("stiffness" in found and found["stiffness"].value >= 1.0) or self._stable(place)
         if CONTROLLER in place.map.system.fmu:
-            late = _last(lambda n: self._stable(place, late=n), 1, LATEST) if stable else 0
-            delay = float(late / self._haptic)
-        return Margin(stiffness, delay, self._rate(stable))
+            found["delay"] = Largest(0.0)
+            if stable:
+                found["delay"] = largest_count(lambda n: self._stable(place, late=n), 1, LATEST)
+        if self._read.graphics is not None:
+            found["rate"] = self._slowest_frame(stable)
+        beyond = tuple(name for name, limit in found.items() if not limit.limited)
+        stiffness, delay, frame = (found.get(name) for name in ("stiffness", "delay", "rate"))
+        return Margin(
+            stiffness=stiffness.value if stiffness else None,
+            delay=float(int(delay.value) / self._haptic) if delay else None,
+            rate=self._frame_rate(int(frame.value)) if frame else None,
+            not_searched_further=beyond,
+        )
 
-    def _rate(self, stable: bool) -> float | None:
-        """The lowest graphics rate of whole haptic periods that is stable, with all above it that
-        were tried, from the scene's own on, at which it is `stable` or not."""
-        if self._read.graphics is None:
-            return None
+    def _frame_rate(self, periods: int) -> float:
+        """The graphics rate (Hz) whose frames are so many haptic periods."""
+        return float(self._haptic / periods) if periods else float("inf")
+
+    def _slowest_frame(self, stable: bool) -> Largest:
+        """The longest frame, in haptic periods, that is stable, with all shorter ones that were
+        tried, from the scene's own on, at which it is `stable` or not."""
         own = frame_length(self._read)
 
         def holds(n: int) -> bool:
             return (
-                stable
-                if n == own
-                else self._growth([_set_rate("graphics", self._haptic / n)]) < 0.0
+                stable if n == own else self._growth([set_rate("graphics", self._haptic / n)]) < 0.0
             )
 
-        frames = _last(holds, own, SLOWEST)
-        return float(self._haptic / frames) if frames else float("inf")
+        return largest_count(holds, own, SLOWEST)
 
     def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
         """Whether all hands are stable with gains scaled, and all that the controller reads some
@@ -179,7 +189,7 @@ class _Search:
     ) -> Iterator[tuple[str, ...]]:
         """Single changes of the scene, and the last resort, softer gains and rate together."""
         read, gains = self._read, place.gains
-        for hold in HOLDS:
+        for hold in REMEDIES:
             if read.graphics is not None and hold != read.hold and not read.holds:
                 yield (f"hold={hold}",)
         if softer:
@@ -196,13 +206,13 @@ class _Search:
                 rate = self._haptic / max(1, round(self._haptic / margin.rate))
             for factor in (1, *FASTER):
                 if rate < factor * rate <= self._haptic or factor == 1:
-                    yield (_set_rate("graphics", factor * rate), *(softer if factor == 1 else ()))
+                    yield (set_rate("graphics", factor * rate), *(softer if factor == 1 else ()))
             if read.mechanism_at == "graphics":
                 yield ("mechanism_at=haptics",)
         for factor in FASTER:
-            yield (_set_rate("haptics", factor * self._haptic),)
+            yield (set_rate("haptics", factor * self._haptic),)
             if softer:
-                yield (_set_rate("haptics", factor * self._haptic), *softer)
+                yield (set_rate("haptics", factor * self._haptic), *softer)
 
     def remedies(
         self, candidates: Sequence[tuple[str, ...]], softer: tuple[str, ...], visited: Visited
@@ -211,57 +221,35 @@ class _Search:
         as it will be with them, in the poses of its changed run; the best of TRIED where none is.
         And softer gains with which all decays."""
         growth = {change: self._growth(change) for change in candidates}
-        judged: dict[tuple[str, ...], Remedy] = {}
         # What leaves the same mode of an arm differs by rounding: fewer options, which come first.
-        best = sorted(growth, key=lambda change: float(f"{growth[change]:.9g}"))
-        for change in best[:TRIED]:
-            if growth[change] >= 0.0 and judged:
-                break
-            judged[change] = self._in_all(change, visited)
-            if judged[change].stable and not judged[change].marginal:
-                break
-        if growth.get(softer, 0.0) < 0.0 and softer not in judged:
-            judged[softer] = self._in_all(softer, visited)
-        every = sorted(judged.values(), key=lambda r: (r.growth >= 0.0, len(r.marginal), r.growth))
+        best = sorted(growth, key=lambda change: float(f"{growth[change]:.9g}"))[:TRIED]
+        judged = list(
+            judge_best_first(
+                best[:1] + [change for change in best[1:] if growth[change] < 0.0],
+                lambda changes: [self._in_all(change, visited) for change in changes],
+                lambda remedy: remedy.stable and not remedy.marginal and not remedy.breaks,
+            )
+        )
+        if growth.get(softer, 0.0) < 0.0 and softer not in (remedy.options for remedy in judged):
+            judged.append(self._in_all(softer, visited))
+        every = sorted(
+            judged, key=lambda r: (r.growth >= 0.0, bool(r.breaks), len(r.marginal), r.growth)
+        )
         return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
 
     def _in_all(self, change: tuple[str, ...], visited: Visited) -> Remedy:
         changed, _ = short(open_scene.load(self._read, change))
         try:
-            poses = visited(changed)
+            poses, broken = visited(changed)
         except (InputFault, FmuFault):  # its run fails
             return Remedy(change, float("inf"), False)
         cases, without = in_poses(changed, poses, self._hands, self._bounds)
         worst = _worst(cases) if cases and not without else float("inf")
         marginal = dict.fromkeys(case.hand for case in cases if case.verdict == "marginal")
-        return Remedy(change, worst, worst < -DECAY, tuple(marginal))
-
-
-def _set_rate(clock: str, rate: Fraction) -> str:
-    """The option that sets a rate."""
-    return f"{clock}.rate={written(rate)}"
+        return Remedy(change, worst, worst < -DECAY, tuple(marginal), broken)
 
 
 def _worst(cases: Sequence[Case]) -> float:
     """The largest growth rate of the cases that do not only drift, and are not marginal."""
     rates = [case.growth for case in cases if case.verdict != "marginal" and not case.drifts]
     return max(rates, default=-float("inf"))
-
-
-def _last(holds: Callable[[int], bool], first: int, most: int) -> int:
-    """The largest count up to `most` that holds, with all below it that were tried, by doubling or
-    halving the `first` one and bisection to a part FINEST of it; 0 where 1 does not."""
-    low, high = 0, first
-    if holds(first):
-        low, high = first, 2 * first
-        while high <= most and holds(high):
-            low, high = high, 2 * high
-        if high > most:
-            return low
-    else:
-        while (low := high // 2) and not holds(low):
-            high = low
-    while low and high - low > max(1, low // FINEST):
-        middle = (low + high) // 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low

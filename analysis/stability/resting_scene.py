@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from hapticlink.analysis.search.settings import Gains, Scales
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.gains import Gains, Scales
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import spring_hand
 from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough

@@ -156,6 +156,8 @@ class Stability:
                 how = f"improves most, to {remedy.growth:.2g} 1/s, which is not enough"
             if remedy.marginal:
                 how += f"; marginal in {len(remedy.marginal)} of the hands"
+            if remedy.breaks:
+                how += f"; but in its run {remedy.breaks}"
             yield f"{'remedy' if remedy is self.remedies[0] else 'or'}: {options}: {how}"
         if not self.remedies and self.verdict == "unstable":
             yield "remedy: no single change of hold, rate, gain or damping that was tried"
@@ -169,21 +171,26 @@ class Stability:
 
     def _margins(self) -> Iterator[str]:
         margin = self.margin
+        at_least = {q: "at least " for q in margin.not_searched_further}
+        most = {q: " (not searched further)" for q in at_least}
         if margin.stiffness is not None:
             yield (
-                f"stiffnesses times {margin.stiffness:.2g}"
+                f"stiffnesses {at_least.get('stiffness', '')}times {margin.stiffness:.2g}"
+                f"{most.get('stiffness', '')}"
                 if margin.stiffness
                 else "unstable with any stiffness"
             )
         if margin.delay is not None:
             yield (
-                f"{1e3 * margin.delay:.3g} ms of further delay"
+                f"{at_least.get('delay', '')}{1e3 * margin.delay:.3g} ms of further delay"
+                f"{most.get('delay', '')}"
                 if margin.delay
                 else "less than a haptic period of further delay"
             )
         if margin.rate is not None:
             yield (
-                f"graphics down to {margin.rate:.3g} Hz"
+                f"graphics {at_least.get('rate', '')}down to {margin.rate:.3g} Hz"
+                f"{most.get('rate', '')}"
                 if math.isfinite(margin.rate)
                 else "no graphics rate"
             )

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.results.read_results import Results
 Row = dict[str, Any]
 
 METRIC = "tracking_max_mm"
-REFUSED, DIED, INTERRUPTED = "refused", "died", "interrupted"
+DONE, REFUSED, DIED, INTERRUPTED = "done", "refused", "died", "interrupted"
 FAILED = ("fault", "diverged", REFUSED, DIED)
 """Ends with an error: a fault of the run, divergence, bad input, and what is no fault of the scene
 (a process that crashed or hung, a full disk)."""

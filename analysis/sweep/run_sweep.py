@@ -1,4 +1,8 @@
-"""Sweeps: many runs of a scene, a grid or a list, in parallel and resumable, as one table."""
+"""Sweeps: many jobs on a scene, a grid or a list, in parallel and resumable, as one table.
+
+What a job measures is a run of its scene, or whatever else gives a row, such as a line of points of
+a stability map.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from hapticlink.analysis.sweep import cluster, pool, table
 from hapticlink.analysis.sweep.job import Job, key
@@ -17,6 +22,10 @@ from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.fmi import process_cache
 
 Measure = Callable[[Experiment], Row]
+"""Of a run."""
+Judge = Callable[[Any, Path], Row]
+"""Of a job, with a folder for what it writes meanwhile. It is called in other processes. The row of
+several points has them as `rows`."""
 Tell = Callable[[int], None]
 
 
@@ -30,27 +39,32 @@ class Unfinished(Fault):
         )
 
 
-def work(job: Job, folder: Path | None = None, measure: Measure = measure) -> Row:
-    """Runs one job and returns its row; results that are not in memory are kept below `folder` (by
-    default the machine's one for temporary files) until they are measured."""
-    assert job.scene is not None
+def work(job: Job, folder: Path | None, judge: Judge) -> Row:
+    """Does one job and returns its row; what is written meanwhile is kept below `folder` (by
+    default the machine's one for temporary files)."""
     try:
         plugins.load(job.plugins)
     except Fault as missing:
         return failed(DIED, str(missing))
-    if key(job.scene) != job.key:
-        return failed(DIED, "this worker has another version of hapticlink or of what it uses")
     with _room(job, folder) as results:
         try:
-            experiment = simulate(job.scene, results, csv=False, in_memory=True)
-            row, fault = measure(experiment), experiment.outcome.fault
-            return row if fault is None or _of_scene(fault) else row | {"end": _retried(fault)}
+            return judge(job, results)
         except Fault as fault:
             return failed(REFUSED if _of_scene(fault) else _retried(fault), str(fault))
-        except Exception as error:  # the other runs of the sweep go on
+        except Exception as error:  # the other jobs of the sweep go on
             return failed(DIED, f"{type(error).__name__}: {error}")
         finally:
             process_cache.trim()
+
+
+def run(job: Job, results: Path, measure: Measure = measure) -> Row:
+    """The row of a run of the scene of a job."""
+    assert job.scene is not None
+    if key(job.scene) != job.key:
+        return failed(DIED, "this worker has another version of hapticlink or of what it uses")
+    experiment = simulate(job.scene, results, csv=False, in_memory=True)
+    row, fault = measure(experiment), experiment.outcome.fault
+    return row if fault is None or _of_scene(fault) else row | {"end": _retried(fault)}
 
 
 @contextmanager
@@ -77,7 +91,6 @@ def _retried(fault: Fault) -> str:
     return INTERRUPTED if isinstance(fault, Interrupted) else DIED
 
 
-@interrupt.held()
 def sweep(
     jobs: Sequence[Job],
     folder: Path,
@@ -86,12 +99,31 @@ def sweep(
     tell: Tell = lambda done: None,
     measure: Measure = measure,
 ) -> list[Row]:
-    """The rows of `jobs`, in their order, each with its point; `tell` is called with the number of
-    finished runs.
+    """The rows of the runs of `jobs`, as `tabulate`."""
+    judge = partial(run, measure=measure)
+    return tabulate(jobs, folder, judge, processes, scheduler=scheduler, tell=tell)
 
-    A row is stored in `folder`/rows when its run ends and is reused by a later call, unless the run
-    failed for a reason other than its scene. Raises Unfinished if the sweep is interrupted, after
-    writing table.csv with the rows so far, and Fault if the disk is full.
+
+@interrupt.held()
+def tabulate(
+    jobs: Sequence[Job],
+    folder: Path,
+    judge: Judge,
+    processes: int,
+    *,
+    scheduler: str | None = None,
+    tell: Tell = lambda done: None,
+    before: Sequence[Row] = (),
+    name: str = "table.csv",
+    each_time: bool = False,
+) -> list[Row]:
+    """The rows of `jobs`, in their order, each with its point, behind those `before`; `tell` is
+    called with the number of finished jobs.
+
+    A row is stored in `folder`/rows when its job ends and is reused by a later call, unless that
+    failed for a reason other than its scene. The table `name` is written at the end, or `each_time`
+    that a job ends. Raises Unfinished if the sweep is interrupted, after writing the table with the
+    rows so far, and Fault if the disk is full.
     """
     try:
         stored = table.Rows(folder / "rows")
@@ -102,34 +134,41 @@ def sweep(
         def done() -> list[Job]:
             return [j for j in jobs if not j.scene or j.key in rows]
 
+        def write() -> list[Row]:
+            found = [*before]
+            for j in done():
+                row = rows[j.key] if j.scene else failed(REFUSED, j.refusal)
+                found += ({**j.point, **part} for part in row.get("rows", [row]))
+            table.write(folder / name, found)
+            return found
+
         tell(len(done()))
         try:
-            for job, row in _finished(missing, folder, processes, scheduler, measure):
+            for job, row in _finished(missing, folder, processes, scheduler, judge):
                 if row["end"] == INTERRUPTED:  # a signal reached the worker too
                     continue
                 if row["end"] != DIED:  # the next sweep repeats those
                     stored.keep(job.key, row)
                 rows[job.key] = row
                 tell(len(done()))
+                if each_time:
+                    write()
         except Interrupted:
             pass
-        finished = [
-            {**j.point, **(rows[j.key] if j.scene else failed(REFUSED, j.refusal))} for j in done()
-        ]
-        table.write(folder / "table.csv", finished)
+        finished = write()
     except OSError as error:
         raise Fault(f"{folder}: {error}") from error
-    if len(finished) < len(jobs):
-        raise Unfinished(len(finished), len(jobs), folder)
+    if len(done()) < len(jobs):
+        raise Unfinished(len(done()), len(jobs), folder, name)
     return finished
 
 
 def _finished(
-    jobs: Sequence[Job], folder: Path, processes: int, scheduler: str | None, measure: Measure
+    jobs: Sequence[Job], folder: Path, processes: int, scheduler: str | None, judge: Judge
 ) -> Iterator[pool.Done]:
     """Each job with its row, as they finish."""
     if scheduler:
-        yield from cluster.on_cluster(partial(work, measure=measure), jobs, scheduler)
+        yield from cluster.on_cluster(partial(work, folder=None, judge=judge), jobs, scheduler)
         return
     running = folder / ".running"
     clear = partial(shutil.rmtree, running, ignore_errors=True)
@@ -137,7 +176,7 @@ def _finished(
     running.mkdir(parents=True)
     interrupt.add(clear)
     try:
-        of_job = partial(work, folder=running, measure=measure)
+        of_job = partial(work, folder=running, judge=judge)
         yield from pool.in_processes(of_job, jobs, processes)
     finally:
         interrupt.remove(clear)

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import Pose, evenly_spaced, fault_of, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting

@@ -12,10 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.optimize import brentq
 
-from hapticlink.analysis.stability.bisection import DOUBLINGS
-from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.search.search import DOUBLINGS, FINE
+from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.resting_scene import RestingScene
-from hapticlink.analysis.tune.stability_limits import FINE
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
@@ -77,7 +76,7 @@ class Feel:
         gives = {name: float(abs(n @ X @ n)) for name, n in self.along.items()}
         return {name: 1.0 / x if x * RIGID > 1.0 else np.inf for name, x in gives.items()}
 
-    def alike(self, scales: Scales) -> dict[str, float]:
+    def alike(self, scales: Scales) -> Scales:
         """`scales` with the topology's one with which the constraint feels like the contact.
         Raises InputFault where there is none."""
 

@@ -7,14 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from hapticlink.analysis.stability.bisection import largest
-from hapticlink.analysis.stability.gains import Scales
+from hapticlink.analysis.search.search import FINE, largest_scale
+from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.hands import SPRINGS
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.orchestrator.base.errors import InputFault
-
-FINE = 0.01
-"""Of the logarithm of a scale."""
 
 
 class Judge:
@@ -49,13 +46,12 @@ class Judge:
         found = np.inf
         for place in list(self._order):
             if found == np.inf or not self._stable(place, scales, found):
-                try:
-                    found = largest(partial(self._stable, place, scales), fine)
-                except InputFault:
+                found = largest_scale(partial(self._stable, place, scales), fine).value
+                if not found:
                     raise InputFault(
                         f"unstable with any gains in the pose at {place[0]}, in a hand of "
                         f"{place[1]:g} N/m: take a higher graphics.rate or haptics.rate, more "
                         "damping of the controller, or a shorter duration, which does not come "
                         "there"
-                    ) from None
+                    )
         return found

@@ -8,10 +8,14 @@ margin that textbooks of control ask for (Astrom, Murray, Feedback Systems, 2008
 **Felt stiffness** (felt_stiffness.py) is that of the handle under a wrench at 2 Hz, in one of these
 poses.
 
-**Along the run** (run_measures.py) the handle must stay near the operational point, too.
+**Along the run** the limits of search/acceptance.py are kept, too. A projector on the constrained
+directions that is held is stale while the mechanism moves, which a linearisation at rest cannot
+show: gains that stiffen a constraint can throw the handle off.
 
-**Search** (search.py). Frames are whole haptic periods on the way, whose map is short; the result
-is judged at the scene's own rates.
+**Search** (search/search.py): the largest coupling that holds, each with the stiffness of the
+topology controller that makes the constraint feel like the contact; without a contact the largest
+stiffness of the topology controller, and then of the coupling. Frames are whole haptic periods on
+the way, whose map is short; the result is judged at the scene's own rates.
 """
 
 from __future__ import annotations
@@ -23,21 +27,23 @@ from pathlib import Path
 
 import numpy as np
 
+from hapticlink.analysis.search.acceptance import METRIC, PEAK, Limits, judged_numbers
+from hapticlink.analysis.search.search import COARSE, FINE, raise_laws
+from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.poses import Pose, at_equilibrium, evenly_spaced, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.short_hyperperiod import whole_frames
+from hapticlink.analysis.sweep.row import Row
 from hapticlink.analysis.tune.felt_stiffness import Feel
-from hapticlink.analysis.tune.run_measures import RunLimit, motion
-from hapticlink.analysis.tune.search import COARSE, search
-from hapticlink.analysis.tune.stability_limits import FINE, Judge
+from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
+from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -92,9 +98,10 @@ class _Tuning:
         keep: Callable[[Tuned], object],
     ) -> None:
         self._read, self._margin, self._tell, self._keep = read, margin, tell, keep
-        self._linkage = required(read)
+        self._linkage, device = required(read)
+        self._limits = Limits.of(device)
 
-    def search(self) -> dict[str, float]:
+    def search(self) -> Scales:
         """The scales of the largest gains with which margin and run hold, with frames of whole
         haptic periods."""
         quick = whole_frames(self._read)
@@ -115,7 +122,12 @@ class _Tuning:
             own = judge.margin({}, COARSE)
             self._tell(f"  {own:.3g}")
             start = dict.fromkeys(judge.laws, min(1.0, own / self._margin))
-            limit = RunLimit(run if own >= self._margin else self._run(feel, start))
+            row = judged_numbers(run)
+            _, broken = self._limits.beside(row)
+            if broken:
+                self._tell(f"  the scene's own run breaks the limits: {broken}")
+            first = row if own >= self._margin else self._run(feel, start)
+            self._limits, _ = self._limits.beside(first)
             self.result = Tuned(
                 run=replace(run, tables={}),
                 asked=self._margin,
@@ -124,36 +136,53 @@ class _Tuning:
                 along=feel.along,
                 margins={"scene": own},
                 felt={"scene": feel.felt(feel.compliance({}))},
-                motion={"scene": motion(run)},
+                motion={"scene": motion(row)},
+                own_run_breaks=broken,
             )
 
-            def require(scales: dict[str, float]) -> None:
+            def require(scales: Scales) -> None:
                 if why := judge.unstable(scales, self._margin):
                     raise InputFault(why)
-                self.result.motion["tuned"] = limit.motion(self._run(feel, scales))
+                self._require_limits(feel, scales)
                 self._take(feel, scales)
 
-            self._tell("gains that keep the margin and the run")
+            self._tell("gains that keep the margin and the limits of a run")
+            laws, complete = [law for law in ("topology", "drift") if law in start], None
+            if len(laws) == len(feel.along) == 2:
+                laws, complete = ["drift"], feel.alike
             try:
-                scales, self.result.limited_by = search(start, feel, require)
+                scales, self.result.limited_by = raise_laws(laws, start, require, complete)
             except InputFault as fault:
-                raise InputFault(f"{fault}; {REMEDY}") from None
+                raise InputFault(f"no gains keep margin and limits: {fault}; {REMEDY}") from None
         return scales
 
-    def judge_at_own_rates(self, scales: dict[str, float]) -> dict[str, float]:
+    def _require_limits(self, feel: Feel, scales: Scales) -> None:
+        """Raises InputFault for gains whose run breaks a limit."""
+        row = self._run(feel, scales)
+        if why := self._limits.why_not(row):
+            raise InputFault(why)
+        self.result.motion["tuned"] = motion(row)
+
+    def judge_at_own_rates(self, scales: Scales) -> Scales:
         """The scales, lowered where the margin at the scene's own rates asks for it."""
         self._tell("the margin at the scene's own rates")
         with self._at_equilibrium(self._read) as (self.result.poses, held):
             judge = Judge(held)
+            feel = Feel(held[self.result.felt_at], self.result.along)
             reached = judge.margin(scales)
             if reached < self._margin * (1 - 2 * FINE):
                 scales = {law: s * reached / self._margin for law, s in scales.items()}
                 reached = judge.margin(scales)
+                try:
+                    self._require_limits(feel, scales)
+                except InputFault as fault:
+                    why = f"no gains keep the margin at the scene's own rates and limits: {fault}"
+                    raise InputFault(f"{why}; {REMEDY}") from None
             self.result.margins["tuned"] = reached
-            self._take(Feel(held[self.result.felt_at], self.result.along), scales)
+            self._take(feel, scales)
         return scales
 
-    def judge_at_near_rates(self, scales: dict[str, float]) -> None:
+    def judge_at_near_rates(self, scales: Scales) -> None:
         """Adds the margins at neighbouring rates to the result, 0 where there is no equilibrium."""
         margins = self.result.margins
         for rate in near_rates(self._read):
@@ -166,7 +195,7 @@ class _Tuning:
             self._tell(f"margin at {rate}: {margins[rate]:.3g}")
             self._keep(self.result)
 
-    def _take(self, feel: Feel, scales: dict[str, float]) -> None:
+    def _take(self, feel: Feel, scales: Scales) -> None:
         """These gains are the best so far."""
         result = self.result
         result.gains, X = feel.gains.options(scales), feel.compliance(scales)
@@ -176,8 +205,8 @@ class _Tuning:
         self._tell(f"  {', '.join(felt)}: gains times {', '.join(times)}")
         self._keep(result)
 
-    def _run(self, feel: Feel, scales: dict[str, float]) -> Results:
-        return simulated(self._read, feel.gains.options(scales))
+    def _run(self, feel: Feel, scales: Scales) -> Row:
+        return judged_numbers(simulated(self._read, feel.gains.options(scales)))
 
     def _at_equilibrium(
         self, read: Scene
@@ -185,9 +214,16 @@ class _Tuning:
         return at_equilibrium(read, self._resting, self._tell, self._states)
 
 
-def required(read: Scene) -> Linkage:
-    """The linkage of a scene. Raises InputFault where there are no gains to tune, or where they are
-    not felt."""
+def motion(row: Row) -> dict[str, float]:
+    """The largest distance (m) of handle and operational point, infinite where the run fails, and
+    the largest energy (J) that was generated at the user's port."""
+    distance = np.inf if row["message"] else row.get(METRIC, np.inf) / 1e3
+    return {"distance": distance, "energy_peak": row.get(PEAK, np.nan)}
+
+
+def required(read: Scene) -> tuple[Linkage, Device]:
+    """The linkage and the device of a scene. Raises InputFault where there are no gains to tune, or
+    where they are not felt."""
     if not (read.linkage and read.controller and read.device and read.hand):
         raise InputFault(
             "no gains to tune: a [linkage], [device], [controller] and [hand] are needed"
@@ -199,7 +235,7 @@ def required(read: Scene) -> Linkage:
         )
     if read.contacts and not read.controller.contact:
         raise InputFault("contacts are not sent to the hand: take --set controller.contact=true")
-    return read.linkage
+    return read.linkage, read.device
 
 
 def near_rates(read: Scene) -> Iterator[str]:

@@ -43,6 +43,8 @@ class Tuned:
     motion: dict[str, dict[str, float]]
     """Along the run: the largest "distance" of handle and operational point (m), and "energy_peak",
     the largest energy generated at the user's port (J)."""
+    own_run_breaks: str = ""
+    """Which limit the scene's own run breaks, so that others are not judged relative to it."""
     gains: dict[str, float | list[float]] = field(default_factory=dict)
     """The tuned ones, as options of the scene."""
     compliance: Complex | None = None
@@ -69,6 +71,7 @@ class Tuned:
             "along": {name: n.tolist() for name, n in self.along.items()},
             "compliance": None if X is None else np.stack([X.real, X.imag], axis=-1).tolist(),
             "motion": self.motion,
+            "own_run_breaks": self.own_run_breaks or None,
             "poses": [asdict(pose) for pose in self.poses],
             "hands": list(SPRINGS),
         }
@@ -107,6 +110,8 @@ class Tuned:
         """The result as text."""
         yield self.finding
         yield f"limited by {self.limited_by}"
+        if self.own_run_breaks:
+            yield f"the scene's own run is no measure, for it breaks a limit: {self.own_run_breaks}"
         for at, margin in self.margins.items():
             yield f"margin, {at}: {margin:.3g}" + (" (unstable)" if margin < 1.0 else "")
         for gains, felt in self.felt.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hapticlink.analysis.advise.advise_method import GAINS, HOLDS
+from hapticlink.analysis.search.settings import GAINS, HOLDS
 
 TICKS = (51, 34, 26, 20, 17, 15, 13, 11, 10, 9, 8)
 RATES = {f"{512 / ticks:.0f}": f"512/{ticks}" for ticks in TICKS}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,26 +11,11 @@ import hapticlink as hl
 from hapticlink.analysis.advise import advise_method as advise
 from hapticlink.analysis.advise.advise_method import Measured, Method
 from hapticlink.analysis.advise.draws import FACTOR, draws
+from hapticlink.analysis.search.acceptance import Limits
 from hapticlink.orchestrator import open_scene
+from tests.analysis.search.test_acceptance import row
 
-
-def row(error_mm: float, peak_J: float = 0.0, work_J: float = 0.1, end: str = "duration") -> Any:
-    return {
-        "end": end,
-        "tracking_max_mm": error_mm,
-        "theta_max_rad": 0.1,
-        "port_peak_J": peak_J,
-        "hand_work_J": work_J,
-    }
-
-
-def test_limits_are_the_end_the_error_and_a_quarter_of_the_work() -> None:
-    assert advise.within(row(5.0, 0.0249))
-    assert not advise.within(row(5.0, 0.0251))
-    assert advise.within(row(5.0, 0.9e-3, work_J=0.0))
-    assert not advise.within(row(43.0))
-    assert not advise.within(row(5.0, end="diverged"))
-    assert not advise.within({"end": "refused", "message": ""})
+LIMITS = Limits(42.0)
 
 
 def test_the_smallest_error_within_the_limits_of_all_draws_is_advised() -> None:
@@ -42,12 +26,12 @@ def test_the_smallest_error_within_the_limits_of_all_draws_is_advised() -> None:
 
     exact, zoh = of("exact", [0.1] * 4, 3), of("zoh", [2.0, 4.0, 6.0, 8.0])
     foh, even = of("foh", [1.0, 2.0, 3.0, 4.0]), of("even", [1.3, 1.9, 3.6, 3.9])
-    found = advise._chosen("", [zoh, exact, even, foh], {})
+    found = advise._chosen("", [zoh, exact, even, foh], {}, LIMITS)
     assert found.taken is foh
     assert found.ties == (even,)
     assert set(found.others) == {exact, zoh}
     assert "1 of" not in next(found.lines())
-    none = advise._chosen("", [exact, of("lost", [9.0] * 4, 1)], {})
+    none = advise._chosen("", [exact, of("lost", [9.0] * 4, 1)], {}, LIMITS)
     assert none.taken is exact
     assert next(none.lines()).startswith("nothing keeps the limits")
 
@@ -57,7 +41,7 @@ def test_a_hold_that_matters_little_is_no_advice(worst: float, matters: bool) ->
     rows = {Method("zoh", "own"): row(1.0), Method("foh", "own"): row(worst)}
     rows |= {Method("exact", "own"): row(9.0, end="diverged"), Method("foh", "soft"): row(5.0)}
     taken = Measured(Method("zoh", "own"), np.ones(2), np.zeros(2), 2)
-    lines = list(advise.Advice("", taken, (), (), rows).lines())
+    lines = list(advise.Advice("", taken, (), (), rows, LIMITS).lines())
     assert ("all 2 leave 1 to 1.09 mm" in lines[0]) is not matters
 
 

@@ -11,21 +11,18 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.findings.user_port import hand_work
+from hapticlink.analysis.search.acceptance import Limits, energy_share, judged_numbers
+from hapticlink.analysis.search.search import COARSE, DOUBLINGS, largest_count, raise_laws
 from hapticlink.analysis.stability.hands import FIRM, spring
 from hapticlink.analysis.stability.poses import LIGHT, Pose, simulated
 from hapticlink.analysis.stability.resting_scene import resting
-from hapticlink.analysis.tune.run_measures import RunLimit, motion
-from hapticlink.analysis.tune.search import COARSE, search
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.overrides import written
 from tests.analysis.stability.own_hand import linearised
 
@@ -75,6 +72,70 @@ damping = 10.0
 [hand]
 type = "constant"
 wrench = [1.0, 0.0, 0.0]
+"""
+
+
+FOUR_BAR = """
+title = "Four-bar with gains that throw the handle off"
+duration = 1.0
+sensing = "encoders"
+haptics.rate = 512
+graphics.rate = 32
+
+[linkage]
+operational_point = { body = "coupler", at = [0.03, 0.01] }
+start = { crank = 1.2, wrist = -0.9, rocker = 1.3 }
+
+[[linkage.body]]
+name = "crank"
+mass = 0.4
+inertia = 8e-5
+center = [0.02, 0.0]
+
+[[linkage.body]]
+name = "coupler"
+mass = 0.5
+inertia = 1.2e-4
+center = [0.03, 0.0]
+
+[[linkage.body]]
+name = "rocker"
+mass = 0.4
+inertia = 1e-4
+center = [0.025, 0.0]
+
+[[linkage.joint]]
+name = "crank"
+child = "crank"
+
+[[linkage.joint]]
+name = "wrist"
+parent = "crank"
+child = "coupler"
+at_parent = [0.04, 0.0]
+
+[[linkage.joint]]
+name = "rocker"
+child = "rocker"
+at_parent = [0.06, 0.0]
+
+[[linkage.loop]]
+name = "pin"
+bodies = ["coupler", "rocker"]
+at = [[0.06, 0.0], [0.05, 0.0]]
+
+[device]
+
+[controller]
+topology = { stiffness = 2000.0, damping = 50.0 }
+
+[controller.teleoperation]
+stiffness = [100.0, 100.0, 0.3]
+damping = [20.0, 20.0, 0.06]
+
+[hand]
+type = "constant"
+wrench = [1.0, 0.5, 0.0]
 """
 
 
@@ -157,6 +218,27 @@ def test_the_first_gains_that_are_kept_feel_alike(
     assert read.controller.topology.stiffness == found[0].gains["controller.topology.stiffness"]
 
 
+def test_a_wild_run_is_no_measure_of_the_gains_that_are_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its own gains generate two thirds of the hand's work at the user's port, which is no licence
+    for others to generate as much."""
+    scene = tmp_path / "four-bar.toml"
+    scene.write_text(FOUR_BAR)
+    monkeypatch.setattr("hapticlink.analysis.tune.tune_gains.POSES", 1)
+    monkeypatch.setattr("hapticlink.analysis.tune.tune_gains.NEAR", {})
+    monkeypatch.setattr("hapticlink.analysis.search.search.COARSE", 0.7)
+    tuned = hl.tune(scene)
+    own, found = (judged_numbers(simulated(scene, gains)) for gains in ({}, tuned.gains))
+    assert energy_share(own) > 2.0
+    assert energy_share(found) <= 1.0
+    device = open_scene.load(scene).device
+    assert device is not None
+    assert not Limits.of(device).why_not(found)
+    assert tuned.own_run_breaks == Limits.of(device).why_not(own)
+    assert any(tuned.own_run_breaks in line for line in tuned.lines())
+
+
 def test_the_search_finds_the_largest_gains_and_tells_what_limits_them() -> None:
     limits = {"topology": 7.0, "drift": 0.3}
 
@@ -165,14 +247,34 @@ def test_the_search_finds_the_largest_gains_and_tells_what_limits_them() -> None
             if scales[law] > most:
                 raise hl.InputFault(f"the limit of {law}")
 
-    feel = Mock(along=["constraint"])
-    found, why = search({"drift": 0.1, "topology": 1.0}, feel, require)
+    laws = ("topology", "drift")
+    found, why = raise_laws(laws, {"drift": 0.1, "topology": 1.0}, require)
     assert why == "the limit of topology (topology); the limit of drift (drift)"
     for law, most in limits.items():
         assert most * np.exp(-COARSE) <= found[law] <= most
     limits["topology"] = 0.0
     with pytest.raises(hl.InputFault, match="the limit of topology"):
-        search(found, feel, require)
+        raise_laws(laws, found, require)
+    limits["topology"] = np.inf
+    found, why = raise_laws(laws, {"drift": 0.1, "topology": 1.0}, require)
+    assert found["topology"] == 2.0**DOUBLINGS
+    assert "not searched further" in why
+
+
+@pytest.mark.parametrize("first", [1, 3, 17, 40])
+@pytest.mark.parametrize("most", [0, 1, 5, 16, 63, 64, 65])
+def test_the_end_of_a_search_is_no_limit(first: int, most: int) -> None:
+    """A count is found to a half of it, and its cap as one that was not searched further."""
+    asked: list[int] = []
+
+    def holds(n: int) -> bool:
+        asked.append(n)
+        return n <= most
+
+    found = largest_count(holds, first, 64)
+    assert max(asked) <= 64
+    assert found.limited is (most < 64)
+    assert most / 1.5 - 1 <= found.value <= min(most, 64)
 
 
 def pressed(name: str, pose: Pose, n: NDArray[np.float64], hertz: float, swing: float) -> Any:
@@ -307,16 +409,3 @@ def gains(found: dict[str, Any], factor: float) -> tuple[str, ...]:
             for key, value in found["gains"].items()
         }
     )
-
-
-def test_the_energy_at_the_users_port_is_a_limit() -> None:
-    """A run whose port gives more than that of the scene's own gains and a quarter of the work."""
-    soft, stiff = (
-        simulated("closed-loop-direct", {"controller.teleoperation.stiffness": [k, k, 0.1]})
-        for k in (100.0, 150.0)
-    )
-    limit, peaks = RunLimit(soft), [motion(run)["energy_peak"] for run in (soft, stiff)]
-    assert limit.motion(soft)["energy_peak"] == peaks[0]
-    assert peaks[1] > max(peaks[0], 0.25 * hand_work(soft))
-    with pytest.raises(InputFault, match="may give"):
-        limit.motion(stiff)

@@ -1,15 +1,18 @@
-"""The gains that are tuned: stiffness and damping of each law, scaled with one damping ratio.
+"""The settings of a scene that are searched: gains, holds and rates.
 
-A law with stiffness K and damping B is scaled by s to s K and sqrt(s) B, which keeps its damping
-ratio B/(2 sqrt(K m)) on any mass.
+Gains are stiffness and damping of each law, scaled with one damping ratio: a law with stiffness K
+and damping B is scaled by s to s K and sqrt(s) B, which keeps its damping ratio B/(2 sqrt(K m)) on
+any mass.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from hapticlink.orchestrator.base.signal_names import CONTROLLER
+from hapticlink.orchestrator.base.ticks import written
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.system.system import System
 
@@ -21,6 +24,42 @@ LAWS = {
 parameters of both."""
 Scales = Mapping[str, float]
 """The scale s of each law, by name; 1 where it is missing."""
+_PASSIVE = tuple(f"holds.virtual_mechanism.{w}=passive" for w in ("F_hand", "F_drift"))
+_SLOPE = (
+    'holds."virtual_mechanism.x -> controller.x_S"=foh',
+    'holds."virtual_mechanism.v -> controller.v_S"=slope',
+)
+HOLDS: dict[str, tuple[str, ...]] = {
+    "zoh": ("hold=zoh",),
+    "foh": ("hold=foh",),
+    "foh-derivative": ("hold=foh-derivative",),
+    "foh, slope": ("hold=foh", *_SLOPE),
+    "second-order": ("hold=second-order",),
+    "delayed": ("hold=delayed",),
+    "zoh, mean": ("hold=zoh", "downsampling=mean"),
+    "passive": ("hold=passive",),
+    "foh-derivative, passive": ("hold=foh-derivative", *_PASSIVE),
+    "pspm, passive": ("hold=pspm", *_PASSIVE),
+}
+"""Options of holds, from the simplest on: of equally good ones the first is advised. `a, b`: hold a
+from slow to fast, b from fast to slow (`slope`: of the velocity, from slow to fast)."""
+REMEDIES = ("zoh", "foh", "lead", "mean")
+"""Holds of all connections with which an unstable scene is tried, as a single change."""
+GAINS: dict[str, tuple[str, ...]] = {
+    name: (f"controller.teleoperation.stiffness={k}", f"controller.teleoperation.damping={b}")
+    for name, k, b in (
+        ("soft", [25.0, 25.0, 0.01], [5.0, 5.0, 0.002]),
+        ("medium", [100.0, 100.0, 0.1], [20.0, 20.0, 0.02]),
+        ("stiff", [100.0, 100.0, 0.5], [70.0, 70.0, 0.375]),
+    )
+}
+"""Options of K_pc and B_pc; stiff: those of section B.6; medium: those of the scene
+closed-loop-direct."""
+
+
+def set_rate(clock: str, rate: Fraction) -> str:
+    """The option that sets the rate (Hz) of "haptics" or "graphics"."""
+    return f"{clock}.rate={written(rate)}"
 
 
 @dataclass(frozen=True)
