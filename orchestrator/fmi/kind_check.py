@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from hapticlink.components.base_units import BASES
+from hapticlink.components.ports import BASES
 from hapticlink.orchestrator.fmi.units import Unit
 
 MATRICES = ("projector", "semidefinite")

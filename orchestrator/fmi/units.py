@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from hapticlink.components.base_units import BASES
+from hapticlink.components.ports import BASES
 
 
 @dataclass(frozen=True)
