@@ -41,3 +41,7 @@ class Spring:
     set_velocity: str = ""
     velocity: str = ""
     force: str = ""
+
+
+BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+"""The base units of every signal, in the order in which FMI and SSP list their exponents."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 
-from hapticlink.components.base_units import BASES
+from hapticlink.components.ports import BASES
 from hapticlink.fmus.errors import InvalidUnit
 
 DERIVED: dict[str, dict[str, int]] = {

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import PurePosixPath
 
-from hapticlink.components.base_units import BASES
+from hapticlink.components.ports import BASES
 from hapticlink.fmus.description_common import Described, base_attributes
 from hapticlink.fmus.documentation import PAGE, page, table
 from hapticlink.orchestrator.fmi.units import Unit

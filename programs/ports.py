@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hapticlink.components.base_units import BASES
 from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component
+from hapticlink.components.ports import BASES
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.scalar_variables import ScalarVariable, scalar_variables
 from hapticlink.fmus.units import base_unit

@@ -63,7 +63,7 @@ def torques(
     """Times (s) and torques (N.m) of the four motors of a user's device, (4, n), or what a function
     gives of those at a number of times, (n, 4); None without a device that is driven."""
     # casadi, which the terminal's lines, of the same module, can do without
-    from hapticlink.components.device.numeric_torques import motor_torques
+    from hapticlink.components.device.motors_and_encoders import motor_torques
 
     motor, handle = signal_of_user(MOTOR_WRENCH, user), signal_of_user(MEASURED_HANDLE_POSE, user)
     table = of_block(results, motor, 3)

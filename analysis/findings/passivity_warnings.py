@@ -133,7 +133,7 @@ def _laws(scene: Mapping[str, Any]) -> dict[str, Passivity]:
 
 def _counts(results: Results) -> Iterator[str]:
     """A line for each passivity controller that damps single counts of the encoders."""
-    from hapticlink.components.device.encoder_count import count_energies  # casadi
+    from hapticlink.components.device.motors_and_encoders import count_energies  # casadi
 
     record, devices = results.record, all_devices(results)
     for user, law in _laws(record.scene).items():

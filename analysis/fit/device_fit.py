@@ -26,7 +26,7 @@ from hapticlink.analysis.fit.estimate import FROM_ZERO, Estimate, standard_devia
 from hapticlink.analysis.fit.log import Log
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.device import pantograph
-from hapticlink.components.device.numeric_torques import numbers
+from hapticlink.components.device.motors_and_encoders import numbers
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from hapticlink.analysis.stability.state_vector import Coordinate
-from hapticlink.components.dynamics.closure_jacobian_values import closure_jacobian
+from hapticlink.components.dynamics.linkage_values import closure_jacobian
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.signal_names import SHARED

@@ -21,7 +21,7 @@ from benchmarks.continuous.hand import Hand
 from benchmarks.continuous.march import Guards
 from hapticlink.components.component import Component
 from hapticlink.components.device import pantograph
-from hapticlink.components.device.numeric_torques import numbers
+from hapticlink.components.device.motors_and_encoders import numbers
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene

@@ -19,10 +19,10 @@ import casadi as ca
 from hapticlink.components import integrators
 from hapticlink.components.component import Block, Component, Variability, Variable
 from hapticlink.components.device import pantograph
+from hapticlink.components.device.motors_and_encoders import quantised
 from hapticlink.components.device.observer import Observer, State
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.ports import Power
-from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.device import Device
 
 _FIXED = (

@@ -20,8 +20,8 @@ import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Block, Component, Variable
 from hapticlink.components.control import passivity as observer
+from hapticlink.components.device.motors_and_encoders import quantised
 from hapticlink.components.port_space import LINE
-from hapticlink.components.quantisation import quantised
 from hapticlink.components.specs.control import Passivity
 
 PERIOD = 1e-3

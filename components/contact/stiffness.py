@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.components.contact.broad_phase import near
-from hapticlink.components.dynamics.start_mobility import start_mobility
+from hapticlink.components.dynamics.linkage_values import start_mobility
 from hapticlink.components.forces import dry_friction
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts, Pair

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.components.device import pantograph
-from hapticlink.components.device.numeric_torques import numbers
+from hapticlink.components.device.motors_and_encoders import numbers
 from hapticlink.components.specs.device import Device
 
 Field = NDArray[np.float64]

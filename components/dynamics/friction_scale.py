@@ -21,7 +21,7 @@ from typing import Any
 
 import casadi as ca
 
-from hapticlink.components.dynamics.start_mobility import start_mobility
+from hapticlink.components.dynamics.linkage_values import start_mobility
 from hapticlink.components.forces.dry_friction import LAG
 from hapticlink.components.forces.friction import rubbing
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate

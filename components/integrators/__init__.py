@@ -1,16 +1,16 @@
-"""Fixed-step integration methods for plants, one a file; `METHODS` holds them by the names that a
-scene uses.
-"""
+"""Fixed-step integration methods for plants; `METHODS` holds them by the names of a scene."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hapticlink.components.integrators import dormand_prince_8, heun, rk4
-from hapticlink.components.integrators.base import Integrator, MechanicalSystem, Ode
+from hapticlink.components.integrators import dormand_prince_8
+from hapticlink.components.integrators.base import Baumgarte, Integrator, MechanicalSystem, Ode
 from hapticlink.components.integrators.linearly_implicit import LinearlyImplicit
 from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
+from hapticlink.components.integrators.runge_kutta import HEUN, RK4, RungeKutta
 from hapticlink.components.integrators.semi_implicit_euler import SemiImplicitEuler
 from hapticlink.components.registry import Registry, no_instance
 
@@ -21,9 +21,9 @@ METHODS: Registry[Integrator] = Registry(
     "integrator",
     {
         "semi-implicit-euler": SemiImplicitEuler(),
-        "heun": heun.METHOD,
+        "heun": RungeKutta(HEUN, Baumgarte(math.sqrt(2), math.sqrt(0.5))),
         "linearly-implicit": LinearlyImplicit(),
-        "rk4": rk4.METHOD,
+        "rk4": RungeKutta(RK4),
         "dormand-prince-8": dormand_prince_8.METHOD,
         "passive-midpoint": PassiveMidpoint(),
     },

@@ -1,6 +1,9 @@
-"""Explicit Runge-Kutta methods, each given by its Butcher tableau.
+"""Explicit Runge-Kutta methods, each given by its Butcher tableau: Heun's method of order 2, the
+classical one of order 4, and in dormand_prince_8.py one of order 8.
 
-k_i = f(t + c_i h, x + h sum_j a_ij k_j),   x_{k+1} = x_k + h sum_i b_i k_i
+    k_i = f(t + c_i h, x + h sum_j a_ij k_j),   x_{k+1} = x_k + h sum_i b_i k_i
+
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1.
 """
 
 from __future__ import annotations
@@ -70,3 +73,12 @@ class RungeKutta(Integrator):
             stage = sum((h * a * k for a, k in zip(row, slopes, strict=True) if a), start=x)
             slopes.append(ode(stage, u, p, t + c * h))
         return x + h * sum(b * k for b, k in zip(self.tableau.b, slopes, strict=True) if b)
+
+
+HEUN = Tableau(a=((), (1.0,)), b=(0.5, 0.5), c=(0.0, 1.0), order=2)
+RK4 = Tableau(
+    a=((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
+    b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    c=(0.0, 0.5, 0.5, 1.0),
+    order=4,
+)

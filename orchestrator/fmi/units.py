@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from hapticlink.components.base_units import BASES
+from hapticlink.components.ports import BASES
 
 
 @dataclass(frozen=True)

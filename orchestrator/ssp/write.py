@@ -19,7 +19,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 
 import pydantic
 
-from hapticlink.components.base_units import BASES
+from hapticlink.components.ports import BASES
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import Scalar

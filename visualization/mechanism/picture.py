@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.analysis.findings.episodes import FULL_TORQUE
-from hapticlink.components.device.numeric_torques import torque_function
+from hapticlink.components.device.motors_and_encoders import torque_function
 from hapticlink.components.device.workspace import link_function
 from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts

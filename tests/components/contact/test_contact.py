@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach, reach
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
 from tests.blocks import Running, once, running, virtual_environment
@@ -236,7 +237,7 @@ def test_contacts_on_a_locked_hand_are_not_felt():
     """Lambda^-1 = 0 but for rounding, of an open linkage of 1/kg: no wrench moves what is locked,
     and none is the least."""
     args = [ca.SX.sym(name, *shape) for name, shape in (("L", (3, 3)), ("a", (3, 1)))]
-    wrench = equivalent_wrench(args[0], ca.SX.eye(3), args[1], ca.SX(0.1))
+    wrench = equivalent_wrench(PLANE, args[0], ca.SX.eye(3), args[1], ca.SX(0.1))
     f = ca.Function("wrench", args, [wrench])
     assert not np.array(f(NOISE, (1e-16, -1e-16, 3e-16))).any()
     moving = np.array(f(np.diag([0.5, 0, 0]) + NOISE, (1.0, 1e-16, 0.0))).ravel()

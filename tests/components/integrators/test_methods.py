@@ -12,9 +12,7 @@ from scipy.integrate import solve_ivp
 
 from hapticlink.components import integrators
 from hapticlink.components.integrators.dormand_prince_8 import DORMAND_PRINCE_8
-from hapticlink.components.integrators.heun import HEUN
-from hapticlink.components.integrators.rk4 import RK4
-from hapticlink.components.integrators.runge_kutta import Tableau
+from hapticlink.components.integrators.runge_kutta import HEUN, RK4, Tableau
 
 
 @given(st.sampled_from([HEUN, RK4, DORMAND_PRINCE_8]), st.data())

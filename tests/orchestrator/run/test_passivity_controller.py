@@ -12,8 +12,7 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.components.blocks.controller import controller
-from hapticlink.components.device.encoder_count import count_energies
-from hapticlink.components.device.numeric_torques import numbers
+from hapticlink.components.device.motors_and_encoders import count_energies, numbers
 from hapticlink.components.device.pantograph import base_angles, dynamics
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller, Passivity

@@ -1,4 +1,4 @@
-"""Mobility J D^-1 J' of coordinates or points of a linkage at its start pose, in numbers."""
+"""Terms of a linkage in numbers: the Jacobian of its closures, and mobilities at its start pose."""
 
 from __future__ import annotations
 
@@ -16,6 +16,15 @@ from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Linkage
 
 Matrix = NDArray[np.float64]
+
+
+def closure_jacobian(linkage: Linkage) -> Callable[[NDArray[np.float64]], Matrix]:
+    """W(q) = dh/dq of (2.14), (m, n), with the linkage's own parameters. Raises ValueError as
+    `LinkageModel` does."""
+    p = Signals("p", parameters(linkage))
+    model = LinkageModel.symbolic(linkage, p)
+    W = ca.Function("W", [model.q, p.vector], [model.W])
+    return lambda q: np.array(W(q, p.starts))
 
 
 def start_mobility(

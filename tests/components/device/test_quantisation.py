@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import pytest
 
-from hapticlink.components.quantisation import quantised
+from hapticlink.components.device.motors_and_encoders import quantised
 
 VALUE, QUANTUM = ca.SX.sym("value"), ca.SX.sym("quantum")
 
