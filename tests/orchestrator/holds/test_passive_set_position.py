@@ -20,7 +20,7 @@ from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.run.make_holds import make_holds
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.build_system import built
-from tests.orchestrator.foreign_fmus import slave
+from tests.little_fmus import slave
 from tests.orchestrator.foreign_scenes import fmu_table, ran, run, wire_table
 
 Vector = NDArray[np.float64]
