@@ -44,7 +44,7 @@ ATTACKS: dict[str, tuple[Callable[[int, int], Iterator[cases.Made]], int, tuple[
     "special_files": (special_files.attack, 300, OUTCOMES),
     "plugins": (plugins.attack, 200, WITH_BELIEVED),
     "misuse": (misuse.attack, 500, OUTCOMES),
-    "loop_memory": (loop_memory.attack, 100, OUTCOMES),
+    "loop_memory": (loop_memory.attack, 100, WITH_BELIEVED),
     "page": (page.attack, 120, OUTCOMES),
 }
 """By name, what makes the cases, how many by default, and the columns of their ends."""

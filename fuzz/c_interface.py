@@ -161,20 +161,26 @@ def called(fmu: Fmu, number: int, seed: int, folder: Path) -> Iterator[cases.Mad
             yield cases.Made(fmu.kind, case, "hung" if status is None else "crashed", wrong)
 
 
-BROKEN = {"is_unknown(m, vr[i], REALS)": "is_unknown(m, vr[i], REALS + 1)"}
-"""A check of the wrapper, and the same one with a fault."""
+BROKEN = {
+    "trapped": (("is_unknown(m, vr[i], REALS)", "is_unknown(m, vr[i], REALS + 1)"),),
+    "sanitized": (
+        ("is_unknown(m, vr[i], REALS)", "is_unknown(m, vr[i], REALS + 1)"),
+        ("size < sizeof(State)", "size < 8"),
+    ),
+}
+"""By how it is compiled, checks of the wrapper, and the same ones with a fault."""
 
 
-def check_that_a_fault_is_found(make: Callable[..., Fmu], folder: Path) -> None:
+def check_that_faults_are_found(make: Callable[..., Fmu], folder: Path) -> None:
     """Breaks the wrapper on purpose. Raises AssertionError where no call crashes then."""
-    ((good, bad),) = BROKEN.items()
-    text, room = WRAPPER.read_text(), folder / f"broken-{make.__name__}"
-    room.mkdir()
-    assert good in text, f"{WRAPPER.name} has no {good!r}: put a check that it has into BROKEN"
-    (room / "broken.c").write_text(text.replace(good, bad))
-    broken = make(sample_components.controller(), room, room / "broken.c")
-    crashed = any(case.outcome == "crashed" for case in called(broken, 4000, 7, room))
-    assert crashed, f"{broken.kind}: a read beyond the last variable is not found"
+    for i, (good, bad) in enumerate(BROKEN.get(make.__name__, ())):
+        text, room = WRAPPER.read_text(), folder / f"broken-{make.__name__}-{i}"
+        room.mkdir()
+        assert good in text, f"{WRAPPER.name} has no {good!r}: put a check that it has into BROKEN"
+        (room / "broken.c").write_text(text.replace(good, bad))
+        broken = make(sample_components.controller(), room, room / "broken.c")
+        crashed = any(case.outcome == "crashed" for case in called(broken, 4000, 7, room))
+        assert crashed, f"{broken.kind}: {bad!r} in the place of {good!r} is not found"
 
 
 KINDS: tuple[Callable[[Component, Path], Fmu], ...] = (native, trapped, sanitized, python)
@@ -194,7 +200,6 @@ def attack(number: int, seed: int) -> Iterator[cases.Made]:
     share = max(1, number // (len(made) * len(kinds)))
     with own_folder() as folder:
         for kind in kinds:
-            if kind in (trapped, sanitized):
-                check_that_a_fault_is_found(kind, folder)
+            check_that_faults_are_found(kind, folder)
             for component in made:
                 yield from called(kind(component, folder), share, seed, folder)

@@ -52,6 +52,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 # After the settings above, which are read when NumPy is imported.
 from tests.shared_fixtures import (  # noqa: E402, F401
     bar,
+    compiled_once,
+    compiler_of_its_own,
     emptied_temporary_folder,
     fmus_of_a_room_unpacked_once,
     fmus_unpacked_once,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 
 import casadi as ca
@@ -13,7 +15,9 @@ import pytest
 import hapticlink as hl
 from hapticlink.commands import main
 from hapticlink.components.component import Block, Component, Variable
+from hapticlink.fmus import lock
 from hapticlink.fmus.build_fmu import build
+from hapticlink.fmus.native import compiler
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.description import describe
@@ -46,6 +50,45 @@ def fmus_unpacked_once() -> Iterator[None]:
     of a sweep do."""
     with process_cache.unpacked_once():
         yield
+
+
+COMPILED = compiler._compiled
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """The same C text for the same system is compiled once, by whichever process of the tests needs
+    it first; fmus/test_native_fmu_entries.py has tests of the compiler itself."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    kept = shared / "compiled"
+    kept.mkdir(exist_ok=True)
+
+    def compiled(
+        source: Iterable[Path], folder: Path, target: str, options: Sequence[str]
+    ) -> bytes:
+        files = [Path(file).resolve() for file in source]
+        included = {Path(option[2:]) for option in options if option.startswith("-I")}
+        headers = {h for room in {f.parent for f in files} | included for h in room.rglob("*.[ch]")}
+        texts = [path.read_bytes() for path in (*files, *sorted(headers))]
+        flags = [target, *(option for option in options if not option.startswith("-I"))]
+        key = sha256(b"\0".join([*texts, *map(str.encode, flags)])).hexdigest()
+        with lock.held(kept / f"{key}.lock", lambda: None):
+            if not (kept / key).exists():
+                made = COMPILED(files, folder, target, options)
+                (kept / f"{key}.part").write_bytes(made)
+                (kept / f"{key}.part").replace(kept / key)
+        return (kept / key).read_bytes()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compiler, "_compiled", compiled)
+        yield
+
+
+@pytest.fixture
+def compiler_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing that another test has compiled is taken in the place of what this one compiles."""
+    monkeypatch.setattr(compiler, "_compiled", COMPILED)
 
 
 RUNNING = (

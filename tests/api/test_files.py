@@ -13,8 +13,6 @@ def test_build_gives_the_file_of_each_block(bar: Path, tmp_path: Path) -> None:
     made = hl.build(bar, {"duration": 1.0}, out=tmp_path / "fmus")
     assert made == {"virtual_mechanism": tmp_path / "fmus" / "virtual_mechanism.fmu"}
     assert made["virtual_mechanism"].is_file()
-    with pytest.raises(hl.InputFault, match="packaging=native"):
-        hl.build(bar, out=tmp_path, all_platforms=True)
 
 
 def test_a_full_disk_leaves_no_part_of_an_fmu(bar: Path, tmp_path: Path) -> None:
@@ -37,11 +35,6 @@ def test_an_exported_scene_explains_itself_as_the_scene_does(bar: Path, tmp_path
     assert path == tmp_path / "bar.ssp"
     assert hl.explain(path) == hl.explain(bar, {"haptics.rate": 100})
     assert hl.explain(bar) != hl.explain(path)
-
-
-def test_an_ssp_takes_no_place_of_a_folder(bar: Path, tmp_path: Path) -> None:
-    with pytest.raises(hl.InputFault, match=r"is a folder; name a file in it, .*scene\.ssp"):
-        hl.export(bar, out=tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.run.real_time import RealTimeRun
-from tests.orchestrator.foreign_fmus import python_fmu
+from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import scene
 from tests.orchestrator.wall_clock import MS, WallClock
 

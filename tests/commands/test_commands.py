@@ -84,6 +84,9 @@ def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) ->
         (["run", "closed-loop", "--set", "stop_when=hand.G<0"], "there is no such output"),
         (["run", "closed-loop", "--bogus"], "Unknown option"),
         (["fly"], "Unknown command"),
+        (["run", "pendulum", "--set", "title=\udcff"], r"'title=\udcff': no text"),
+        (["build", "five-bar", "--all-platforms", "--out", "none"], "--set packaging=native"),
+        (["new", "nowhere/crane"], "nowhere"),
     ],
 )
 def test_bad_input_is_status_2(
@@ -161,11 +164,6 @@ def test_an_error_of_ours_is_a_message_and_a_report(
     assert "Traceback" in text
     assert "raise error" in text
     assert "$ " in text
-
-
-def test_arguments_that_are_no_text(capsys: pytest.CaptureFixture[str]) -> None:
-    assert status("run", "pendulum", "--set", "title=\udcff") == 2
-    assert r"'title=\udcff': no text" in capsys.readouterr().err
 
 
 RUN = f"{sys.executable} -m hapticlink run pendulum --set duration=0.01 --no-figures --out out"

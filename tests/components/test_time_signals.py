@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from hapticlink.components.paths import TimeSine, TimeSpline, TimeTable, signal
-from hapticlink.components.specs.paths import CoordinateSine, PoseSine
+from hapticlink.components.paths import TimeSine, TimeSpline, TimeTable
+from hapticlink.components.specs.paths import PoseSine
 from hapticlink.components.time_signals import at, over, size_over, within
 from hapticlink.fmus.straight_line import program
 
@@ -78,19 +78,6 @@ def test_plain_python_looks_up_the_same_bits(kind: type[TimeTable | TimeSpline])
         assert result == np.array(function(instant)).ravel().tolist()
 
 
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        ((), "`x`: the table has no rows"),
-        (((0.0, 1.0), (0.0, 2.0)), r"`x`: row 2 at t = 0.0 s does not come after 0.0 s"),
-        (((0.0, 1.0), (1.0, float("nan"))), r"`x`: row 2 is .*finite"),
-    ],
-)
-def test_a_table_that_says_nothing_is_refused(rows: tuple, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        TimeTable(rows, "x")
-
-
 # --- splines and sines ------------------------------------------------------------------------
 
 
@@ -134,15 +121,3 @@ def test_a_sine_has_its_mean_amplitude_frequency_and_phase() -> None:
         expected = [0.1 + 0.05 * np.sin(a), 0.02 * np.sin(b), 0.3]
         expected += [0.05 * np.pi * np.cos(a), 0.02 * 4 * np.pi * np.cos(b), 0.0]
         np.testing.assert_allclose(np.array(function(instant)).ravel(), expected, atol=1e-14)
-
-
-def test_a_sine_is_not_interpolated() -> None:
-    with pytest.raises(
-        ValueError, match="`x`: a sine has no rows: give rows, or leave `interpolation` out"
-    ):
-        signal(CoordinateSine(amplitude=1.0, frequency=1.0), "spline", "x")
-
-
-def test_a_spline_that_is_not_finite_is_refused() -> None:
-    with pytest.raises(ValueError, match="`x`: no spline through rows so close"):
-        TimeSpline(((0.0, 0.0), (1e-200, 1.0), (1.0, 0.0)), "x")

@@ -64,30 +64,33 @@ H = 1 / 512
 ERROR = 3
 
 
-@pytest.fixture(scope="module")
-def both(tmp_path_factory) -> dict[str, tuple[Path, ...]]:
-    """Each block of the report's experiment as a Python and as a native FMU; two also as native
-    ones of FMI 3.0, in which nothing but the arrays of variables is of the block."""
-    scene = open_scene.load("closed-loop", OPTIONS)
-    folder = tmp_path_factory.mktemp("both")
-    made = {b.name: component(b.block, b.settings) for b in blocks.blocks(scene).built}
-    three = {
-        n: (build_native(made[n], folder / n / "native3", fmi=3),)
-        for n in ("controller", "virtual_mechanism")
-    }
-    made["discrete_equivalent"] = component("discrete_equivalent", {"rule": "trapezoidal"})
-    made |= {"arm": arm(300), "driven": driven_slider(), "rubbing": rubbing_rod()}
-    made["passive"] = controller(Controller(passivity=True), PLANE, 0.04)
-    made |= {"splined": arm(300, "spline", "continuous"), "swung": driven_slider(SINE)}
-    # Several are named virtual_mechanism.
-    return {
-        n: (
-            build(c, folder / n / "python"),
-            build_native(c, folder / n / "native"),
-            *three.get(n, ()),
+class Both(dict[str, tuple[Path, ...]]):
+    """By name, each block of the report's experiment, and some more, as a Python and as a native
+    FMU; two also as native ones of FMI 3.0, in which nothing but the arrays of variables is of the
+    block. Each is built where it is first asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self._folder = folder
+        loaded = open_scene.load("closed-loop", OPTIONS)
+        self._blocks = {b.name: (b.block, b.settings) for b in blocks.blocks(loaded).built}
+        self._blocks["discrete_equivalent"] = ("discrete_equivalent", {"rule": "trapezoidal"})
+
+    def __missing__(self, name: str) -> tuple[Path, ...]:
+        made = OTHERS[name]() if name in OTHERS else component(*self._blocks[name])
+        room = self._folder / name  # several are named virtual_mechanism
+        three = name in ("controller", "virtual_mechanism")
+        self[name] = (
+            build(made, room / "python"),
+            build_native(made, room / "native"),
+            *((build_native(made, room / "native3", fmi=3),) if three else ()),
         )
-        for n, c in made.items()
-    }
+        return self[name]
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory) -> Both:
+    return Both(tmp_path_factory.mktemp("both"))
 
 
 SINE = CoordinateSine(mean=0.1, amplitude=0.2, frequency=3.0, phase=0.3)
@@ -133,6 +136,16 @@ def rubbing_rod() -> Component:
     floor = ((-1.0, -0.03), (1.0, -0.03), (0.0, 1.5))
     contacts = Contacts(enclosure=floor, friction=0.3, detection="haptics", stiffness=2000.0)
     return virtual_mechanism(linkage, Mechanism(), None, contacts, step_s=H)
+
+
+OTHERS: dict[str, Callable[[], Component]] = {
+    "arm": lambda: arm(300),
+    "driven": driven_slider,
+    "rubbing": rubbing_rod,
+    "passive": lambda: controller(Controller(passivity=True), PLANE, 0.04),
+    "splined": lambda: arm(300, "spline", "continuous"),
+    "swung": lambda: driven_slider(SINE),
+}
 
 
 def driven(path: Path) -> np.ndarray:
@@ -212,13 +225,14 @@ def test_plain_python_gives_the_same_bits(both, name, monkeypatch):
 @pytest.mark.parametrize("name", ["arm", "driven"])
 def test_pieces_of_long_functions_give_the_same_bits(both, name, tmp_path, monkeypatch):
     """The arm calls look-ups; the statements of the slider are pieces in several files."""
+    whole = both[name][0]
     for size, statements in (("MAX_STATEMENTS", 30), ("PIECE_STATEMENTS", 20), ("FILE_PIECES", 5)):
         monkeypatch.setattr(split_functions, size, statements)
     made = arm(300) if name == "arm" else driven_slider()
     header, files = component_source(made)
     assert header.count("noinline") > len([*files]) >= 1
     split = build_native(made, tmp_path)
-    np.testing.assert_array_equal(driven(split), driven(both[name][0]))
+    np.testing.assert_array_equal(driven(split), driven(whole))
     if shutil.which("cc"):
         np.testing.assert_array_equal(driven(rebuilt(split, tmp_path / "cc", by_cc)), driven(split))
 
@@ -297,6 +311,7 @@ def test_rows_of_a_table_are_data(both):
     assert long.count(";") == short.count(";")
 
 
+@pytest.mark.usefixtures("compiler_of_its_own")
 def test_the_same_component_gives_the_same_bytes(native_fmus, tmp_path):
     again = build_native(sample_components.spring(), tmp_path)
     assert again.read_bytes() == native_fmus["spring"].read_bytes()
@@ -512,12 +527,14 @@ def test_an_unknown_platform_is_named(tmp_path):
 
 
 def test_another_version_of_ziglang_is_another_guid(tmp_path, native_fmus, monkeypatch):
+    this = native_fmus["gain"]
     monkeypatch.setattr(compiler, "version", lambda name: "0.0")
     other = build_native(sample_components.stateless(), tmp_path)
-    with session(native_fmus["gain"]) as one, session(other) as two:
+    with session(this) as one, session(other) as two:
         assert one.description.guid != two.description.guid
 
 
+@pytest.mark.usefixtures("compiler_of_its_own")
 def test_c_that_does_not_compile_says_where(tmp_path):
     source = tmp_path / "broken.c"
     source.write_text("int broken(void) { return nothing; }\n")
@@ -526,6 +543,7 @@ def test_c_that_does_not_compile_says_where(tmp_path):
     assert list(tmp_path.iterdir()) == [source]
 
 
+@pytest.mark.usefixtures("compiler_of_its_own")
 def test_functions_that_the_system_lacks_come_from_zig_s_own_library(tmp_path, monkeypatch):
     """The second link is not carried out: zig would build that library for seconds."""
     zig, links = compiler._zig, []
@@ -546,6 +564,7 @@ def test_functions_that_the_system_lacks_come_from_zig_s_own_library(tmp_path, m
     assert library.read_bytes() == b"linked"
 
 
+@pytest.mark.usefixtures("compiler_of_its_own")
 def test_a_library_of_ones_own(tmp_path):
     source = tmp_path / "own.c"
     source.write_text(

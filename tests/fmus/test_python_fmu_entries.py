@@ -29,8 +29,9 @@ OK, DISCARD, FATAL = 0, 2, 4
 
 @pytest.mark.parametrize("name", [c.name for c in sample_components.EVERY])
 def test_contract_on_plain_python(fmus, name, monkeypatch):
+    made = fmus[name]
     monkeypatch.setenv("HAPTICLINK_PURE_PYTHON", "1")
-    assert check_fmu(fmus[name]) == []
+    assert check_fmu(made) == []
 
 
 def test_an_error_leaves_instance_and_process_whole(opened):
@@ -109,12 +110,13 @@ def test_only_pythonfmu_and_the_slave_can_be_imported_from_resources(opened):
 
 
 def test_nothing_is_left_behind(fmus, monkeypatch, tmp_path):
+    made = fmus["spring"]
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with session(fmus["spring"]) as at:
+    with session(made) as at:
         Named(at).start().step(0.0, 0.1)
         assert Path(at.folder).is_relative_to(tmp_path)
         assert living_slaves()
-    assert check_fmu(fmus["spring"]) == []
+    assert check_fmu(made) == []
     assert list(tmp_path.iterdir()) == []
     assert living_slaves() == []
 

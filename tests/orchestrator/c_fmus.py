@@ -1,43 +1,16 @@
 """FMUs of the C files of this folder: of FMI 2.0 and FMI 3.0, and one that fails on demand."""
 
-import re
-import tempfile
-import zipfile
-from collections.abc import Iterable, Mapping
-from functools import cache
 from pathlib import Path
 
-from fmpy import platform, platform_tuple, sharedLibraryExtension
-
-from hapticlink.fmus.native import compile_library
+from tests.little_fmus import c_fmu, description2, description3
 
 FOLDER = Path(__file__).parent
 
 
-def description3(
-    name: str, variables: str, outputs: Iterable[int], token: str = "", **flags: str
-) -> str:
-    """The modelDescription.xml of an FMU of FMI 3.0."""
-    given = "".join(f'<Output valueReference="{reference}"/>' for reference in outputs)
-    return f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{token or name}">
-<CoSimulation modelIdentifier="{name}" {attributes(flags)}/>
-<ModelVariables>{variables}</ModelVariables>
-<ModelStructure>{given}</ModelStructure>
-</fmiModelDescription>
-"""
-
-
-HOSTILE = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="hostile" guid="hostile">
-<CoSimulation modelIdentifier="hostile" {flags}/>
-<ModelVariables>
+HOSTILE = """
 <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
 <ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
 <ScalarVariable name="slope" valueReference="2" causality="output"><Real/></ScalarVariable>
-</ModelVariables>
-<ModelStructure><Outputs><Unknown index="2"/><Unknown index="3"/></Outputs></ModelStructure>
-</fmiModelDescription>
 """
 HOSTILE3 = """
 <Float64 name="u" valueReference="0" causality="input" start="0"/>
@@ -48,40 +21,27 @@ HOSTILE_LOG = "HOSTILE_FMU_LOG"
 STATES = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
 
 
+def hostile_description(fmi: str, **flags: str) -> str:
+    """The description of the FMU of hostile_fmu.c."""
+    if fmi == "3":
+        return description3("hostile", HOSTILE3, (1, 2), **flags)
+    outputs = '<Unknown index="2"/><Unknown index="3"/>'
+    return description2("hostile", HOSTILE, outputs, **flags)
+
+
 def hostile_fmu(folder: Path, fmi: str = "2", *options: str, **flags: str) -> Path:
     """The FMU of hostile_fmu.c, with capability flags; it can restore its state. What its instances
     do is in their names, "<place>_<act>_<step>"."""
     given = {STATES[fmi]: "true", "canHandleVariableCommunicationStepSize": "true"} | flags
-    description, where = HOSTILE.format(flags=attributes(given)), platform
-    if fmi == "3":
-        description, where = description3("hostile", HOSTILE3, (1, 2), **given), platform_tuple
     options = (f"-DFMI={fmi}", "-pthread", *options)
-    return packed(folder / "hostile.fmu", "hostile_fmu.c", where, description, *options)
+    description = hostile_description(fmi, **given)
+    return packed(folder / "hostile.fmu", "hostile_fmu.c", description, *options)
 
 
-def attributes(given: Mapping[str, str]) -> str:
-    return " ".join(f'{name}="{value}"' for name, value in given.items())
-
-
-def packed(path: Path, source: str, where: str, description: str, *options: str) -> Path:
-    """The FMU of a C file of this folder, with one binary."""
-    if where == platform_tuple:
-        options = (*options, str(FOLDER / "fmi3_rest.c"))
-    found = re.search('modelIdentifier="(.*?)"', description)
-    assert found
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", description)
-        library = f"binaries/{where}/{found[1]}{sharedLibraryExtension}"
-        archive.writestr(library, compiled(FOLDER / source, *options))
-    return path
-
-
-@cache
-def compiled(source: Path, *options: str) -> bytes:
-    """A C file as a shared library, with all its functions exported."""
-    with tempfile.TemporaryDirectory() as room:
-        exported = ["-fvisibility=default", *options]
-        return compile_library(source, Path(room) / "library", options=exported).read_bytes()
+def packed(path: Path, source: str, description: str, *options: str) -> Path:
+    """The FMU of a C file of this folder, and of what FMI 3.0 asks for besides."""
+    rest = [FOLDER / "fmi3_rest.c"] if 'fmiVersion="3.0"' in description else []
+    return c_fmu(path, description, FOLDER / source, *rest, options=options)
 
 
 NUMBERS = (
@@ -116,7 +76,7 @@ def c_fmu3(folder: Path) -> Path:
 </Binary>
 <Binary name="echo" valueReference="28" causality="output" variability="discrete"/>"""
     description = description3("types", variables, (*range(1, 2 * len(NUMBERS), 2), 26, 28))
-    return packed(folder / "types.fmu", "types_fmu3.c", platform_tuple, description)
+    return packed(folder / "types.fmu", "types_fmu3.c", description)
 
 
 EVENTS = """
@@ -136,7 +96,7 @@ def event_fmu3(folder: Path, varies: bool = True, token: str = "") -> Path:
     flags = {"hasEventMode": "true", "canGetAndSetFMUState": "true"}
     flags["canHandleVariableCommunicationStepSize"] = str(varies).lower()
     description = description3("events", EVENTS, (1, 3, 4, 6, 8), token, **flags)
-    return packed(folder / "events.fmu", "event_fmu3.c", platform_tuple, description)
+    return packed(folder / "events.fmu", "event_fmu3.c", description)
 
 
 CLOCKED = """
@@ -169,5 +129,4 @@ def clock_fmu3(folder: Path, shift: float = 0.05, **flags: str) -> Path:
     )
     variables = CLOCKED.format(counts=counts, shift=shift)
     description = description3("clocks", variables, (), **flags)
-    of = platform_tuple, description, f"-DSHIFT={shift}"
-    return packed(folder / "clocks.fmu", "clock_fmu3.c", *of)
+    return packed(folder / "clocks.fmu", "clock_fmu3.c", description, f"-DSHIFT={shift}")

@@ -3,6 +3,8 @@ and the same names of instances: "<place>_<act>_<step>"."""
 
 from pathlib import Path
 
+from tests.little_fmus import python_fmu_of
+
 RAISES = {
     "raise": "raise ValueError('broken')",
     "base": "raise BaseException('broken')",
@@ -113,20 +115,13 @@ class {name}(Fmi{fmi}Slave):
 
 def hostile_slave(folder: Path, fmi: str) -> Path:
     """The FMU, `Hostile2.fmu` or `Hostile3.fmu` in `folder`."""
-    if fmi == "2":
-        from pythonfmu.builder import FmuBuilder
-    else:
-        from pythonfmu3.builder import FmuBuilder
     acts = ""
     for name, text in ACTS.items():
         body = text.replace("\n", f"\n{12 * ' '}")
         acts += f"        if self.act == {name!r}:\n            {body}\n"
     name, real = f"Hostile{fmi}", {"2": "Real", "3": "Float64"}[fmi]
     of = "" if fmi == "2" else "3"
-    script = folder / f"{name.lower()}_slave.py"
-    script.write_text(
-        _SLAVE.format(of=of, fmi=fmi, real=real, low=real.lower(), name=name, acts=acts)
-    )
+    text = _SLAVE.format(of=of, fmi=fmi, real=real, low=real.lower(), name=name, acts=acts)
     states = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
     options = states if fmi == "2" else {k.replace("state", "State"): v for k, v in states.items()}
-    return Path(FmuBuilder.build_FMU(script, dest=folder, **options))
+    return python_fmu_of(folder, text, f"{name.lower()}_slave", fmi, **options)

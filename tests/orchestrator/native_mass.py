@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from fmpy import platform
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.scene.scene_tables import PowerPort, SetSpring
-from tests.orchestrator.c_fmus import attributes, packed
+from tests.little_fmus import attributes
+from tests.orchestrator.c_fmus import packed
 
 K, C, K_C, C_C = 100.0, 1.0, 100.0, 1.0
 START = np.array([0.0, 1.0, 1.0, 0.0])
@@ -84,7 +84,7 @@ def native(
     `values`."""
     start = {**dict.fromkeys(REALS, 0.0), **OWN[name], **values}
     description = _description(name, flags, nominal or {}, start)
-    return describe(packed(folder / f"{name}.fmu", "mass_fmu.c", platform, description))
+    return describe(packed(folder / f"{name}.fmu", "mass_fmu.c", description))
 
 
 def held(folder: Path) -> dict[str, Description]:

@@ -20,7 +20,6 @@ from lxml import etree
 
 import hapticlink as hl
 from hapticlink.fmus.check import check_fmu, initialize, session
-from hapticlink.orchestrator.base.errors import InputFault
 from tests.fmus.named_fmu import Named
 from tests.programs.built import needs_compiler, program
 from tests.programs.comparison import differing, outputs, run
@@ -217,7 +216,3 @@ def test_the_command_makes_it(tmp_path: Path) -> None:
         ["The", "mechanism"],
     ]
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
-    with pytest.raises(InputFault, match="--fmi 3 compiles: add --set packaging=native"):
-        hl.build("pendulum", out=tmp_path, fmi=3)
-    with pytest.raises(InputFault, match="--fmi: 4 is not 2 or 3"):
-        hl.build("pendulum", out=tmp_path, as_one=True, fmi=4)

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pythonfmu.builder import FmuBuilder
 
 from hapticlink.analysis.sweep import grid, pool, row, table
 from hapticlink.analysis.sweep import job as points_of
@@ -30,6 +29,7 @@ from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.results.read_results import Results, Table
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.visualization.figures import sweep_figure
+from tests.little_fmus import slave
 from tests.orchestrator.results.records import run_json
 from tests.shared_fixtures import status
 
@@ -293,32 +293,18 @@ def test_a_misspelt_metric_is_told_before_anything_runs(
     assert status(*line, "steps virtual_mechanism") == 0
 
 
-SLAVE = """
-import os, time
-from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
-
-class Unit(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.y, self.die, self.nap = 0.0, 0.0, 0.0
-        self.register_variable(Real("y", causality=Fmi2Causality.output))
-        for name in ("die", "nap"):
-            self.register_variable(Real(
-                name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
-
-    def do_step(self, time_now, size):
+DIES = """
         if self.die == 1.0:
-            os._exit(3)
-        time.sleep(self.nap)
-        self.y = time_now + size
-        return True
-"""
+            os._exit(3)"""
+UNIT = ("output", {"y": 0.0}), ("tunable", {"die": 0.0, "nap": 0.0})
 
 
-def unit(folder: Path, slave: str = SLAVE, keys: str = "duration = 0.2") -> Path:
-    """A scene of one FMU."""
-    (folder / "unit.py").write_text(slave)
-    FmuBuilder.build_FMU(folder / "unit.py", dest=folder)
+def unit(folder: Path, y: str = "end", act: str = DIES, keys: str = "duration = 0.2") -> Path:
+    """A scene of one FMU, which gives y and can take its time or `act`."""
+    body = f"""import os, time as clock{act}
+        clock.sleep(self.nap)
+        self.y = {y}"""
+    slave(folder, "Unit", *UNIT, body=body)
     path = folder / "foreign.toml"
     path.write_text(f"""title = "One unit"
 haptics.rate = 100
@@ -352,7 +338,7 @@ def test_what_fails_for_the_machine_is_made_again_and_what_the_scene_gives_is_no
     """An FMU that does not answer, one that raises, one whose process is killed, while a file is
     there; and one that always diverges."""
     ill, log = tmp_path / "ill", tmp_path / "log"
-    body = f"""
+    act = f"""
         with open({str(log)!r}, "a") as file:
             print(self.die, file=file)
         if self.die == 4.0:
@@ -360,13 +346,12 @@ def test_what_fails_for_the_machine_is_made_again_and_what_the_scene_gives_is_no
             return True
         if os.path.exists({str(ill)!r}):
             if self.die == 1.0:
-                time.sleep(1000)
+                clock.sleep(1000)
             if self.die == 2.0:
                 raise OSError("no space left on device")
             if self.die == 3.0:
                 os.kill(os.getpid(), 9)"""
-    slave = SLAVE.replace("\n        if self.die == 1.0:\n            os._exit(3)", body)
-    path = unit(tmp_path, slave, "duration = 0.02\nisolate = true\nfaults.timeout = 2.0")
+    path = unit(tmp_path, act=act, keys="duration = 0.02\nisolate = true\nfaults.timeout = 2.0")
     line = ("sweep", path, "--vary", "fmu.unit.start.die=0.0,1.0,2.0,3.0,4.0", "--jobs", 1)
     ill.touch()
     assert status(*line, "--out", tmp_path / "out") == 0
@@ -450,7 +435,7 @@ def test_a_sweep_that_is_interrupted_twice_leaves_nothing(foreign: Path, tmp_pat
 def test_a_run_is_made_again_where_its_fmu_has_changed(foreign: Path, tmp_path: Path) -> None:
     arguments = ("sweep", foreign, "--vary", "duration=0.1", "--out", tmp_path / "out")
     assert status(*arguments) == 0
-    unit(tmp_path, SLAVE.replace("self.y = time_now", "self.y = 2 * time_now"))
+    unit(tmp_path, "2 * end")
     assert status(*arguments) == 0
     assert len(list((tmp_path / "out" / "rows").iterdir())) == 2
 

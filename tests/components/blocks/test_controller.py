@@ -164,11 +164,6 @@ def test_a_part_left_out_leaves_nothing(spec, inputs, parameters, outputs):
     assert not component.states
 
 
-def test_bias_needs_the_impedance_law():
-    with pytest.raises(ValueError, match=r"controller\.bias.*controller\.impedance"):
-        controller(Controller(impedance=False, bias="full"), PLANE, L)
-
-
 @settings(max_examples=60)
 @given(directions)
 def test_constraint_map_is_symmetric_and_semidefinite(vectors):

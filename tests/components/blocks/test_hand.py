@@ -33,13 +33,6 @@ def test_profile_is_the_table():
         np.testing.assert_allclose(running.y["F"], expected, atol=1e-14)
 
 
-def test_table_must_increase_in_time():
-    with pytest.raises(ValueError, match=r"hand\.table.*row 2 at t = 0\.0 s"):
-        hand(ProfileHand(table=((1.0, 0, 0, 0), (0.0, 0, 0, 0))))
-    with pytest.raises(ValueError, match=r"hand\.target.*no rows"):
-        hand(ArmHand(target=()))
-
-
 def test_arm_starts_at_the_handle_with_no_force():
     x, v = (0.01, -0.02, 3.6), (0.3, -0.1, 2.0)
     running = Running(hand(ArmHand(target=((0.0, 0.1, 0, 0),))), {"x": x, "v": v})

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hapticlink.components.contact.joint_limits import damping_ratio
-from hapticlink.components.specs.linkage import Body, Limits
+from hapticlink.components.specs.linkage import Limits
 from hapticlink.orchestrator import open_scene
 from tests.blocks import RATES, errors, order, running, state_after
 from tests.components import appendix_a
@@ -155,9 +155,3 @@ def test_a_slot_ends_at_its_limit():
     assert block.state["qd"][0] < 0
     assert block.y["q"][0] < 1.05
     assert block.y["energy"] == pytest.approx(e**2 * before, rel=2e-3)
-
-
-def test_limits_of_a_free_joint_are_refused():
-    body, limits = Body(name="b", mass=1, inertia=1), Limits(lower=0.0, stiffness=1.0)
-    with pytest.raises(ValueError, match="limits act on one coordinate"):
-        running(one_body(body, type="free", limits=limits))

@@ -279,5 +279,3 @@ def test_inertia_of_uniform_shapes():
         found = uniform(corners, 0.2)
         np.testing.assert_allclose(found[0], center, rtol=1e-6)
         assert found[1] == pytest.approx(inertia, rel=1e-5)
-    with pytest.raises(ValueError, match="give its `inertia`"):
-        Body(name="point", mass=1.0)

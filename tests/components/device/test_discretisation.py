@@ -71,8 +71,3 @@ def test_image_of_the_left_half_plane():
     edge = 1j * np.linspace(-500, 500, 81)
     np.testing.assert_allclose(np.abs(discretisation.pole("backward", edge) - 0.5), 0.5, rtol=1e-12)
     np.testing.assert_allclose(np.abs(discretisation.pole("trapezoidal", edge)), 1, rtol=1e-12)
-
-
-def test_unknown_rule_names_the_choices():
-    with pytest.raises(ValueError, match=r"'tustin'.*forward, backward, trapezoidal"):
-        discretisation.weight("tustin")

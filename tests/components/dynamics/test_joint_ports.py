@@ -9,23 +9,8 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from tests.blocks import Running, advance, virtual_mechanism
-from tests.orchestrator.foreign_fmus import python_fmu_of
+from tests.little_fmus import slave
 
-SERVO = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-class Servo(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.angle = self.rate = self.torque = 0.0
-        for name in ("angle", "rate"):
-            self.register_variable(Real(name, causality=Fmi2Causality.input))
-        self.register_variable(Real("torque", causality=Fmi2Causality.output))
-
-    def do_step(self, time, size):
-        self.torque = 20.0 * (1.3 - self.angle) - 0.4 * self.rate
-        return True
-"""
 ACTIVE = """
 extends = "slider-crank"
 title = "A motor outside"
@@ -63,7 +48,9 @@ def test_a_constant_effort_from_outside_is_that_of_a_drive() -> None:
 
 def test_a_controller_outside_turns_a_joint_and_its_work_is_booked(tmp_path: Path) -> None:
     """The work of the held torque, by its own sum over the recorded steps."""
-    fmu = python_fmu_of(tmp_path, SERVO, f"servo_{tmp_path.name}")
+    servo = "self.torque = 20.0 * (1.3 - self.angle) - 0.4 * self.rate"
+    ports = ("input", {"angle": 0.0, "rate": 0.0}), ("output", {"torque": 0.0})
+    fmu = slave(tmp_path, "Servo", *ports, body=servo)
     path = tmp_path / "active.toml"
     path.write_text(ACTIVE.replace("PATH", fmu.as_posix()))
     run = hl.run(path, PORTS)
@@ -72,11 +59,3 @@ def test_a_controller_outside_turns_a_joint_and_its_work_is_booked(tmp_path: Pat
     booked = run.run["energies_within_a_rate"]["motor.torque -> virtual_mechanism.crank.effort"]
     steps = np.diff(angle)
     assert booked["held"] == pytest.approx(torque[: len(steps)] @ steps, rel=0.02)
-
-
-def test_ports_that_cannot_be_are_refused() -> None:
-    ports = {"linkage.joint.0.ports": ["effort"]}
-    with pytest.raises(hl.InputFault, match="effort is the drive's constant already"):
-        hl.scene("slider-crank", ports)
-    with pytest.raises(hl.InputFault, match="a free joint has three"):
-        hl.scene("single-body", {"linkage.joint.0.ports": ["position"]})

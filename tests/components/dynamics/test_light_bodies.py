@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import tests.components.dynamics.extended_precision as exact
-from hapticlink.components.dynamics.massless_bodies import MasslessError
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.specs.linkage import (
     Body,
@@ -22,7 +21,7 @@ from hapticlink.components.specs.linkage import (
     OperationalPoint,
 )
 from tests.blocks import Running, advance, running, virtual_environment
-from tests.mechanisms import evaluated, five_bar, four_bar, linkages, rod
+from tests.mechanisms import evaluated, four_bar, linkages, rod
 
 G, RATE = 9.81, 1000
 
@@ -145,19 +144,6 @@ def test_massless_coupler_is_the_limit_of_light_ones():
     )
     np.testing.assert_allclose(massless.x, light.x, rtol=0, atol=1e-9)
     assert light.y["closure_error"] < 1e-14
-
-
-@pytest.mark.parametrize("loops", [True, False])
-def test_a_massless_body_that_is_free_is_refused_by_name(loops):
-    """At the end of an open chain, and two links of a five-bar, which has two freedoms."""
-    linkage = (
-        five_bar(m=(1, 0, 0, 0), I=(1e-4, 0, 0, 0))
-        if loops
-        else replace(four_bar((1.0, 0.0, 1.0)), loop=())
-    )
-    name = "link[234]" if loops else "coupler"
-    with pytest.raises(MasslessError, match=f"body `{name}` has mass and inertia 0"):
-        running(linkage)
 
 
 def test_a_dead_centre_that_nothing_with_mass_carries_ends_the_run_by_name():

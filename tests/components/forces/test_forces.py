@@ -122,11 +122,6 @@ def test_drives():
     assert block.y["q"][0] == pytest.approx(0.4, abs=1e-6)  # the table's end is held
 
 
-def test_one_coordinate_terms_are_refused_on_a_free_joint():
-    with pytest.raises(ValueError, match="one coordinate and a free joint has three"):
-        running(one_body(Body(name="b", mass=1, inertia=1), type="free", damping=1.0))
-
-
 def test_bias_acceleration_carries_gravity():
     """At rest with no wrench, a_bias is the operational acceleration itself."""
     block = pendulum(gravity=(0.0, -9.81))

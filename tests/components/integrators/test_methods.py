@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from hapticlink.components import integrators
 from hapticlink.components.integrators.dormand_prince_8 import DORMAND_PRINCE_8
-from hapticlink.components.integrators.runge_kutta import HEUN, RK4, Tableau
+from hapticlink.components.integrators.runge_kutta import HEUN, RK4
 
 
 @given(st.sampled_from([HEUN, RK4, DORMAND_PRINCE_8]), st.data())
@@ -35,19 +35,6 @@ def test_a_coefficient_that_is_off(tableau, data):
 def test_an_order_that_is_claimed(tableau):
     with pytest.raises(ValueError, match=f"should sum to 1/{tableau.order + 1} for order"):
         replace(tableau, order=tableau.order + 1)
-
-
-@pytest.mark.parametrize(
-    ("a", "b", "c"),
-    [
-        (((0.0,), (0.5,)), (0.0, 1.0), (0.0, 0.5)),  # implicit
-        (((),), (0.0, 1.0), (0.0, 0.5)),
-        (((), (0.5,)), (0.0, 1.0), (0.5,)),
-    ],
-)
-def test_sizes_that_do_not_fit(a, b, c):
-    with pytest.raises(ValueError, match="an explicit method has"):
-        Tableau(a, b, c, 1)
 
 
 q, v, t = ca.SX.sym("q"), ca.SX.sym("v"), ca.SX.sym("t")

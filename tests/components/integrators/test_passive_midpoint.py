@@ -180,12 +180,3 @@ def test_any_method_may_use_the_terms_of_a_mechanism_and_count(monkeypatch):
     assert counting.y["steps"] == counting.state["steps"] == 20
     assert np.abs(own.state["qd"]).max() > 1
     np.testing.assert_array_equal(counting.x[:8], own.x[:8])
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [({"stabilization": "baumgarte"}, "projection"), ({"frame_s": 1 / 30}, "local_model")],
-)
-def test_what_does_not_fit_is_refused(settings, message):
-    with pytest.raises(ValueError, match=message):
-        running(five_bar(), **settings)

@@ -86,16 +86,6 @@ def test_mean_link_length_of_the_five_bar():
     assert mean_link_length(five_bar()) == pytest.approx(np.mean(appendix_a.L), rel=1e-15)
 
 
-def test_a_tree_without_a_root_is_refused():
-    linkage = Linkage(
-        body=(Body(name="a", mass=1, inertia=1), Body(name="b", mass=1, inertia=1)),
-        joint=(Joint(name="ab", parent="b", child="a"), Joint(name="ba", parent="a", child="b")),
-        operational_point=OperationalPoint(body="a"),
-    )
-    with pytest.raises(ValueError, match="no chain of joints leads to `ground`"):
-        terms(linkage, "x_h")
-
-
 @settings(max_examples=30)
 @given(linkages())
 def test_tree_recursion_is_D_and_its_inverse(drawn):

@@ -12,7 +12,7 @@ from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import describe
-from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.little_fmus import edited, python_fmu
 
 SPRING = Spring("far", "x", stiffness="K", damping="B", set_velocity="rate")
 

@@ -12,10 +12,11 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import opened, read_xml
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read
-from tests.orchestrator.c_fmus import HOSTILE, description3
+from tests.little_fmus import description3
+from tests.orchestrator.c_fmus import hostile_description
 from tests.orchestrator.ssp.ssps import HEAD, UNTIMED, component
 
-DESCRIPTION = HOSTILE.format(flags="")
+DESCRIPTION = hostile_description("2")
 
 LAUGHS = """<?xml version="1.0"?>
 <!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from hapticlink.orchestrator.base.errors import SceneFault
+from tests.little_fmus import edited, python_fmu
 from tests.orchestrator.c_fmus import clock_fmu3, event_fmu3
-from tests.orchestrator.foreign_fmus import edited, python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, run, wire_table
 
 ONE = fmu_table("one", "clocks")

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results.read_results import Table
 from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.system.system import System
-from tests.orchestrator.c_fmus import compiled
+from tests.little_fmus import compiled
 from tests.orchestrator.coupled import NEWTON, simulate, system
 from tests.orchestrator.native_mass import FLAGS, ROWS, STIFF, native, stiff
 from tests.orchestrator.systems import with_coupling

@@ -5,8 +5,8 @@ import pytest
 
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.in_process import in_process
+from tests.little_fmus import python_fmu
 from tests.orchestrator.c_fmus import event_fmu3
-from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, run, wire_table
 
 ONE = fmu_table("one", "events")

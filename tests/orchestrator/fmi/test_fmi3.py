@@ -7,8 +7,8 @@ import pytest
 
 from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.fmi.description import describe
+from tests.little_fmus import edited, python_fmu, slave
 from tests.orchestrator.c_fmus import NUMBERS, c_fmu3
-from tests.orchestrator.foreign_fmus import edited, python_fmu, slave
 from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, run, wire_table
 
 ONE = fmu_table("one", "types")

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
-from tests.orchestrator.foreign_fmus import edited, python_fmu, slave, with_units
+from tests.little_fmus import edited, python_fmu, python_fmu_of, slave, with_units
 from tests.orchestrator.foreign_scenes import ISOLATED, PAIR, fmu_table, ran, run, scene, wire_table
 from tests.shared_fixtures import BAR
 
@@ -104,11 +104,7 @@ class Three(Fmi3Slave):
 
 
 def three(folder: Path) -> Path:
-    from pythonfmu3.builder import FmuBuilder as Builder3
-
-    script = folder / "three_slave.py"
-    script.write_text(THREE)
-    return Path(Builder3.build_FMU(script, dest=folder))
+    return python_fmu_of(folder, THREE, "three_slave", "3")
 
 
 def test_fmi3_arrays_and_types_beside_fmi2(tmp_path):

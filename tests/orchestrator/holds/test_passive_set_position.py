@@ -18,7 +18,7 @@ from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.hold_parts import describe_holds, describe_spring
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.build_system import built
-from tests.orchestrator.foreign_fmus import slave
+from tests.little_fmus import slave
 from tests.orchestrator.foreign_scenes import fmu_table, ran, run, wire_table
 from tests.orchestrator.holds.bench import Bench
 

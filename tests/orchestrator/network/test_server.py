@@ -17,7 +17,7 @@ from hapticlink.orchestrator.network import served_part, server
 from hapticlink.orchestrator.network.messages import Answer, Request, answer_of
 from hapticlink.orchestrator.network.server import Server
 from hapticlink.orchestrator.system.build_system import built
-from tests.orchestrator.foreign_fmus import python_fmu
+from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene
 
 ONE, TWO = bytes(16), bytes(15) + b"2"

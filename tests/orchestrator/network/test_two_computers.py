@@ -23,7 +23,7 @@ import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.network import key_file
 from hapticlink.orchestrator.results.read_results import read_table
-from tests.orchestrator.foreign_fmus import python_fmu
+from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.network.served import (
     command,

@@ -8,7 +8,7 @@ import pytest
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.explain import explain
 from hapticlink.orchestrator.plan.plan import Plan
-from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.little_fmus import edited, python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 
 COUPLING = "coupling=gauss-seidel-plants"

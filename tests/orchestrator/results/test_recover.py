@@ -14,8 +14,8 @@ from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.results.recover import Recovered, recover
 from hapticlink.orchestrator.results.rows_file import RowsFile
 from hapticlink.orchestrator.results.write_files import FileRecorder
+from tests.little_fmus import python_fmu
 from tests.orchestrator.c_fmus import hostile_fmu
-from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import COMMAND, ISOLATED, RUN, fmu_table, scene
 from tests.orchestrator.results.records import run_json
 

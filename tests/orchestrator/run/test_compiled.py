@@ -13,8 +13,8 @@ from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled.loop import Events
 from hapticlink.orchestrator.scene.scene_tables import Iteration
+from tests.little_fmus import python_fmu
 from tests.orchestrator import coupled
-from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.native_mass import held
 from tests.orchestrator.results.records import tables_of

@@ -22,6 +22,7 @@ from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged
 from hapticlink.orchestrator.scene.scene_tables import Iteration
 from hapticlink.orchestrator.system.system import System
+from tests.little_fmus import edited
 from tests.orchestrator.coupled import (
     HERMITE,
     described,
@@ -35,7 +36,6 @@ from tests.orchestrator.coupled import (
     system,
 )
 from tests.orchestrator.coupled import order as observed_order
-from tests.orchestrator.foreign_fmus import edited
 from tests.orchestrator.native_mass import FLAGS, POWER, ROWS, STIFF, held, native, stiff
 
 Fmus = Mapping[str, Description]

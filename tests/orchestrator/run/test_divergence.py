@@ -4,7 +4,7 @@ import pytest
 
 from hapticlink.orchestrator.base.errors import Diverged
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.foreign_fmus import python_fmu, slave, with_units
+from tests.little_fmus import python_fmu, slave, with_units
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, ran, run
 from tests.shared_fixtures import status
 

@@ -12,8 +12,8 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import read_results
+from tests.little_fmus import edited, edited_entries, slave
 from tests.orchestrator.c_fmus import hostile_fmu
-from tests.orchestrator.foreign_fmus import edited, edited_entries, slave
 from tests.orchestrator.foreign_scenes import fmu_table, run, scene
 from tests.shared_fixtures import status
 

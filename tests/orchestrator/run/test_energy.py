@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.run.energy.meter import ROWS
-from tests.orchestrator.foreign_fmus import entries, slave, with_units
+from tests.little_fmus import entries, slave, with_units
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.holds.bench import Bench
 

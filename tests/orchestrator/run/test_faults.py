@@ -19,8 +19,8 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import read_results
+from tests.little_fmus import SLAVE, edited_entries, python_fmu, python_fmu_of, slave
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
-from tests.orchestrator.foreign_fmus import SLAVE, edited_entries, python_fmu, python_fmu_of, slave
 from tests.orchestrator.foreign_scenes import (
     COMMAND,
     ISOLATED,

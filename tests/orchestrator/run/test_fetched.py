@@ -8,7 +8,7 @@ import pytest
 
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from tests.orchestrator.foreign_fmus import python_fmu
+from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 
 SCENE, SHORT = "closed-loop", ("duration=0.5",)

@@ -17,8 +17,8 @@ from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.results.rows_file import RowsFile
+from tests.little_fmus import python_fmu
 from tests.orchestrator.c_fmus import hostile_fmu
-from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, RUN, fmu_table, scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")

@@ -2,8 +2,8 @@
 
 import pytest
 
+from tests.little_fmus import python_fmu
 from tests.orchestrator.c_fmus import hostile_fmu
-from tests.orchestrator.foreign_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, run, wire_table
 
 MEET = """import pathlib, time as clock

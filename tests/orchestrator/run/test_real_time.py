@@ -21,7 +21,7 @@ from hapticlink.orchestrator.run import concurrent_fmus, pace
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.visualization.figures.real_time_figure import exceedance
 from hapticlink.visualization.figures.run_figures import figures
-from tests.orchestrator.foreign_fmus import python_fmu
+from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, scene
 from tests.orchestrator.results.records import tables_of
 from tests.orchestrator.wall_clock import MS, WallClock

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays
 from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.run import execute_plan
-from tests.orchestrator.foreign_fmus import python_fmu
+from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import COMMAND, fault, fmu_table, run, scene
 from tests.shared_fixtures import run_once, status
 

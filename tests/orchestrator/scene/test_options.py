@@ -45,20 +45,20 @@ def test_words_numbers_and_arrays_are_written_as_on_the_command_line():
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("value", [None, object(), b"10", {1, 2}, [None]])
-def test_what_no_scene_can_hold_is_refused(value):
-    with pytest.raises(InputFault, match=r"graphics\.rate: .* is no value of a scene"):
-        overrides.written({"graphics.rate": value})
+NO_VALUE = r"graphics\.rate: .* is no value of a scene"
 
 
-def test_pairs_are_no_options():
-    with pytest.raises(InputFault, match=r"option \('graphics.rate', 10\): write key=value, or"):
-        open_scene.load("closed-loop", [("graphics.rate", 10)])
-
-
-def test_one_text_is_no_list_of_options():
-    with pytest.raises(InputFault, match="give a mapping, or a list"):
-        overrides.written("graphics.rate=10")
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        *(({"graphics.rate": v}, NO_VALUE) for v in (None, object(), b"10", {1, 2}, [None])),
+        ([("graphics.rate", 10)], r"option \('graphics.rate', 10\): write key=value, or"),
+        ("graphics.rate=10", "give a mapping, or a list"),
+    ],
+)
+def test_what_is_no_option_is_refused(given, message):
+    with pytest.raises(InputFault, match=message):
+        open_scene.load("closed-loop", given)
 
 
 def test_a_scene_object_takes_options_as_its_name_does(tmp_path):

@@ -78,11 +78,6 @@ def test_an_exported_scene_runs_again_without_what_built_it(native, tmp_path):
     assert tables_of(native) == tables_of(tmp_path / "again")
 
 
-def test_all_platforms_are_for_what_is_compiled(tmp_path, capsys):
-    assert status("build", "five-bar", "--all-platforms", "--out", tmp_path) == 2
-    assert "--set packaging=native" in capsys.readouterr().err
-
-
 @pytest.fixture
 def asked(monkeypatch):
     """The platforms compiled for, by a stand-in: tests/fmus/test_native_fmu_entries.py compiles."""

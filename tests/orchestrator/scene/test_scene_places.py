@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.scene import overrides, read_and_check
 from hapticlink.orchestrator.ssp import names
-from tests.orchestrator.foreign_fmus import python_fmu
+from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import scene as foreign_scene
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.shared_fixtures import status

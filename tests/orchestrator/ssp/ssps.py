@@ -3,7 +3,7 @@
 import zipfile
 from pathlib import Path
 
-from tests.orchestrator.foreign_fmus import edited_entries, python_fmu, with_units
+from tests.little_fmus import edited_entries, python_fmu, with_units
 from tests.orchestrator.ssp.parameter_sets import ON, binding, bindings, values
 
 HEAD = """<?xml version="1.0" encoding="UTF-8"?>

@@ -11,7 +11,7 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.foreign_fmus import edited, edited_entries, python_fmu
+from tests.little_fmus import edited, edited_entries, python_fmu
 from tests.orchestrator.ssp.ssps import foreign
 
 RUN = {"duration": 0.2, "haptics": {"rate": 50}}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.orchestrator.foreign_fmus import python_fmu, with_units
+from tests.little_fmus import python_fmu, with_units
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.ssp.parameter_sets import binding, bindings, parameters, unit, values
 from tests.orchestrator.ssp.ssps import component, connectors, line, ssp, system

@@ -13,8 +13,8 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Results
+from tests.little_fmus import python_fmu, slave, with_units
 from tests.orchestrator.c_fmus import c_fmu3, clock_fmu3
-from tests.orchestrator.foreign_fmus import python_fmu, slave, with_units
 from tests.orchestrator.foreign_scenes import PAIR, fmu_table, scene, wire_table
 from tests.orchestrator.results.records import tables_of
 from tests.orchestrator.ssp.ssps import foreign

@@ -11,7 +11,7 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read
-from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.little_fmus import edited, python_fmu
 from tests.orchestrator.run.test_energy import fmus
 from tests.orchestrator.ssp.parameter_sets import ON, TABLE, binding, bindings, linear, values
 from tests.orchestrator.ssp.ssps import HEAD, TAIL, component, connectors, line, ssp, system

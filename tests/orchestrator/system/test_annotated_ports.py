@@ -12,7 +12,7 @@ import hapticlink as hl
 from hapticlink.components.blocks import BLOCKS as BUILDERS
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import simulate
-from tests.orchestrator.foreign_fmus import python_fmu, slave, with_units
+from tests.little_fmus import python_fmu, slave, with_units
 from tests.orchestrator.foreign_scenes import fmu_table, ran, run, scene, wire_table
 from tests.orchestrator.results.records import tables_of
 from tests.orchestrator.systems import system_of

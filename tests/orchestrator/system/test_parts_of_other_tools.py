@@ -14,6 +14,7 @@ from fmpy.util import create_zip_archive
 import hapticlink as hl
 from hapticlink.commands.options import Changes
 from hapticlink.orchestrator.base.errors import SceneFault
+from tests.little_fmus import python_fmu_of
 from tests.orchestrator.results.records import tables_of
 
 NATIVE = {"duration": 0.2, "packaging": "native"}
@@ -85,9 +86,8 @@ def test_a_part_made_by_fmpy_changes_no_byte(tmp_path, own, made_by, block):
 
 
 def test_a_hand_of_pythonfmu3_changes_no_byte(tmp_path, own):
-    builder = pytest.importorskip("pythonfmu3.builder")
-    (tmp_path / "pull.py").write_text(PULL)
-    file = builder.FmuBuilder.build_FMU(tmp_path / "pull.py", dest=tmp_path)
+    pytest.importorskip("pythonfmu3")
+    file = python_fmu_of(tmp_path, PULL, "pull", "3")
     assert tables_of(run_with("hand", file, tmp_path).folder) == own[1]
 
 

@@ -14,7 +14,7 @@ from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.system.build_system import built
-from tests.orchestrator.foreign_fmus import entries, slave
+from tests.little_fmus import entries, slave
 from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import status
 

@@ -19,7 +19,7 @@ from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.system.timeline import clocks, timeline
-from tests.orchestrator.foreign_fmus import edited, python_fmu
+from tests.little_fmus import edited, python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.timelines import CAUSAL, LOOP, fixed, scene_of, scenes, varying
 
