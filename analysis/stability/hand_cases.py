@@ -61,8 +61,10 @@ class Case:
 
     @property
     def severity(self) -> tuple[bool, bool, float]:
-        """What is worse is larger: in a hand rather than free, fast rather than drifting."""
-        return self.verdict == "unstable" and not self.drifts, not self.free, self.growth
+        """What is worse is larger: in a hand rather than free, fast rather than drifting; the same
+        for growth rates that differ by rounding."""
+        growth = float(f"{self.growth:.9g}")
+        return self.verdict == "unstable" and not self.drifts, not self.free, growth
 
     def record(self) -> dict[str, Any]:
         return {

@@ -171,29 +171,21 @@ class Stability:
 
     def _margins(self) -> Iterator[str]:
         margin = self.margin
-        at_least = {q: "at least " for q in margin.not_searched_further}
-        most = {q: " (not searched further)" for q in at_least}
+
+        def told(quantity: str, what: str, value: str) -> str:
+            if quantity in margin.not_searched_further:
+                return f"{what}at least {value} (not searched further)"
+            return f"{what}{value}"
+
         if margin.stiffness is not None:
-            yield (
-                f"stiffnesses {at_least.get('stiffness', '')}times {margin.stiffness:.2g}"
-                f"{most.get('stiffness', '')}"
-                if margin.stiffness
-                else "unstable with any stiffness"
-            )
+            some = told("stiffness", "stiffnesses ", f"times {margin.stiffness:.2g}")
+            yield some if margin.stiffness else "unstable with any stiffness"
         if margin.delay is not None:
-            yield (
-                f"{at_least.get('delay', '')}{1e3 * margin.delay:.3g} ms of further delay"
-                f"{most.get('delay', '')}"
-                if margin.delay
-                else "less than a haptic period of further delay"
-            )
+            some = told("delay", "", f"{1e3 * margin.delay:.3g} ms of further delay")
+            yield some if margin.delay else "less than a haptic period of further delay"
         if margin.rate is not None:
-            yield (
-                f"graphics {at_least.get('rate', '')}down to {margin.rate:.3g} Hz"
-                f"{most.get('rate', '')}"
-                if math.isfinite(margin.rate)
-                else "no graphics rate"
-            )
+            some = told("rate", "graphics ", f"down to {margin.rate:.3g} Hz")
+            yield some if math.isfinite(margin.rate) else "no graphics rate"
         if margin.stiffness is None and margin.delay is None and margin.rate is None:
             yield "no coupling and no second rate"
 

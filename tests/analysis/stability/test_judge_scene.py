@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -15,16 +16,17 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.stability import forward_sensitivity
 from hapticlink.analysis.stability.forward_sensitivity import ForwardSensitivity
-from hapticlink.analysis.stability.hand_cases import InHands, in_poses
+from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
 from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
 from hapticlink.analysis.stability.linear_period import LinearPeriod
-from hapticlink.analysis.stability.margin_and_remedy import SAFE, improvements
+from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, improvements
 from hapticlink.analysis.stability.modes import DRIFT, kind, modes
 from hapticlink.analysis.stability.poses import evenly_spaced, settled, simulated
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
+from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.components.specs.hand import ArmHand, SpringHand
 from hapticlink.orchestrator.scene import overrides
 from tests.analysis.stability.own_hand import linearised
@@ -158,6 +160,33 @@ def test_a_free_slider_decays_by_its_damper_alone() -> None:
 )  # fmt: skip
 def test_modes_are_told_apart(growth: float, hertz: float, said: str) -> None:
     assert kind(growth, hertz, DRIFT) == said
+
+
+def test_of_cases_that_differ_by_rounding_the_first_is_the_worst() -> None:
+    def case(hand: str, growth: float) -> Case:
+        return Case("0 s", hand, growth, 1e-4, 1.0, "oscillation", "stable", ())
+
+    tie = [case("light touch", -0.5), case("firm grip", -0.5 * (1 - 1e-14))]
+    assert max(tie, key=lambda case: case.severity) is tie[0]
+    assert max([*tie, case("stiff arm", -0.4999)], key=lambda case: case.severity) is not tie[0]
+
+
+def test_a_margin_whose_search_ended_says_at_least() -> None:
+    ends = ("stiffness", "delay", "rate")
+    none = Margin(0.0, 0.0, math.inf)
+    some, most = Margin(8.7, 0.00195, 15.06), Margin(1024.0, 0.015625, 8.0, ends)
+    told = {
+        margin: ", ".join(Stability._margins(Mock(margin=margin))) for margin in (none, some, most)
+    }
+    assert told[none] == (
+        "unstable with any stiffness, less than a haptic period of further delay, no graphics rate"
+    )
+    assert told[some] == "stiffnesses times 8.7, 1.95 ms of further delay, graphics down to 15.1 Hz"
+    assert told[most] == (
+        "stiffnesses at least times 1e+03 (not searched further), "
+        "at least 15.6 ms of further delay (not searched further), "
+        "graphics at least down to 8 Hz (not searched further)"
+    )
 
 
 def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
