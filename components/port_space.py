@@ -28,12 +28,46 @@ class Entries(NamedTuple):
     units: tuple[str, ...]
 
 
+class _Vector:
+    """A quantity with an entry for each direction: its units along lengths and about axes."""
+
+    def __init__(self, linear: str, angular: str) -> None:
+        self._units = linear, angular
+
+    def __get__(self, space: PortSpace, _: type[PortSpace]) -> Entries:
+        return Entries((space.size,), tuple(self._units[turns] for turns in space.turns))
+
+
+class _Matrix:
+    """A quantity with an entry for each pair of directions: its units for two lengths, one of each,
+    and two axes."""
+
+    def __init__(self, linear: str, mixed: str, angular: str) -> None:
+        self._units = linear, mixed, angular
+
+    def __get__(self, space: PortSpace, _: type[PortSpace]) -> Entries:
+        of_pairs = tuple(self._units[a + b] for a in space.turns for b in space.turns)
+        return Entries((space.size, space.size), of_pairs)
+
+
 @dataclass(frozen=True)
 class PortSpace:
-    """The directions of a port; names: of the entries of its pose, rows: of the six."""
+    """The directions of a port; names: of the entries of its pose, rows: of the six. Mass,
+    stiffness and damping are those by direction."""
 
     names: tuple[str, ...]
     rows: tuple[int, ...]
+
+    pose = _Vector("m", "rad")
+    twist = _Vector("m/s", "rad/s")
+    acceleration = _Vector("m/s2", "rad/s2")
+    wrench = _Vector("N", "N.m")
+    mass = _Vector("kg", "kg.m2")
+    stiffness = _Vector("N/m", "N.m/rad")
+    damping = _Vector("N.s/m", "N.m.s/rad")
+    inertia = _Matrix("kg", "kg.m", "kg.m2")
+    mobility = _Matrix("1/kg", "1/(kg.m)", "1/(kg.m2)")
+    projector = _Matrix("1", "1", "1")
 
     @property
     def size(self) -> int:
@@ -43,58 +77,6 @@ class PortSpace:
     def turns(self) -> tuple[bool, ...]:
         """Whether each entry is an angle."""
         return tuple(row >= LINEAR for row in self.rows)
-
-    def _vector(self, linear: str, angular: str) -> Entries:
-        units = tuple(angular if turns else linear for turns in self.turns)
-        return Entries((self.size,), units)
-
-    def _matrix(self, linear: str, mixed: str, angular: str) -> Entries:
-        units = (linear, mixed, angular)
-        of_pairs = tuple(units[a + b] for a in self.turns for b in self.turns)
-        return Entries((self.size, self.size), of_pairs)
-
-    @property
-    def pose(self) -> Entries:
-        return self._vector("m", "rad")
-
-    @property
-    def twist(self) -> Entries:
-        return self._vector("m/s", "rad/s")
-
-    @property
-    def acceleration(self) -> Entries:
-        return self._vector("m/s2", "rad/s2")
-
-    @property
-    def wrench(self) -> Entries:
-        return self._vector("N", "N.m")
-
-    @property
-    def mass(self) -> Entries:
-        """Inertia by direction."""
-        return self._vector("kg", "kg.m2")
-
-    @property
-    def stiffness(self) -> Entries:
-        """Stiffness by direction."""
-        return self._vector("N/m", "N.m/rad")
-
-    @property
-    def damping(self) -> Entries:
-        """Damping by direction."""
-        return self._vector("N.s/m", "N.m.s/rad")
-
-    @property
-    def inertia(self) -> Entries:
-        return self._matrix("kg", "kg.m", "kg.m2")
-
-    @property
-    def mobility(self) -> Entries:
-        return self._matrix("1/kg", "1/(kg.m)", "1/(kg.m2)")
-
-    @property
-    def projector(self) -> Entries:
-        return self._matrix("1", "1", "1")
 
     @property
     def identity(self) -> tuple[float, ...]:
