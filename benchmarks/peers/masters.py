@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import ctypes
 import logging
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -179,7 +178,7 @@ def bare(ring: Ring) -> Steps:
 
 MASTERS: dict[str, Callable[[Ring], Steps]] = {
     "C loop": bare,
-    "hapticlink": compiled,
+    "hapticlink": ours,
     "Ecos": ecos,
     "libcosim": libcosim,
     "ctypes": calls_by_ctypes,
