@@ -19,7 +19,7 @@ TITLES = {
     "pythonfmu": "Python FMUs of pythonfmu",
 }
 COLOURS = {
-    OURS: "#1b6ca8", "hapticlink, loop in Python": "#8bb8d8", "Ecos": "#d1495b",
+    OURS: "#1b6ca8", "Ecos": "#d1495b",
     "libcosim": "#e0a030", "ctypes": "#5a8f3c", "FMPy": "#8a5fa8", ALONE: "0.5",
 }  # fmt: skip
 Row = Mapping[str, str]

@@ -1,10 +1,11 @@
-"""Draws the waveform of every hold to docs/figures/, by running the hold classes on one signal:
+"""Draws the waveform of every hold to docs/figures/, by running the holds on one signal:
 
 python docs/draw_holds.py
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from hapticlink.orchestrator.holds import HOLDS, Hold, HoldContext
-from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
-from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefinite, Unwrapped
+from hapticlink.orchestrator.holds import HOLDS, HoldContext, HoldRow
+from hapticlink.orchestrator.run.compiled import structures
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold, make_tank
+from hapticlink.orchestrator.run.compiled.library import load
+from hapticlink.orchestrator.run.energy.bonds import Reader
+from hapticlink.orchestrator.run.hold_parts import HoldParts, SpringParts
 
 Vector = NDArray[np.float64]
 FOLDER = Path(__file__).with_name("figures")
@@ -49,36 +53,47 @@ def near_end(tick: float) -> float:
     return signal(tick + 30 * np.cos(2 * np.pi * tick / END))
 
 
-def _seconds(ticks: float) -> float:
-    return ticks * TICK
+class Signals:
+    """What holds read besides their samples: a position."""
+
+    def __init__(self) -> None:
+        self.values, self.loop = np.zeros(1), structures.Loop(numerator=TICK, denominator=1.0)
+        self.loop.fill(self, "values")
+
+    def hold(self, name: str, size: int = 1, **parts: Any) -> CompiledHold:
+        """A hold, which lives as long as these signals."""
+        kind, position = HOLDS[name], Reader(self, [0])  # type: ignore[arg-type]
+        width, tank = (2 if kind.needs in ("derivative", "integral") else 1) * size, None
+        if kind.needs == "power":
+            parts["displacement"] = position
+        elif kind.needs == "spring":
+            stiffness = np.full(1, STIFFNESS)
+            spring = SpringParts(stiffness, np.zeros(1), position, np.zeros(1), TICK, sampled=True)
+            tank = make_tank(spring)
+        every = HoldParts(name, kind, tuple(range(width)), HoldContext(size), **parts)
+        loop = ctypes.addressof(self.loop)
+        return CompiledHold(load(), loop, every, np.zeros(size), "", tank)
 
 
 def waveform(name: str) -> tuple[Vector, Vector]:
     """The values of a hold at every tick, and the stamps of its samples."""
-    now = [0]
-    kind = HOLDS[name]
-    context = HoldContext(1, _seconds)
-    if kind.needs == "power":  # the force of a spring at the target: x = -y/K
-        context = HoldContext(1, _seconds, lambda: np.array([-signal(now[0]) / STIFFNESS]))
-    elif kind.needs == "spring":
-        end = lambda: np.array([near_end(now[0])])  # noqa: E731
-        near = NearEnd(end, np.zeros(1), TICK, _seconds, sampled=True)
-        context = HoldContext(
-            1, _seconds, tank=(EnergyTank(np.full(1, STIFFNESS), np.zeros(1), near), 0)
-        )
-    hold, values = kind(context), []
+    signals, kind, values = Signals(), HOLDS[name], list[float]()
+    assert isinstance(kind, HoldRow)
+    hold = signals.hold(name)
     fast = kind.downsamples and name == "mean"
     every = 1 if fast else PERIOD
     for tick in range(END):
-        now[0] = tick
+        # The near end of the spring, or the target on the spring of which the signal is the force.
+        spring = kind.needs == "spring"
+        signals.values[0] = near_end(tick) if spring else -signal(tick) / STIFFNESS
         if tick % every == 0:
             hold.push(tick, sample(kind, tick), tick)
         read = not fast or tick % PERIOD == 0
-        values.append(hold.value(tick).copy()[0] if read else values[-1])
+        values.append(float(hold.value(tick)[0]) if read else values[-1])
     return np.array(values), np.arange(0, END, PERIOD)
 
 
-def sample(kind: type[Hold], tick: int) -> Vector:
+def sample(kind: HoldRow, tick: int) -> Vector:
     """The signal at `tick`, and beside it what the hold needs."""
     if kind.needs == "derivative":
         return np.array([signal(tick), rate(tick)])
@@ -122,7 +137,7 @@ def scalars() -> Figure:
     return figure
 
 
-def held(hold: Hold, source: Callable[[int], Vector]) -> Vector:
+def held(hold: CompiledHold, source: Callable[[int], Vector]) -> Vector:
     """The values of a hold whose source is sampled each period, (END, n)."""
     found = []
     for tick in range(END):
@@ -156,12 +171,14 @@ def manifolds() -> Figure:
     panels = figure.subplots(1, 3)
     ticks = np.arange(END)
 
-    def foh(size: int) -> Hold:
-        return HOLDS["foh"](HoldContext(size, _seconds))
+    signals = Signals()
 
-    angle: Any = (foh(1), Unwrapped(lambda: foh(1), [0], [2 * np.pi]), _wrapped)
-    projector: Any = (foh(4), Projector(lambda: foh(4), 4), _direction)
-    mobility: Any = (foh(4), Semidefinite(lambda: foh(4), 4), _mobility)
+    def pair(size: int, **kind: Any) -> tuple[CompiledHold, CompiledHold]:
+        return signals.hold("foh", size), signals.hold("foh", size, **kind)
+
+    angle: Any = (*pair(1, turns={0: 2 * np.pi}), _wrapped)
+    projector: Any = (*pair(4, matrix="projector"), _direction)
+    mobility: Any = (*pair(4, matrix="semidefinite"), _mobility)
 
     def beyond(values: Vector) -> Vector:
         """The largest entry of P P - P."""

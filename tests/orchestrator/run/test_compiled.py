@@ -6,11 +6,13 @@ from typing import Any
 
 import pytest
 
+from hapticlink.commands import doctor
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.event_kinds import event
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.run.compiled import build, library
 from hapticlink.orchestrator.run.compiled.loop import Events
 from hapticlink.orchestrator.scene.scene_tables import Iteration
 from tests.little_fmus import python_fmu
@@ -41,6 +43,21 @@ def test_every_hold(tmp_path, hold):
     assert hold in run["holds"].values()
     assert sum(link["lost"] for link in run["links"].values())
     assert run["in_python"] == {}
+
+
+def test_a_machine_without_the_library_is_told_the_remedy(tmp_path, monkeypatch):
+    monkeypatch.setattr(build, "name", lambda tag=None: "loop-of-no-machine.so")
+    monkeypatch.setattr(build, "compilers", lambda: iter(()))
+    library.load.cache_clear()
+    try:
+        ended = simulate("pendulum", tmp_path, ["duration=0.1"])
+        told = doctor._loop()
+    finally:
+        library.load.cache_clear()
+    for said in (str(ended.outcome.fault), told.removeprefix("no: ")):
+        assert said.startswith("the event loop, a library of C, is not there for ")
+        assert "it is not built, and there is no C compiler; take a wheel" in said
+        assert 'pip install "hapticlink[native]"' in said
 
 
 STEPS = (
