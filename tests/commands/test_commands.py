@@ -84,6 +84,7 @@ def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) ->
         (["run", "closed-loop", "--set", "stop_when=hand.G<0"], "there is no such output"),
         (["run", "closed-loop", "--bogus"], "Unknown option"),
         (["fly"], "Unknown command"),
+        (["export-results", "runs/a", "--to", "mcap"], '.frame("haptics").to_parquet('),
     ],
 )
 def test_bad_input_is_status_2(
