@@ -114,9 +114,13 @@ class RowsBeingWritten:
             self._memory.madvise(mmap.MADV_DONTNEED)  # rows that are written need no memory
 
     def close(self) -> None:
-        """Close the file, which then ends with its last row."""
+        """Close the file, which then ends with its last row. Nothing may write rows any more."""
+        size = self._begin + self.filled.value * self._row
+        del self.rows, self.filled
+        with suppress(BufferError):  # somebody else still has them
+            self._memory.close()
         with suppress(OSError):  # Windows shortens no file that is mapped
-            self._file.truncate(self._begin + self.filled.value * self._row)
+            self._file.truncate(size)
         self._file.close()
 
 

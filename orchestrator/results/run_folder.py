@@ -108,7 +108,7 @@ class RunFolder(RunResults):
     def _interrupted(self) -> None:
         self._broken_off("interrupted", Interrupted(self.last))
         for recorder in self._recorders.values():
-            recorder.__exit__()
+            recorder.discard()  # and closes nothing, since the loop may go on
 
     def _broken_off(self, reason: str, error: BaseException) -> None:
         if self.published:

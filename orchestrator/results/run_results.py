@@ -73,6 +73,9 @@ class Recorder:
         """The number of rows that may be filled, more than are."""
         return 1 if self.rows is None else len(self.rows)
 
+    def discard(self) -> None:
+        """Remove the rows, where they are not published."""
+
     def publish(self) -> None:
         """Replace the table of an earlier run by this one."""
 

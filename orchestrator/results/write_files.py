@@ -5,7 +5,9 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +35,10 @@ class FileRecorder(Recorder):
     ) -> None:
         self.path, self.target = path, path.with_suffix(rows_file.SUFFIX)
         self._unfinished = path.with_name(f".{self.target.name}.{os.getpid()}")
+        if sys.platform == "win32":  # which moves no open file
+            self._unfinished = self.target
         self._file: rows_file.RowsBeingWritten | None = None
-        self._full = False
+        self._published, self._full = False, 0.0
         super().__init__(recorded, values, first, every, end)
 
     def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
@@ -48,33 +52,42 @@ class FileRecorder(Recorder):
     @property
     def last(self) -> float | None:
         """As of all recorders, of the last row in the file where the disk is full."""
-        if self._full and self.rows is not None and self.filled.value:
-            return float(self.rows[self.filled.value - 1, 0])
-        return super().last
+        return self._full or super().last
 
     def _make_room(self) -> int:
-        if self._file is None:
+        if self._file is None or self.rows is None:
             return super()._make_room()
-        if self.filled.value == self._file.reserved:
-            self._full = True
-            self._file.reserve()
-            self._full = False
+        if (filled := self.filled.value) == self._file.reserved:
+            try:
+                self._file.reserve()
+            except OSError:
+                self._full = float(self.rows[filled - 1, 0])
+                raise
         if self.room.value:
             self.room.value = self._file.reserved
         return self._file.reserved
 
     def publish(self) -> None:
         if self._file:
-            os.replace(self._unfinished, self.target)
+            if self._unfinished != self.target:
+                os.replace(self._unfinished, self.target)
+            self._published = True
 
     def finish(self) -> None:
         if self._file and self.last is not None:
             make_csv(self.path)
 
+    def discard(self) -> None:
+        """Remove the rows, where they are not published."""
+        if not self._published:
+            with suppress(OSError):
+                self._unfinished.unlink(missing_ok=True)
+
     def __exit__(self, *_: object) -> None:
         if self._file:
+            self.rows, self.filled = None, ctypes.c_int64()
             self._file.close()
-            self._unfinished.unlink(missing_ok=True)
+            self.discard()
 
 
 def make_csv(path: Path) -> rows_file.RowsFile:
@@ -88,7 +101,8 @@ def make_csv(path: Path) -> rows_file.RowsFile:
 
 def remove_rows(path: Path) -> None:
     """Remove the rows of which the CSV `path` was made."""
-    path.with_suffix(rows_file.SUFFIX).unlink(missing_ok=True)
+    with suppress(PermissionError):  # of Windows, where somebody still has them mapped
+        path.with_suffix(rows_file.SUFFIX).unlink(missing_ok=True)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

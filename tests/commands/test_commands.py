@@ -87,6 +87,7 @@ def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) ->
         (["run", "pendulum", "--set", "title=\udcff"], r"'title=\udcff': no text"),
         (["build", "five-bar", "--all-platforms", "--out", "none"], "--set packaging=native"),
         (["new", "nowhere/crane"], "nowhere"),
+        (["export-results", "runs/a", "--to", "mcap"], '.frame("haptics").to_parquet('),
     ],
 )
 def test_bad_input_is_status_2(
