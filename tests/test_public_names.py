@@ -1,7 +1,5 @@
 """The public names of `import hapticlink as hl`, their page and the script of first steps."""
 
-from __future__ import annotations
-
 import base64
 import inspect
 import json

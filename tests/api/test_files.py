@@ -1,7 +1,5 @@
 """Building, exporting and explaining a scene from Python."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

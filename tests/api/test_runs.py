@@ -1,7 +1,5 @@
 """Runs from Python, in memory and in a folder, compared with those of the command."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Sweeps from Python, compared with those of the command."""
 
-from __future__ import annotations
-
 import csv
 import os
 import signal

@@ -1,8 +1,6 @@
 """Tables, splines and sines of time: against NumPy, SciPy and the table; Python text against
 CasADi."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Links, anchors and the files that pages name exist."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

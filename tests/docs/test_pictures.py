@@ -1,7 +1,5 @@
 """Every shipped scene has a page with its picture; every page has pictures that are shown."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

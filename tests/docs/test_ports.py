@@ -1,7 +1,5 @@
 """docs/ports.md lists every port of the project's blocks, with the unit that its FMU declares."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any

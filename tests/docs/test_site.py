@@ -1,7 +1,5 @@
 """The documentation site: built without a warning, and nothing fetched from the network."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

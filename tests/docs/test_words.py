@@ -1,7 +1,5 @@
 """Words that were retired, in pages and in what the package says: the glossary's stand instead."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """FMUs built at most once for all tests of this folder, and a way to drive them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Small components with answers known in closed form."""
 
-from __future__ import annotations
-
 import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable

@@ -1,7 +1,5 @@
 """The FMU as a file: the same bytes, whole or not at all, valid, documented."""
 
-from __future__ import annotations
-
 import re
 import struct
 import subprocess

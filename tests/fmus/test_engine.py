@@ -1,7 +1,5 @@
 """Blocks by MuJoCo against our equations: two codes that share the scene alone."""
 
-from __future__ import annotations
-
 import json
 import math
 

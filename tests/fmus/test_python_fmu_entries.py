@@ -1,7 +1,5 @@
 """What a built FMU does, through FMPy."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os

@@ -1,7 +1,5 @@
 """The reference run on the page of a block is what its FMU does."""
 
-from __future__ import annotations
-
 import zipfile
 from dataclasses import replace
 from pathlib import Path

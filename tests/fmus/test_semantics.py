@@ -1,7 +1,5 @@
 """What every built FMU does through FMPy, whichever way it is packaged."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack

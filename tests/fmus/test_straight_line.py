@@ -1,7 +1,5 @@
 """Generated Python against CasADi: the same doubles, special values included."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Libraries for Windows, linked with the C functions of Windows alone, under wine."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -6,8 +6,6 @@ Prints for each the number of outputs that differ in a bit, or why it is refused
 one differs. The suite has a choice of them (`test_programs`).
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections.abc import Iterator

@@ -1,8 +1,6 @@
 """Programs of scenes for tests: compiled by the machine's own compiler without optimisation, each C
 file once, since another hold or rate changes the data of a scene alone."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile

@@ -1,7 +1,5 @@
 """The outputs of a program beside the rows of a run of the same scene."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

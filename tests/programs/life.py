@@ -1,7 +1,5 @@
 """The life of two instances of a program, by life.c for FMI 2.0 and life3.c for FMI 3.0."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

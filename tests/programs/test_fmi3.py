@@ -1,7 +1,5 @@
 """A scene as one FMU of FMI 3.0: the bits of the run, arrays, its life, and how it is rebuilt."""
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

@@ -1,8 +1,6 @@
 """The one FMU of a scene on other machines: the same life of two instances as here, by its binary
 for Windows under wine, and by its C files for ARM under qemu."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import zipfile

@@ -1,7 +1,5 @@
 """The one FMU of a scene, with graphics at 30 Hz, in other masters: the bits of the run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

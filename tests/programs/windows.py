@@ -1,7 +1,5 @@
 """Programs for Windows, under wine."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

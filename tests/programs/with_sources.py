@@ -1,7 +1,5 @@
 """FMUs of others that bring their C sources."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tests.little_fmus import c_fmu, description2, edited_entries, listing

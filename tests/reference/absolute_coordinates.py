@@ -6,8 +6,6 @@ every joint: a formulation that shares nothing with the one in joint coordinates
 Haug, Computer Aided Kinematics and Dynamics of Mechanical Systems I (1989), chapters 3 and 6.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp

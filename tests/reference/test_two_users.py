@@ -2,8 +2,6 @@
 share nothing with the blocks but the scene: mobilities and forces between the points, a point that
 the other user holds still, and the whole loop as rates go up."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

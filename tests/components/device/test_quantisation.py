@@ -1,7 +1,5 @@
 """Quantisation by encoders: counts, and none where the quantum is 0."""
 
-from __future__ import annotations
-
 import casadi as ca
 import pytest
 

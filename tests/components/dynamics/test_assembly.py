@@ -1,7 +1,5 @@
 """Start rates: those of the scene are kept, the others follow from the geometry (by hand)."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -4,8 +4,6 @@ A path y is on each of its segments the first entry of w with w' = S w, so that 
 (0, k y + b y') is a linear system with it, whose solution is an exponential of a matrix.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Servers and bad networks of tests, as processes of their own."""
 
-from __future__ import annotations
-
 import os
 import socket
 import subprocess

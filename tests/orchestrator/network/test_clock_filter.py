@@ -1,7 +1,5 @@
 """The estimate of another clock: its true offset and drift are within what it tells."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """The study: its draws are scenes, its comparisons are within draws, its page says what the rows
 say."""
 
-from __future__ import annotations
-
 import csv
 import re
 from itertools import product

@@ -1,7 +1,5 @@
 """A headless Chromium on a page; without one the tests that need it are skipped."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Iterator

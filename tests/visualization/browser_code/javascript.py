@@ -1,7 +1,5 @@
 """Modules of the page under node; without it the tests that need it are skipped."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

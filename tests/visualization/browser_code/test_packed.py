@@ -1,7 +1,5 @@
 """What Python packs into a page, its scripts unpack."""
 
-from __future__ import annotations
-
 from random import Random
 
 from hapticlink.visualization.browser_code import one_file

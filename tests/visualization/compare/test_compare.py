@@ -1,7 +1,5 @@
 """Runs beside each other, and the page of a run."""
 
-from __future__ import annotations
-
 import base64
 import filecmp
 import json

@@ -1,7 +1,5 @@
 """The block diagram shows every FMU and every connection of a system, and no others."""
 
-from __future__ import annotations
-
 import pytest
 
 import hapticlink as hl

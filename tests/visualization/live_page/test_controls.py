@@ -1,7 +1,5 @@
 """What a page can change, and its messages, without a page."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The page in Chromium: what the mouse does to the run, and what the page shows of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page as it is served, from the outside: who is let in, and what acts on the run."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import socket

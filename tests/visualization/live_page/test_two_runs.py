@@ -1,7 +1,5 @@
 """Two runs under one mouse on the served page: the second is a session of its own."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Two users on one linkage: two windows, each with hold of one handle."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

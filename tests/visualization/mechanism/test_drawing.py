@@ -1,7 +1,5 @@
 """The drawing of a mechanism shows it where the run has it."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a page and an animation show of recorded runs, beside their tables."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """A replay in Chromium: its slider, two runs, and the file without a network."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

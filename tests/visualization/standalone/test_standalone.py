@@ -1,7 +1,5 @@
 """The page that needs no server, opened from the disk in Chromium."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from pathlib import Path
