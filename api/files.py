@@ -20,7 +20,7 @@ from hapticlink.orchestrator.run import start_parameters
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.timeline import timeline
 
@@ -86,7 +86,7 @@ def build(
         raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
     folder = folders.ensure(out)
     starts = _starts(read)
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         platforms = {2: PLATFORMS, 3: PLATFORMS_3}[fmi] if all_platforms else ()
         files = fmu_files(read, planned, timeline(read, planned), room, platforms, starts, fmi)
         for name, path in files.items():
@@ -105,10 +105,10 @@ def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path)
     from hapticlink.orchestrator.ssp import write  # its XML parsers are slow to load
 
     read = open_scene.load(scene, options)
-    with built(read, _starts(read)) as system:
+    with build_system(read, _starts(read)) as system:
         for line in uneven(system.timeline):
             logging.getLogger(__name__).warning(line)
-        return write.write(read, start_parameters.settled(system), Path(out))
+        return write.write_ssp(read, start_parameters.apply_initial_connections(system), Path(out))
 
 
 def _pictures(scene: Scene) -> dict[str, bytes]:
@@ -117,7 +117,7 @@ def _pictures(scene: Scene) -> dict[str, bytes]:
     from hapticlink.visualization.figure_axes import png  # loads Matplotlib
     from hapticlink.visualization.figures import block_diagram, run_figures
 
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         run = simulate(scene, room, in_memory=True, csv=False)
         pictures = {BLOCKS: png(block_diagram.figure(run.system, scene.title), DPI)}
         drawn = run_figures.drawings(run.results)
@@ -144,5 +144,5 @@ def _starts(scene: Scene) -> dict[str, dict[str, tuple[float, ...]]]:
     if not (scene.device or scene.connection or scene.fmu):
         return {}  # a mechanism alone, which no connection starts: its FMU is built once
     # Python FMUs give the same values as native ones, and need no compiler.
-    with built(replace(scene, packaging="python")) as system:
+    with build_system(replace(scene, packaging="python")) as system:
         return start_parameters.by_port(system)

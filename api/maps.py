@@ -46,7 +46,7 @@ def stability_map(
     folder = folders.ensure(out)
     processes = jobs or os.cpu_count() or 1
     tell = progress or (lambda done, of: None)
-    given = overrides.written(options)
+    given = overrides.write_options(options)
     found = compute_map(scene, given, axes(vary), folder, processes, check, seed, tell)
     sweep_figure.save(drawing.draw(found), folder / "map.png")
     return found

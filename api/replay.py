@@ -25,7 +25,7 @@ class Replay:
         """Write a page that opens without a network, .html, or an animation of the drawing, .gif,
         .webp or .png. Raises InputFault for another ending, or if `path` cannot be written."""
         replay_page.require_written(Path(path))
-        replay_page.write(self.runs, Path(path))
+        replay_page.write_replay(self.runs, Path(path))
 
     def __repr__(self) -> str:
         return f"replay of {', '.join(run.name for run in self.runs)}: write() makes a page of it"

@@ -96,7 +96,7 @@ class Run(Results):
         return found
 
     def __str__(self) -> str:
-        ending, *lines = summary.printed(self, self.run["scene"]["title"], self.numbers)
+        ending, *lines = summary.print_lines(self, self.run["scene"]["title"], self.numbers)
         return "\n".join([ending, *([f"  {self.fault}"] if self.fault else []), *lines])
 
     def _repr_html_(self) -> str:

@@ -42,7 +42,7 @@ class RunInterrupted(Interrupted):
         self.run = run
 
 
-@interrupt.held()
+@interrupt.defer_signals()
 def run(
     scene: str | Path | Scene,
     options: Options = (),
@@ -83,7 +83,7 @@ def run(
     return run_paced(read, out, paced, figures, progress, remote=servers)
 
 
-@interrupt.held()
+@interrupt.defer_signals()
 def run_paced(
     scene: Scene,
     out: str | Path | None,
@@ -98,7 +98,7 @@ def run_paced(
     if out is None:
         ended = _in_memory(simulated, tables)
     else:
-        with folder_lock.held(Path(out)):
+        with folder_lock.lock_folder(Path(out)):
             ended = _in_folder(simulated, Path(out), figures)
     if interrupt.came() or ended.record.end.reason == "interrupted":
         raise RunInterrupted(ended)
@@ -106,7 +106,7 @@ def run_paced(
 
 
 def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
-    with temporary_folders.room() as folder:
+    with temporary_folders.temporary_folder() as folder:
         ended = simulated(folder, csv=False)
         if not tables:
             return Run(None, ended.run, {})
@@ -129,12 +129,12 @@ def _run(folder: Path | None, run: dict[str, Any], results: Results, measures: M
 def _in_folder(simulated: Callable[..., Experiment], folder: Path, figures: bool) -> Run:
     ended = simulated(folder, keep_rows=True)
     try:
-        return _found(folder, ended, figures)
+        return _describe_run(folder, ended, figures)
     finally:
         ended.remove_rows()
 
 
-def _found(folder: Path, ended: Experiment, figures: bool) -> Run:
+def _describe_run(folder: Path, ended: Experiment, figures: bool) -> Run:
     """What the rows of a run say of it, in its folder."""
     results = ended.results
     if not ended.outcome.published:
@@ -145,13 +145,13 @@ def _found(folder: Path, ended: Experiment, figures: bool) -> Run:
     try:
         run = folders.add(folder, (), findings)
         if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
-            run = folders.add(folder, _explained(ended))
+            run = folders.add(folder, _write_plan(ended))
             if figures:
                 from hapticlink.visualization.figures import (
                     run_figures,  # with casadi, slow to load
                 )
 
-                run = folders.add(folder, figure_axes.write(run_figures.pngs(results), folder))
+                run = folders.add(folder, figure_axes.write_pngs(run_figures.pngs(results), folder))
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None
@@ -161,12 +161,12 @@ def _found(folder: Path, ended: Experiment, figures: bool) -> Run:
     return _run(folder, run, results, measures)
 
 
-def _explained(ended: Experiment) -> list[str]:
+def _write_plan(ended: Experiment) -> list[str]:
     """Writes the plan; returns its file's name. Raises Interrupted and OSError."""
     (ended.folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
     with (ended.folder / "plan.txt").open("x", encoding="utf-8") as file:
         for line in explain.explain(Plan(ended.system)):
-            interrupt.check()
+            interrupt.raise_if_interrupted()
             file.write(f"{line}\n")
     return ["plan.txt"]
 

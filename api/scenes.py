@@ -7,16 +7,16 @@ from pathlib import Path
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.plan import explain as explained
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.run.fetched_outputs import with_fetched
+from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
 from hapticlink.orchestrator.scene import find_scene
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 
 
 def shipped() -> dict[str, str]:
     """The names of the scenes that are shipped with hapticlink, each with its title."""
-    return {name: open_scene.load(name).title for name in find_scene.shipped()}
+    return {name: open_scene.load(name).title for name in find_scene.list_shipped()}
 
 
 def scene(scene: str | Path | Scene, options: Options = ()) -> Scene:
@@ -38,5 +38,5 @@ def explain(scene: str | Path | Scene, options: Options = ()) -> list[str]:
     """The plan of a run as lines of text: which FMU steps when, and from which samples its inputs
     are computed. Raises InputFault for a scene that cannot be run.
     """
-    with built(open_scene.load(scene, options)) as system:
-        return list(explained.explain(Plan(with_fetched(system)), explained.PRINTED))
+    with build_system(open_scene.load(scene, options)) as system:
+        return list(explained.explain(Plan(choose_fetched(system)), explained.PRINTED))

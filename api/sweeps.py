@@ -109,9 +109,9 @@ def sweep(
     if jobs is not None and jobs < 1:
         raise InputFault(f"--jobs {jobs}: give 1 or more")
     varied = points(vary, runs)
-    made = job.jobs(scene, overrides.written(options), varied)
+    made = job.jobs(scene, overrides.write_options(options), varied)
     if metric:
-        sweep_figure.check(metric, [j.scene for j in made if j.scene])
+        sweep_figure.check_metric(metric, [j.scene for j in made if j.scene])
     keys = tuple(dict.fromkeys(key for point in varied for key in point))
 
     def into(folder: Path) -> list[row.Row]:
@@ -120,7 +120,7 @@ def sweep(
         return make(made, folder, processes, scheduler, lambda done: tell(done, len(made)))
 
     if out is None:
-        with temporary_folders.room() as room:
+        with temporary_folders.temporary_folder() as room:
             try:
                 return Sweep(into(room), keys, None)
             except Unfinished as left:
@@ -128,6 +128,6 @@ def sweep(
                 raise Fault(f"interrupted: {left.done} of {left.of} runs; {advice}") from None
     folder = folders.ensure(out)
     found = Sweep(into(folder), keys, folder, ("table.csv",))
-    if sweep_figure.write(folder / "sweep.png", found.rows, keys, metric):
+    if sweep_figure.write_figure(folder / "sweep.png", found.rows, keys, metric):
         return replace(found, files=("table.csv", "sweep.png"))
     return found

@@ -75,7 +75,7 @@ class Judged:
 def judged(seed: int, folder: Path, processes: int) -> Judged:
     """The advice for the scene of a seed, judged."""
     name, changes = drawn(seed)
-    options = overrides.written(changes | {"packaging": "native"})
+    options = overrides.write_options(changes | {"packaging": "native"})
     advice = advise(name, options, folder / "advice", processes=processes)
     read = open_scene.load(name, options)
     apart = list(draws(read, DRAWS, SEED))

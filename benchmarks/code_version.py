@@ -16,7 +16,7 @@ import hapticlink.fmus.native
 import hapticlink.orchestrator
 import hapticlink.programs
 from hapticlink.fmus.cache import sources
-from hapticlink.fmus.versions import installed
+from hapticlink.fmus.versions import find_versions
 
 PACKAGES = (
     "hapticlink", "casadi", "ziglang", "numpy", "scipy", "mujoco", "pin", "exudyn", "drake",
@@ -30,7 +30,7 @@ def begin(out: Path, rows: tuple[str, ...], *further: ModuleType) -> None:
     `further` among them, and versions."""
     path = out / "state.json"
     made_by = sources(hapticlink.components, hapticlink.fmus.native, benchmarks, *further)
-    now = {"sources": made_by, "versions": installed(PACKAGES)}
+    now = {"sources": made_by, "versions": find_versions(PACKAGES)}
     if not path.exists() or json.loads(path.read_text()) != now:
         for name in rows:
             (out / name).unlink(missing_ok=True)

@@ -76,9 +76,9 @@ def _measured(
 ) -> tuple[int, float, float, float, float]:
     """Size (bytes), processor time to make (s), and times real time of run, node and Chromium."""
     shown = load_viewed_scene(scene, (*options, "packaging=native"), DURATION)
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         file = room / "page.html"
-        make = made_anew(lambda: page.write(shown, scene, file), room / "cache")
+        make = made_anew(lambda: page.write_page(shown, scene, file), room / "cache")
         text = file.read_text(encoding="utf-8")
         opened = browser.new_page()
         opened.goto(f"file://{file}")
@@ -88,7 +88,7 @@ def _measured(
         for _ in range(rounds):
             runs.append(simulated(shown, room / "run", csv=False).outcome.wall_time)
             nodes.append(_node(text))
-            worker = one_file.unpacked(text, "worker").decode() + TIMED + IN_WORKER
+            worker = one_file.unpack_text(text, "worker").decode() + TIMED + IN_WORKER
             wall.append(opened.evaluate(IN_CHROMIUM, [worker, *_program(text).values(), 5]))
         opened.close()
         by_run, by_node, by_chromium = (DURATION / min(times) for times in (runs, nodes, wall))
@@ -108,8 +108,8 @@ def _node(text: str) -> float:
 def _program(text: str) -> dict[str, Any]:
     """The program in a page, and how long it shall run."""
     return {
-        "data": json.loads(one_file.unpacked(text, "data")),
-        "program": base64.b64encode(one_file.unpacked(text, "program")).decode(),
+        "data": json.loads(one_file.unpack_text(text, "data")),
+        "program": base64.b64encode(one_file.unpack_text(text, "program")).decode(),
         "duration": DURATION,
     }
 

@@ -121,7 +121,7 @@ def _register_completion() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit: 0 done, 1 the run failed (results kept), 2 bad input."""
-    with interrupt.held(interrupt.end_process):
+    with interrupt.defer_signals(interrupt.end_process):
         temporary_folders.clear()
         try:
             sys.exit(_status(arguments))
@@ -131,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _status(arguments: Sequence[str] | None) -> int:
     try:
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         given = sys.argv[1:] if arguments is None else list(arguments)
         for each in given:
             _require_unicode(each)
@@ -151,7 +151,7 @@ def _status(arguments: Sequence[str] | None) -> int:
         say(f"hapticlink: {error}", file=sys.stderr)
         return 1
     except Exception as error:
-        if message := plugins.blamed(error):
+        if message := plugins.blame_plugin(error):
             say(f"hapticlink: {message}", file=sys.stderr)
             return InputFault.exit_status
         if isinstance(error, ModuleNotFoundError) and error.name != "hapticlink":
@@ -161,7 +161,7 @@ def _status(arguments: Sequence[str] | None) -> int:
             return 1
         from hapticlink.commands import internal_error  # slow to load
 
-        say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
+        say(f"hapticlink: {internal_error.report_error(error)}", file=sys.stderr)
         return 1
 
 

@@ -18,12 +18,12 @@ def doctor(*, json: Json = False) -> int:
     """Report versions, optional packages that are missing and how to install them, and the cache;
     build a small FMU of each packaging that is available, and run it. The exit status is 1 if that
     fails."""
-    environment = _found()
+    environment = _collect()
     print_result(_lines(environment), environment, quiet=False, as_json=json)
     return 0 if all(state == "works" for state in environment["runs"].values()) else 1
 
 
-def _found() -> dict[str, Any]:
+def _collect() -> dict[str, Any]:
     from hapticlink.fmus import cache
 
     folder = cache.folder()
@@ -98,7 +98,7 @@ def _runs() -> dict[str, str]:
             states[packaging] = str(made.fault) if made.fault else "works"
         except Fault as fault:
             states[packaging] = str(fault)
-        interrupt.check()  # Ctrl-C is no fault of the FMU
+        interrupt.raise_if_interrupted()  # Ctrl-C is no fault of the FMU
     return states
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from hapticlink.analysis.findings.start_values import coordinates, mechanism_outputs
-from hapticlink.commands.options import UNCHANGED, Changes, Out, Scene, default_folder
+from hapticlink.commands.options import UNCHANGED, Out, Scene, SceneOptions, default_folder
 from hapticlink.orchestrator.base.terminal_output import say
 from hapticlink.orchestrator.system.system import System
 
@@ -29,7 +29,7 @@ def info(
     scene: Scene | None = None,
     /,
     *,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     draw: Draw = False,
     out: Out = None,
 ) -> int:
@@ -45,18 +45,19 @@ def info(
     from hapticlink.analysis.findings import summary
     from hapticlink.orchestrator.plan import sample_ages
     from hapticlink.orchestrator.plan.plan import Plan
-    from hapticlink.orchestrator.run.fetched_outputs import with_fetched
-    from hapticlink.orchestrator.system.build_system import built
 
     if scene is None:
         for name, title in hl.shipped().items():
             say(f"{name}: {title}")
         return 0
+    from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
+    from hapticlink.orchestrator.system.build_system import build_system
+
     read = hl.scene(scene, changes.options)
-    with built(read) as system:
+    with build_system(read) as system:
         time = system.timeline
         start = mechanism_outputs(system) if read.linkage else {}
-        fetched = with_fetched(system).fmu
+        fetched = choose_fetched(system).fmu
     say(f"{read.title}\n{read.description.strip()}".strip())
     _starts(read, start)
     say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
@@ -74,7 +75,7 @@ def info(
         else:
             note = "at the start only"
         say(f"  {connection.name}: {note}{f', {connection.hold}' * bool(connection.hold)}")
-    for line in summary.replaced(system.replacements):
+    for line in summary.describe_replacements(system.replacements):
         say(f"  {line}")
     _needs(read, time, list(system.replacements))
     if draw or out:
@@ -87,14 +88,14 @@ def _starts(scene: Any, start: dict[str, float]) -> None:
     from hapticlink.analysis.findings import summary, workspace
 
     if scene.linkage and start:
-        for line in summary.moved(asdict(scene.linkage), coordinates(start)):
+        for line in summary.describe_assembly(asdict(scene.linkage), coordinates(start)):
             say(f"  {line}")
     if scene.device:
         say("\ndevice's workspace")
         for line in workspace.lines(scene.device, _pose(start)):
             say(f"  {line}")
     elif start:
-        say(f"\nthe operational point starts at {workspace.placed(_pose(start))}")
+        say(f"\nthe operational point starts at {workspace.write_pose(_pose(start))}")
     if scene.hand:
         swapped = (fmu.path or fmu.engine for fmu in scene.fmu if fmu.replaces == "hand")
         say(f"hand: {next(swapped, scene.hand.type)}")
@@ -106,7 +107,8 @@ def _starts(scene: Any, start: dict[str, float]) -> None:
             f"{pair.body} with {pair.obstacle}" for pair in near(scene.linkage, scene.contacts)
         ]
         say(f"contacts that can be reached: {', '.join(pairs) or 'none'}")
-        for line in contact_warnings.pressed(scene.linkage, scene.contacts, coordinates(start)):
+        q = coordinates(start)
+        for line in contact_warnings.warn_of_pressed_start(scene.linkage, scene.contacts, q):
             say(f"  {line}")
 
 

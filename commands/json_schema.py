@@ -82,7 +82,7 @@ class _Definitions:
 
     def _any_of(self, kind: Any, entry: bool) -> Json:
         found: list[Json] = []
-        for branch, beside in types_of_keys.measured(kind):
+        for branch, beside in types_of_keys.find_quantities(kind):
             if branch is not NoneType and (one := self._one(branch, beside, entry)) not in found:
                 found.append(one)
         return dict(found[0]) if len(found) == 1 else {"anyOf": found}

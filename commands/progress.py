@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from hapticlink.fmus.durations import measured
+from hapticlink.fmus.durations import record_duration
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import printable, say
 
@@ -15,7 +15,7 @@ SHORT = 2.0
 
 
 @contextmanager
-def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
+def count_runs(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
     """Gives a function to be called with the numbers of finished and of all runs."""
     with bar(title, hidden) as show:
         yield lambda done, of: show(done, of, f"{done} of {of} runs") if show else None
@@ -32,7 +32,7 @@ def runs(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None
 def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int], None]]:
     """Gives a function to be called with what is done, and the numbers of finished and of all
     steps. Where stderr is no terminal, a line tells at the start how long it took before."""
-    with measured(title) as took, bar(title, hidden) as show:
+    with record_duration(title) as took, bar(title, hidden) as show:
         if not (hidden or show):
             _tell(title, took)
         yield lambda what, done, of: show(done, of, what) if show else None
@@ -50,10 +50,12 @@ def progress(
 
 
 @contextmanager
-def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> Iterator[None]:
+def time_command(
+    command: str, guess: str = "not known yet", hidden: bool = False
+) -> Iterator[None]:
     """Prints before a long command how many minutes it took at most on this machine, or `guess`,
     and records how many it takes. Raises Fault where it is interrupted."""
-    with measured(command) as took:
+    with record_duration(command) as took:
         if took is not None:
             guess = f"up to {took / 60:.1f} minutes here, less if partly finished before"
         if not hidden:
@@ -68,7 +70,7 @@ def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> I
 def waiting(what: str, hidden: bool = False) -> Iterator[None]:
     """Says what is being done, for as long as it takes, and how long it took before, where nothing
     can be counted; once at the start where stderr is no terminal."""
-    with measured(what) as took:
+    with record_duration(what) as took:
         if hidden or not sys.stderr.isatty():
             if not hidden:
                 _tell(what, took)
@@ -77,18 +79,18 @@ def waiting(what: str, hidden: bool = False) -> Iterator[None]:
         from rich.console import Console
         from rich.markup import escape
 
-        with Console(stderr=True).status(escape(printable(_said(what, took)))):
+        with Console(stderr=True).status(escape(printable(_say_duration(what, took)))):
             yield
 
 
-def _said(what: str, took: float | None) -> str:
+def _say_duration(what: str, took: float | None) -> str:
     return what if took is None else f"{what}, up to {took:.0f} s before"
 
 
 def _tell(what: str, took: float | None) -> None:
     """Prints what is begun on stderr, unless it is known to take less than SHORT."""
     if took is None or took >= SHORT:
-        say(_said(what, took), file=sys.stderr)
+        say(_say_duration(what, took), file=sys.stderr)
 
 
 @contextmanager

@@ -23,10 +23,9 @@ def report(runs: Runs, /, *, out: Out = None) -> int:
     """
     from hapticlink.fmus.atomic_file import atomic_file
     from hapticlink.orchestrator.results import folders
-    from hapticlink.orchestrator.results.folders import named
     from hapticlink.visualization.compare import page
 
-    results = named(runs)
+    results = folders.load_by_name(runs)
     path = out or Path("reports") / f"{'+'.join(name.replace('/', '-') for name in results)}.html"
     if path.is_dir():
         raise InputFault(f"--out {path}: is a folder; name a file, such as {path / 'report.html'}")

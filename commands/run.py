@@ -10,9 +10,9 @@ from cyclopts import Parameter
 from hapticlink.commands.options import (
     PRINTED,
     UNCHANGED,
-    Changes,
     Output,
     Scene,
+    SceneOptions,
     print_result,
     repeatable,
     title,
@@ -58,7 +58,7 @@ def run(
     scene: Scene,
     /,
     *,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     set_file: SetFile = None,
     figures: Figures = True,
     explain: Explain = False,
@@ -110,7 +110,7 @@ def run(
         result = ended.run
     if result.fault:
         say(f"hapticlink: {result.fault}", file=sys.stderr)
-    lines = [*summary.printed(result, title(scene), result.numbers)]
+    lines = [*summary.print_lines(result, title(scene), result.numbers)]
     if output.quiet or output.json:
         for line in summary.warnings(result):
             say(f"hapticlink: {line}", file=sys.stderr)

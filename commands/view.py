@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter, validators
 
 from hapticlink.commands import completion
-from hapticlink.commands.options import UNCHANGED, Changes, Out, default_folder
+from hapticlink.commands.options import UNCHANGED, Out, SceneOptions, default_folder
 from hapticlink.commands.progress import waiting
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
@@ -69,7 +69,7 @@ def view(
     /,
     *,
     out: Out = None,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
@@ -103,7 +103,7 @@ def view(
             f"`hapticlink view {default_folder('runs', scene)}`"
         )
     if standalone:
-        return _written(scene, changes, standalone)
+        return _write_page(scene, changes, standalone)
     default = default_folder("runs", scene)
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
@@ -126,7 +126,7 @@ def view(
     return 0
 
 
-def _written(name: str, changes: Changes, path: Path) -> int:
+def _write_page(name: str, changes: SceneOptions, path: Path) -> int:
     """Write the page of a scene that needs no server."""
     from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
     from hapticlink.visualization.standalone import page
@@ -136,7 +136,7 @@ def _written(name: str, changes: Changes, path: Path) -> int:
         raise InputFault(f"--standalone {path}: name a file that ends in .html")
     title = default_folder("", name).name
     with waiting(f"{title}: compiling its page"):
-        page.write(scene, title, path)
+        page.write_page(scene, title, path)
     say(f"{path}: {path.stat().st_size / 1e3:.0f} kB; open it in a browser and drag")
     return 0
 
@@ -152,19 +152,19 @@ def _replay(
         replay_page.require_written(export)
     runs = [Recorded(folder) for folder in folders]
     if export:
-        replay_page.write(runs, export)
+        replay_page.write_replay(runs, export)
         say(f"{export}: {export.stat().st_size / 1e3:.0f} kB")
         return 0
     html, token = replay_page.html(runs), secrets.token_urlsafe(16)
     with ExitStack() as pages, suppress(Interrupted):
         try:
-            at = pages.enter_context(serve.served(html, host, _ports(port), token))
+            at = pages.enter_context(serve.serve_page(html, host, _ports(port), token))
         except OSError as error:
-            raise InputFault(_refused(host, port, error)) from None
+            raise InputFault(_say_refused(host, port, error)) from None
         _show(" beside ".join(folders), host, at, token, browser)
         say("  a replay, with a time slider; Ctrl-C ends it")
         while True:
-            interrupt.check()
+            interrupt.raise_if_interrupted()
             time.sleep(WAIT)
     return 0
 
@@ -190,7 +190,7 @@ def _port(link: ChildProcess, host: str, port: int | None) -> int:
     if (first := link.first()) is None:
         raise Fault("the page's server does not start")
     if "error" in first:
-        raise InputFault(_refused(host, port, first["error"]))
+        raise InputFault(_say_refused(host, port, first["error"]))
     return int(first["port"])
 
 
@@ -210,7 +210,7 @@ def _show(title: str, host: str, port: int, token: str, browser: bool) -> None:
         webbrowser.open(url)
 
 
-def _refused(host: str, port: int | None, why: object) -> str:
+def _say_refused(host: str, port: int | None, why: object) -> str:
     """That the address cannot be served on."""
     asked = f"--host {host}" if port is None else f"--host {host} --port {port}"
     return f"{asked}: {why}: choose another"

@@ -8,14 +8,14 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.visualization.live_and_standalone.viewed_scene import unpack_scene
-from hapticlink.visualization.live_page.server_pipe import Pipe, read, to_caller
+from hapticlink.visualization.live_page.server_pipe import Pipe, read_message, to_caller
 
 
 def main() -> None:
     """Run the scene with the settings, which the caller sends first, until it has ended. It waits
     at its start until the caller lets it go on."""
     out = to_caller()
-    if (arguments := read(sys.stdin.buffer)) is None:
+    if (arguments := read_message(sys.stdin.buffer)) is None:
         return
     link = Pipe(sys.stdin.buffer, out)
     import hapticlink as hl

@@ -66,7 +66,7 @@ class TimeSignal(ABC):
         return self.at(t)
 
 
-def checked(rows: Rows, name: str) -> NDArray[np.float64]:
+def check_rows(rows: Rows, name: str) -> NDArray[np.float64]:
     """The rows as an array. Raises ValueError, with `name`, where there are none, for numbers that
     are not finite and for times that do not increase."""
     if not rows:

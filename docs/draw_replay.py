@@ -12,7 +12,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 import hapticlink as hl
-from hapticlink.orchestrator.results.folders import named
+from hapticlink.orchestrator.results.folders import load_by_name
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.compare import overlay
 from hapticlink.visualization.compare import page as report
@@ -39,22 +39,22 @@ def main() -> None:
             hl.run("closed-loop", options, out=folder, figures=False)
         OUT.joinpath("figures").mkdir(exist_ok=True)
         figure_axes.save(run_figures.figures(hl.run("enclosure")), OUT / "figures")
-        over = overlay.figures(named(folders))
+        over = overlay.figures(load_by_name(folders))
         figure_axes.save({f"compare_{name}": f for name, f in over.items()}, OUT / "figures")
         runs = [Recorded(str(folder)) for folder in folders]
-        replay_page.write(runs, OUT / "topology.gif")
+        replay_page.write_replay(runs, OUT / "topology.gif")
         page = started.chromium.launch(
             executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
         ).new_page()
         file = Path(room) / "page.html"
-        replay_page.write(runs, file)
+        replay_page.write_replay(runs, file)
         for name, ((width, height), act) in SHOTS.items():
             page.set_viewport_size({"width": width, "height": height})
             page.goto(file.as_uri())
             page.evaluate(act)
             page.wait_for_timeout(300)
             page.screenshot(path=OUT / f"{name}.png")
-        file.write_text(report.page(named(folders)), encoding="utf-8")
+        file.write_text(report.page(load_by_name(folders)), encoding="utf-8")
         page.set_viewport_size({"width": 1100, "height": 1500})
         page.goto(file.as_uri())
         page.screenshot(path=OUT / "report.png")

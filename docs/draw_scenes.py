@@ -13,7 +13,7 @@ from pathlib import Path
 
 import hapticlink as hl
 from hapticlink.analysis.findings.start_values import coordinates, mechanism_outputs
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.visualization.figures import block_diagram
 from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
@@ -35,7 +35,7 @@ def examples(folder: Path) -> Iterator[Path]:
 def draw(scene: str | Path) -> Path:
     """Draws a scene, given by its name or path, and returns the picture's path."""
     read = hl.scene(scene)
-    with built(read) as system:
+    with build_system(read) as system:
         q = coordinates(mechanism_outputs(system))
     path = PICTURES / f"{Path(scene).stem}.png"
     drawing.figure(read, q).savefig(path, dpi=DPI, **SAME)
@@ -44,7 +44,7 @@ def draw(scene: str | Path) -> Path:
 
 def blocks(scene: str, file: str) -> Path:
     """Draws the block diagram of a scene to a file of FIGURES, and returns its path."""
-    with built(hl.scene(scene)) as system:
+    with build_system(hl.scene(scene)) as system:
         figure = block_diagram.figure(system, f"The blocks of {scene} and their signals")
     figure.savefig(FIGURES / file, dpi=90, **SAME)
     return FIGURES / file
@@ -53,7 +53,7 @@ def blocks(scene: str, file: str) -> Path:
 def device(scene: str) -> Path:
     """Draws the device of a scene in its workspace, and returns the picture's path."""
     read = hl.scene(scene)
-    with built(read) as system:
+    with build_system(read) as system:
         start = mechanism_outputs(system)
     pose = [start[f"x[{i}]"] for i in (1, 2, 3)]
     figure = workspace_drawing.draw(read.device, pose, f"Device and its workspace: {read.title}")

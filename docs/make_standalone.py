@@ -42,7 +42,7 @@ def main(names: Sequence[str], folder: Path = FOLDER) -> list[str]:
         said = "as it was"
         if made.get(name) != now or not path.exists():
             try:
-                page.write(scene, name, path)
+                page.write_page(scene, name, path)
             except InputFault as why:
                 print(f"{i} of {len(names)}: {why}", flush=True)
                 path.unlink(missing_ok=True)

@@ -87,4 +87,4 @@ def build_block(
         material["compiler"] = compiler_version()
         material["platforms"] = list(platforms) or [host_platform(fmi)]
         material["fmi"] = fmi
-    return cache.cached(material, make, build_folder, poll)
+    return cache.get_or_build(material, make, build_folder, poll)

@@ -23,7 +23,7 @@ from typing import Any
 import hapticlink.components
 from hapticlink.components import registry
 from hapticlink.fmus import lock
-from hapticlink.fmus.versions import installed
+from hapticlink.fmus.versions import find_versions
 
 MAX_BUILD_TIME = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
@@ -64,7 +64,7 @@ def key(material: Mapping[str, Any]) -> str:
     package = sys.modules[__package__]  # this one, which imports this file
     whole = {
         "material": material,
-        "versions": installed(VERSIONS),
+        "versions": find_versions(VERSIONS),
         "sources": sources(hapticlink.components, package),
         "plugins": {name: source(name) for name in plugins},
     }
@@ -98,7 +98,7 @@ def source(module: str) -> str:
     return hashlib.sha256(Path(file).read_bytes() if file else os.urandom(32)).hexdigest()
 
 
-def cached(
+def get_or_build(
     key_material: Mapping[str, Any],
     build_function: Callable[[Path], Path],
     build_folder: Path,
@@ -114,12 +114,12 @@ def cached(
     """
     root = folder()
     if root is None:
-        return _built(build_function, build_folder, None, Path())
+        return _build(build_function, build_folder, None, Path())
     entry = root / key(key_material)
     if cached_file := _whole_file(entry):
         return cached_file
     with _exclusively(entry, str(key_material.get("block", "the same FMU")), poll):
-        return _whole_file(entry) or _built(build_function, build_folder, root, entry)
+        return _whole_file(entry) or _build(build_function, build_folder, root, entry)
 
 
 def _whole_file(entry: Path) -> Path | None:
@@ -150,7 +150,7 @@ def _exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator
         with suppress(OSError):  # a cache that cannot be written: reported when it is
             private(entry.parent)
             private(path.parent)
-            stack.enter_context(lock.held(path, wait))
+            stack.enter_context(lock.hold_lock(path, wait))
             _held.add(path)
         try:
             yield
@@ -167,7 +167,7 @@ def remove_locks() -> None:
             _held.pop().unlink()
 
 
-def _built(
+def _build(
     build_function: Callable[[Path], Path], build_folder: Path, root: Path | None, entry: Path
 ) -> Path:
     build_folder.mkdir(parents=True, exist_ok=True)
@@ -176,7 +176,7 @@ def _built(
     if root is None:
         return built
     try:
-        stored = _stored(built, root, entry)
+        stored = _store(built, root, entry)
     except OSError as error:
         logging.getLogger(__name__).warning(
             "the cache %s cannot be written (%s): %s is not kept; name another by HAPTICLINK_CACHE",
@@ -187,7 +187,7 @@ def _built(
     return stored
 
 
-def _stored(built: Path, root: Path, entry: Path) -> Path:
+def _store(built: Path, root: Path, entry: Path) -> Path:
     """A copy of `built` in `entry`: from its first instant there it is whole."""
     private(root)
     _clear(root)

@@ -15,7 +15,7 @@ FILE = "durations.json"
 
 
 @contextmanager
-def measured(what: str) -> Iterator[float | None]:
+def record_duration(what: str) -> Iterator[float | None]:
     """Gives the longest duration (s) that something took on this machine, None where it is not
     known, and records how long it takes, unless an exception ends it."""
     folder, known = cache.folder(), dict[str, float]()

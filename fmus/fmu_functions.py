@@ -52,8 +52,8 @@ class OnePass:
 
 
 def one_pass(component: Component) -> OnePass:
-    with _unsimplified():
-        return _composed(component)
+    with _without_simplification():
+        return _compose(component)
 
 
 GRAPHS = threading.RLock()
@@ -62,7 +62,7 @@ under which another thread would derive other graphs."""
 
 
 @contextmanager
-def _unsimplified() -> Iterator[None]:
+def _without_simplification() -> Iterator[None]:
     with GRAPHS:
         before = ca.GlobalOptions.getSimplificationOnTheFly()
         ca.GlobalOptions.setSimplificationOnTheFly(False)
@@ -72,7 +72,7 @@ def _unsimplified() -> Iterator[None]:
             ca.GlobalOptions.setSimplificationOnTheFly(before)
 
 
-def _composed(component: Component) -> OnePass:
+def _compose(component: Component) -> OnePass:
     x, u, p, t, h = component.step.sx_in()
     end, z = ca.SX.sym("end"), ca.SX(0, 1)
     known, given = ca.SX(0, 1), ca.SX.sym("z", 0)

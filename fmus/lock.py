@@ -14,20 +14,20 @@ POLL = 0.05
 
 
 @contextmanager
-def attempted(path: Path) -> Iterator[bool]:
+def try_lock(path: Path) -> Iterator[bool]:
     """Whether the lock of the file `path`, which is made if necessary, is held within the context:
     not if it is held already, by another process or another call in this one. Raises OSError where
     the file cannot be opened."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("ab") as file:
-        yield _taken(file)
+        yield _take(file)
 
 
 @contextmanager
-def held(path: Path, poll: Callable[[], object]) -> Iterator[None]:
+def hold_lock(path: Path, poll: Callable[[], object]) -> Iterator[None]:
     """Holds the lock of the file `path`; calls `poll` from time to time while waiting for it."""
     while True:
-        with attempted(path) as taken:
+        with try_lock(path) as taken:
             if taken:
                 yield
                 return
@@ -35,7 +35,7 @@ def held(path: Path, poll: Callable[[], object]) -> Iterator[None]:
         time.sleep(POLL)
 
 
-def _taken(file: IO[bytes]) -> bool:
+def _take(file: IO[bytes]) -> bool:
     try:
         if sys.platform == "win32":
             import msvcrt

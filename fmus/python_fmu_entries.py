@@ -70,10 +70,10 @@ def entries(component: Component, **experiment: float) -> dict[str, bytes]:
         "resources/functions.txt": program(parts.functions, component.look_ups).encode(),
     }
     about = {"n_shared": parts.n_shared}
-    return packed(component, functions, about, **experiment)
+    return pack_entries(component, functions, about, **experiment)
 
 
-def packed(
+def pack_entries(
     component: Component,
     functions: Mapping[str, bytes],
     about: Mapping[str, object],

@@ -12,7 +12,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 LEVEL = 3  # of zlib: less than half the time of its default, and a tenth larger
 
 
-def write(files: Mapping[str, bytes], target: BinaryIO) -> None:
+def write_zip(files: Mapping[str, bytes], target: BinaryIO) -> None:
     """Writes a zip archive whose bytes depend on `files` only: sorted names, a fixed date and
     system."""
     with zipfile.ZipFile(target, "w") as archive:

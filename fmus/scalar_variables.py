@@ -71,7 +71,7 @@ def scalar_variables(component: Component) -> list[ScalarVariable]:
             depends=tuple(settable[i].name for i in columns),
         )
         for v, columns in zip(
-            _scalars("OUTPUT", component.outputs), feed_through(component), strict=True
+            _scalars("OUTPUT", component.outputs), find_feed_through(component), strict=True
         )
     ]
     return settable + outputs
@@ -100,7 +100,7 @@ def _bases(component: Component) -> dict[str, str]:
     return bases
 
 
-def feed_through(component: Component) -> list[list[int]]:
+def find_feed_through(component: Component) -> list[list[int]]:
     """For each flat output, the flat inputs that y = output(x, u, p, t) depends on."""
     return _rows(component.output.jac_sparsity(0, 1))
 

@@ -85,7 +85,7 @@ def _instruction(function: ca.Function, k: int) -> str:
     if operation == ca.OP_OUTPUT:
         return f"r{into[0]}[{into[1]}] = w{of[0]}"
     if operation == ca.OP_CALL:
-        return f"{', '.join(f'w{i}' for i in into)}, = {_called(function, k)}(w{of[0]})"
+        return f"{', '.join(f'w{i}' for i in into)}, = {_name_of_call(function, k)}(w{of[0]})"
     template = TEMPLATES.get(operation)
     if template is None:
         name = _NAMES.get(operation, str(operation))
@@ -96,7 +96,7 @@ def _instruction(function: ca.Function, k: int) -> str:
     return f"w{into[0]} = " + template.format(*(f"w{i}" for i in of))
 
 
-def _called(function: ca.Function, k: int) -> str:
+def _name_of_call(function: ca.Function, k: int) -> str:
     """The name of the look-up that instruction k calls."""
     called = function.instructions_sx()[k].which_function()
     if called.class_name() not in ("LinearInterpolant", "LinearInterpolantJac"):

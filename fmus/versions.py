@@ -11,7 +11,7 @@ version = cache(metadata.version)
 """The version of a distribution by its name. Raises importlib.metadata.PackageNotFoundError."""
 
 
-def installed(names: Iterable[str]) -> dict[str, str]:
+def find_versions(names: Iterable[str]) -> dict[str, str]:
     """The versions of those distributions that are installed: built FMUs run without what built
     them."""
     found = {}

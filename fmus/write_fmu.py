@@ -11,7 +11,7 @@ from fmpy.validation import validate_fmu
 
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.errors import FmuError
-from hapticlink.fmus.reproducible_zip import write
+from hapticlink.fmus.reproducible_zip import write_zip
 
 _PLAIN = re.compile(
     r"(?!der\()[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.A
@@ -26,7 +26,7 @@ def write_fmu(files: Mapping[str, bytes], folder: Path | str, name: str) -> Path
     target.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(target) as unfinished:
         with unfinished.open("xb") as file:
-            write(files, file)
+            write_zip(files, file)
         if found := findings(str(unfinished)):
             raise FmuError(f"`{name}` fails validation:\n  " + "\n  ".join(found))
     return target

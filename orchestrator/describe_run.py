@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Iterable
 
-from hapticlink.fmus.versions import installed
+from hapticlink.fmus.versions import find_versions
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.signal_names import MECHANISM
 from hapticlink.orchestrator.fmi.units import MATRICES
@@ -38,8 +38,8 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
     return RunSetup(
         scene=scene.tables(),
         options=list(scene.source.options) if scene.source else [],
-        versions=installed(packages) | {"python": platform.python_version()},
-        plugins=plugins.loaded(),
+        versions=find_versions(packages) | {"python": platform.python_version()},
+        plugins=plugins.list_plugins(),
         seeds=_seeds(scene, system),
         files=["run.json", *(f"{table}.{scene.record.format}" for table in tables)],
         rates=[c.name for c in timeline.clocks],

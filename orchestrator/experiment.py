@@ -18,7 +18,7 @@ from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.describe_run import setup
 from hapticlink.orchestrator.host import crash_monitor, host_state
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
-from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
+from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, place_remote_fmus
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, record_crash
 from hapticlink.orchestrator.results.read_results import (
@@ -33,15 +33,15 @@ from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, Run
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.results.write_files import remove_rows
 from hapticlink.orchestrator.run.compiled import library
-from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, beside_or_refused
+from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, require_concurrent
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
-from hapticlink.orchestrator.run.fetched_outputs import with_fetched
-from hapticlink.orchestrator.run.open_fmus import isolated
+from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
+from hapticlink.orchestrator.run.open_fmus import find_isolated
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.orchestrator.system.system import System
 
 
@@ -93,7 +93,7 @@ def _columns(system: System) -> dict[str, list[str]]:
     return {clock: [*columns] for clock, columns in recorded.items() if columns is not None}
 
 
-def _left_out(every: System, system: System) -> list[str]:
+def _find_left_out(every: System, system: System) -> list[str]:
     """The outputs `fmu.port` of which an entry is not written."""
     if system.recording.outputs is None:
         return []
@@ -119,7 +119,7 @@ def _watch(folder: Path) -> AbstractContextManager[None]:
     return crash_monitor.watch_for_crash(folder, record_crash.__name__, guard)
 
 
-@interrupt.held()
+@interrupt.defer_signals()
 def simulate(
     scene: str | Path | Scene,
     folder: Path | str,
@@ -145,19 +145,19 @@ def simulate(
     read = open_scene.load(scene, options)
     with ExitStack() as stack:
         if not in_memory:
-            stack.enter_context(folder_lock.held(folder))
-        every = stack.enter_context(built(read))
-        system = placed(with_fetched(every), read, remote)
+            stack.enter_context(folder_lock.lock_folder(folder))
+        every = stack.enter_context(build_system(read))
+        system = place_remote_fmus(choose_fetched(every), read, remote)
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin
         tables: dict[str, Sequence[str]] = {**_columns(system)}
         if real_time:
-            sides = dict.fromkeys(beside_or_refused(plan).values())
+            sides = dict.fromkeys(require_concurrent(plan).values())
             tables |= {f"{clock}_{SAMPLES}": COLUMNS for clock in sides}
             tables |= {f"{fmu.name}_{FRAMES}": FRAME for fmu in system.fmus if fmu.served}
-        before = setup(read, plan, tables, _left_out(every, system))
-        alone = isolated(system.fmus)
+        before = setup(read, plan, tables, _find_left_out(every, system))
+        alone = find_isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         if in_memory and not foreign and _fits_in_memory(system, tables):
             memory = RunResults()
@@ -166,7 +166,7 @@ def simulate(
             return Experiment(
                 read, system, outcome, folder, before, outcome.ending(build_time), memory
             )
-        stack.enter_context(folder_lock.held(folder))
+        stack.enter_context(folder_lock.lock_folder(folder))
         csv = csv and read.record.format == "csv"
         with RunFolder(folder, before, csv) as results:
             with (

@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.errors import Finding, SceneFault
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
-from hapticlink.orchestrator.scene.find_scene import find
+from hapticlink.orchestrator.scene.find_scene import find_scene
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.read_and_check import from_source
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
@@ -25,7 +25,7 @@ def load(scene: str | FilePath | Scene | Source, options: Options = ()) -> Scene
     created or changed in Python is checked. Raises SceneFault with every finding, InputFault for a
     scene that is not found and for an option that cannot be applied.
     """
-    further = overrides.written(options)
+    further = overrides.write_options(options)
     if isinstance(scene, Scene) and scene.source and not further:
         return scene
     source = scene if isinstance(scene, Source) else source_of(scene)
@@ -48,7 +48,7 @@ def _find(scene: str) -> Source:
         from hapticlink.orchestrator.ssp import read as ssp
 
         return Source(scene, ssp.tables(FilePath(scene)), {})
-    name, text, folder = find(scene)
+    name, text, folder = find_scene(scene)
     return Source(name, *document(text, name, folder))
 
 

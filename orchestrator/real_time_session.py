@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
+from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.apply_changes import InputSetter
@@ -23,14 +23,14 @@ from hapticlink.orchestrator.scene.arguments import require, require_name
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.changes import (
-    changed,
+    check_changed,
     choices,
     require_other_rate,
     settable,
 )
 from hapticlink.orchestrator.system.ports import names, scalars_of
 from hapticlink.orchestrator.system.system import Connection, InputChange, System
-from hapticlink.orchestrator.system.timeline import changed_period
+from hapticlink.orchestrator.system.timeline import period_in_ticks
 
 Result = TypeVar("Result")
 
@@ -118,7 +118,7 @@ class LiveRun:
         except (TypeError, ValueError):
             values = np.empty(0)
         if len(values) != size or not np.isfinite(values).all():
-            raise InputFault(f"{name} = {shortened(repr(value))}: give {size} finite numbers")
+            raise InputFault(f"{name} = {shorten(repr(value))}: give {size} finite numbers")
         setter.values = values
         setter.wait()
 
@@ -137,7 +137,10 @@ class LiveRun:
         if not connections:
             every = [key for c in system.connections if c.hold for key in names(c)]
             raise InputFault(unknown("connection with a hold", name, every))
-        new = [changed(system, self._connections.get(c.name, c), hold, delay) for c in connections]
+        new = [
+            check_changed(system, self._connections.get(c.name, c), hold, delay)
+            for c in connections
+        ]
         for connection in new:
             held = self._simulation.make_hold(connection)
             newest = self._loop.events.previous(system.fmu[connection.source].clock)
@@ -171,7 +174,7 @@ class LiveRun:
         jitter = require(f"jitter of {clock}", jitter, Annotated[float, Quantity("1", ge=0)])
         seed = int(require("seed", seed, Seed))
         try:
-            period = changed_period(rate, timeline.base, haptics.longest)
+            period = period_in_ticks(rate, timeline.base, haptics.longest)
         except ValueError as error:
             raise InputFault(f"rate of {clock}: {error}") from error
         most = float(1 - haptics.longest / period)
@@ -221,7 +224,7 @@ class LiveRun:
         self._called(self)
         while self.paused and self._until is None:
             pace.wait(pace.now() + self._every)
-            interrupt.check(self.time)
+            interrupt.raise_if_interrupted(self.time)
             self._called(self)
         loop.events.patience(self._every if self._until is None else 0)
         if self.paused or stepping:

@@ -66,7 +66,7 @@ def build_program(
     way; Fault if the compiler fails.
     """
     identifier = _identifier(name)
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         try:
             compiler_version()
             every = PLATFORMS if fmi == 2 else PLATFORMS_3
@@ -76,11 +76,11 @@ def build_program(
                         "compiler": [compiler_version(), *FLAGS]}  # fmt: skip
 
             def make(folder: Path) -> Path:
-                return _built(files, identifier, platforms, folder)
+                return _build_checked(files, identifier, platforms, folder)
 
-            path = cache.cached(material, make, room, interrupt.check)
+            path = cache.get_or_build(material, make, room, interrupt.raise_if_interrupted)
         except CompilerError as error:
-            interrupt.check()
+            interrupt.raise_if_interrupted()
             raise Fault(str(error)) from error
         except FmuError as error:
             raise InputFault(str(error)) from error
@@ -158,7 +158,7 @@ def _resources(program: Resolved) -> Iterator[tuple[str, bytes]]:
                 yield f"resources/{id_}/{name}", content
 
 
-def _built(
+def _build_checked(
     files: Mapping[str, bytes], identifier: str, platforms: Sequence[str], folder: Path
 ) -> Path:
     """The FMU with a binary for each platform, written once FMPy finds nothing wrong with it."""

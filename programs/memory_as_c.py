@@ -55,7 +55,7 @@ def size(type_: str) -> int:
     return ctypes.sizeof(of_type(type_))
 
 
-def embedded(type_: str) -> Iterator[tuple[str, Any]]:
+def find_embedded(type_: str) -> Iterator[tuple[str, Any]]:
     """The fields of a structure that are no pointers, with their ctypes classes."""
     pointers = POINTERS.get(type_, {})
     yield from (f for f in of_type(type_)._fields_ if f[0] not in pointers)
@@ -132,7 +132,7 @@ class Regions:
             count = pointer.width * structures.evaluate(pointer.count, known, self._counts)
             kind = target(type_, field, entry)
             self._visit(Region(kind, address, count, f"{name}_{field}"), known)
-        for field, class_ in embedded(type_):
+        for field, class_ in find_embedded(type_):
             if issubclass(class_, ctypes.Structure):
                 self._follow(class_.__name__, getattr(entry, field), f"{name}_{field}", known)
 
@@ -172,7 +172,7 @@ class TypedData:
         self.calls: list[tuple[str, int, str]] = []
         self.slots: list[tuple[str, int]] = []
         self._of_check: dict[int, int] = {}
-        fields = [f"    {_declared(region)};" for region in regions.all]
+        fields = [f"    {_declare(region)};" for region in regions.all]
         self.structure = "\n".join(["typedef struct {", *fields, "} Scene;"])
         values = ((region, self._initial(region)) for region in regions.all)
         rows = [f"    .{region.name} = {text}," for region, text in values if text != "{0}"]
@@ -183,12 +183,12 @@ class TypedData:
             self._array_of_pointers(region)
             return "{0}"
         if not is_structure(region.type):
-            return _listed(_numbers(region.type, region.address, region.count))
+            return _write_initialiser(_numbers(region.type, region.address, region.count))
         entries = []
         for i in range(region.count):
             entry = of_type(region.type).from_address(region.address + i * size(region.type))
             entries.append(self._structure(region.type, entry, _place(region, i), None))
-        return entries[0] if region.count == 1 else _listed(entries, "{0}")
+        return entries[0] if region.count == 1 else _write_initialiser(entries, "{0}")
 
     def _array_of_pointers(self, region: Region) -> None:
         addresses = (ctypes.c_void_p * region.count).from_address(region.address)
@@ -209,13 +209,13 @@ class TypedData:
             if getattr(entry, field):
                 self._pointer(type_, field, entry, f"{place}.{field}", member)
         rows = []
-        for field, class_ in embedded(type_):
+        for field, class_ in find_embedded(type_):
             value = getattr(entry, field)
             if issubclass(class_, ctypes.Structure):
                 text = self._structure(class_.__name__, value, f"{place}.{field}", member)
             elif issubclass(class_, ctypes.Array):
                 suffix = "u" if class_._type_ is ctypes.c_uint64 else ""
-                text = _listed(f"{entry}{suffix}" if entry else "0" for entry in value)
+                text = _write_initialiser(f"{entry}{suffix}" if entry else "0" for entry in value)
             else:
                 text = number(value) if class_ is ctypes.c_double else str(value)
             if text not in ("0", "0.0", "{0}") and (type_, field) != ("Kind", "python"):
@@ -243,7 +243,7 @@ class TypedData:
             self.slots.append((place, member))
 
 
-def _declared(region: Region) -> str:
+def _declare(region: Region) -> str:
     pointers = region.type.count("*")
     several = f"[{region.count}]" if _is_array(region) else ""
     return f"{region.type.rstrip(' *')} {'*' * pointers}{region.name}{several}"
@@ -262,7 +262,7 @@ def _numbers(type_: str, address: int, count: int) -> Iterator[str]:
     return map(number if type_ == "double" else str, values)
 
 
-def _listed(entries: Iterable[str], zero: str = "") -> str:
+def _write_initialiser(entries: Iterable[str], zero: str = "") -> str:
     """A C initialiser, without the zeros at its end, which C fills in."""
     rows, none = [*entries], {"0", "0.0", zero}
     while rows and rows[-1] in none:

@@ -69,7 +69,7 @@ def ports(resolved: Resolved, components: Mapping[str, Component]) -> list[Port]
     ]  # fmt: skip
 
 
-def fed(system: System, fmu: str) -> set[str]:
+def find_fed(system: System, fmu: str) -> set[str]:
     """The scalars of an FMU that connections set."""
     return {s.name for c in system.connections if c.target == fmu for s in c.inputs}
 
@@ -78,7 +78,7 @@ def _of_block(resolved: Resolved, fmu: str, member: int, component: Component) -
     """The variables of a block of this project that no connection sets, of its outputs those that
     the scene records (all by default); step sizes are those of the scene."""
     system = resolved.system
-    set_by_others = {f"{fmu}.{name}" for name in (*fed(system, fmu), STEP_SIZE, FRAME_SIZE)}
+    set_by_others = {f"{fmu}.{name}" for name in (*find_fed(system, fmu), STEP_SIZE, FRAME_SIZE)}
     chosen = {f"{fmu}.{s.name}" for s in system.fmu[fmu].description.outputs} & resolved.recorded
     given = {s.name: float(v) for s, v in system.fmu[fmu].starts}
     for reference, v in enumerate(scalar_variables(component)):
@@ -128,7 +128,7 @@ def _outside(resolved: Resolved) -> Iterator[Port]:
 def _of_others(resolved: Resolved, fmu: str, member: int) -> Iterator[Port]:
     """The real inputs and parameters of an FMU of others that no connection sets, and its outputs
     that the scene records."""
-    description, taken = resolved.foreign[fmu].description, fed(resolved.system, fmu)
+    description, taken = resolved.foreign[fmu].description, find_fed(resolved.system, fmu)
     given = {s.name: float(v) for s, v in resolved.system.fmu[fmu].starts if s.type == "Real"}
     real = [s for s in description.scalars if s.type == "Real" and s.name not in taken]
     inputs = [s for s in real if s.causality == "input"]

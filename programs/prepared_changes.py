@@ -22,8 +22,8 @@ from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.changes import (
     choices_of_slower,
-    held_by,
     require_other_rate,
+    with_hold,
 )
 
 CLOCK = "graphics"
@@ -117,7 +117,7 @@ def _holds(simulation: Simulation) -> Iterator[tuple[Choice, CompiledHold]]:
         connection = system.connection[name]
         latency = connection.latency or Latency(min=MOST_DELAY)
         for hold in holds:
-            other = replace(held_by(connection, hold, None), latency=latency)
+            other = replace(with_hold(connection, hold, None), latency=latency)
             if hold in TABLE:  # no hold of a plugin
                 new = simulation.make_hold(other)
                 longest = MOST_DELAY + (1 / LEAST_RATE if new.account else 0.0)

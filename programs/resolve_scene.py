@@ -27,11 +27,11 @@ from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
-from hapticlink.orchestrator.run.fetched_outputs import with_fetched
+from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
 from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample, instructions
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
 from hapticlink.programs.foreign import Foreign
@@ -127,8 +127,8 @@ def resolve_scene(
     scene that cannot be a program."""
     scene = replace(scene, record=replace(scene.record, every=1), isolate=False)
     refusals.of_scene(scene)
-    with built(scene) as every, ExitStack() as stack:
-        fetched = with_fetched(every)
+    with build_system(scene) as every, ExitStack() as stack:
+        fetched = choose_fetched(every)
         system = replace(fetched, recording=Recording(outputs=()))
         foreign = refusals.of_system(system, outside, scene)
         plan = Plan(system)
@@ -141,11 +141,11 @@ def resolve_scene(
         if not simulation.swept:
             why = "an algebraic loop at t = 0 is solved by Newton's method, in Python"
             refusals.refuse(scene.title, [why])
-        recorded = _recorded(fetched)
-        yield _resolved(scene, plan, simulation, outside, foreign, rooms, recorded, changing)
+        recorded = _find_recorded(fetched)
+        yield _resolve(scene, plan, simulation, outside, foreign, rooms, recorded, changing)
 
 
-def _recorded(system: System) -> frozenset[str]:
+def _find_recorded(system: System) -> frozenset[str]:
     outputs = (f"{fmu.name}.{s.name}" for fmu in system.fmus for s in fmu.description.outputs)
     return frozenset(outputs if (chosen := system.recording.outputs) is None else chosen)
 
@@ -170,7 +170,7 @@ def _accounts(system: System) -> bool:
     return any(HOLDS[c.hold].needs == "power" for c in system.connections if c.hold)
 
 
-def _resolved(
+def _resolve(
     scene: Scene,
     plan: Plan,
     simulation: Simulation,

@@ -98,7 +98,7 @@ def _scene(
     outputs = [s for _, description in described for s in description.outputs]
     names = [f"{fmu}.{s.name}" for fmu, description in described for s in description.outputs]
     unbounded = [s.unit is None or s.type != "Real" for s in outputs]
-    given = [*_given(resolved, members)]
+    given = [*_write_starts(resolved, members)]
     sizes = {
         "N_MEMBERS": len(members),
         "N_FMUS": len(resolved.fmus),
@@ -203,7 +203,7 @@ def _at(place: str) -> str:
     return f"offsetof(Scene, {place})"
 
 
-def _given(resolved: Resolved, members: Sequence[str]) -> Iterator[str]:
+def _write_starts(resolved: Resolved, members: Sequence[str]) -> Iterator[str]:
     """The start values that a scene gives to FMUs of others, but for those of the program's own
     variables."""
     for fmu in resolved.foreign:

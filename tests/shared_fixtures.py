@@ -21,7 +21,7 @@ from hapticlink.fmus.native import compiler
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.scene.overrides import Options, written
+from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.system.system import Coupling, Fmu, System
 from tests.orchestrator.systems import connected
 
@@ -48,11 +48,11 @@ def emptied_temporary_folder(own_temporary_folder: Path, monkeypatch: pytest.Mon
 def fmus_unpacked_once() -> Iterator[None]:
     """Runs of a module of tests leave the FMUs of this project unpacked for the next one, as those
     of a sweep do."""
-    with process_cache.unpacked_once():
+    with process_cache.keep_unpacked():
         yield
 
 
-COMPILED = compiler._compiled
+COMPILED = compiler._compile
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -73,7 +73,7 @@ def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         texts = [path.read_bytes() for path in (*files, *sorted(headers))]
         flags = [target, *(option for option in options if not option.startswith("-I"))]
         key = sha256(b"\0".join([*texts, *map(str.encode, flags)])).hexdigest()
-        with lock.held(kept / f"{key}.lock", lambda: None):
+        with lock.hold_lock(kept / f"{key}.lock", lambda: None):
             if not (kept / key).exists():
                 made = COMPILED(files, folder, target, options)
                 (kept / f"{key}.part").write_bytes(made)
@@ -128,7 +128,7 @@ def _once(scene: str, options: tuple[str, ...]) -> hl.Run:
 
 def run_once(scene: str, options: Options = ()) -> hl.Run:
     """A run of a shipped scene, which all tests of a process share that ask for it."""
-    return _once(scene, written(options))
+    return _once(scene, write_options(options))
 
 
 def clock(name: str, timing: str, inputs: Sequence[str]) -> Component:

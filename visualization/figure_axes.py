@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.analysis.findings.summary import stopped_by
+from hapticlink.analysis.findings.summary import describe_stop
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import shortened
+from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
 
@@ -66,7 +66,7 @@ def headline(on: Any, text: str, width: int, **where: float) -> None:
     write(plain(fill(text, width)), fontsize="medium", **where)
 
 
-def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
+def titled_axes(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     """A figure whose title tells where a run ended early, and its axes: one, or one below the other
     for several labels y."""
     from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
@@ -74,12 +74,12 @@ def titled(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
     reason = results.record.end.reason
     if reason != "duration":
         why = _ENDS.get(reason, "a fault ended the run")
-        said = stopped_by(results.record.stop_when)
+        said = describe_stop(results.record.stop_when)
         if reason == "stop_when" and said.startswith("the device"):
             why = said
         title += f", until {why} at {short(results.last_time)} s"
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
-    framed(figure)
+    set_margins(figure)
     every = figure.subplots(len(y), 1, sharex=True, squeeze=False)[:, 0]
     for axes, label in zip(every, y, strict=True):
         axes.set_ylabel(label)
@@ -99,7 +99,7 @@ def _events(axes: Axes, results: Results) -> None:
     end = results.last_time if events else 0.0
     for time, text in events:
         if time <= end:
-            texts.setdefault(time, []).append(shortened(text, 60))
+            texts.setdefault(time, []).append(shorten(text, 60))
     for time, said in texts.items():
         axes.axvline(time, color="0.4", linestyle=":", linewidth=1)
         axes.annotate(
@@ -109,7 +109,7 @@ def _events(axes: Axes, results: Results) -> None:
         )  # fmt: skip
 
 
-def framed(figure: Figure, **margins: float) -> None:
+def set_margins(figure: Figure, **margins: float) -> None:
     """Sets the margins of a figure's axes (in), by default those of MARGINS."""
     (width, height), m = figure.get_size_inches(), MARGINS | margins
     figure.subplots_adjust(
@@ -123,7 +123,7 @@ def legend_below(figure: Figure) -> None:
     legend = figure.legend(fontsize="x-small", ncols=COLUMNS, loc="lower center")
     lines = [text.get_text().count("\n") + 1 for text in legend.get_texts()]
     tallest = max((sum(column) for column in np.array_split(lines, COLUMNS)), default=0)
-    framed(figure, bottom=MARGINS["bottom"] + 0.15 + ROW * tallest)
+    set_margins(figure, bottom=MARGINS["bottom"] + 0.15 + ROW * tallest)
 
 
 def legend_above_curves(axes: Axes, columns: int) -> None:
@@ -150,14 +150,14 @@ def png(figure: Figure, dpi: int = 150) -> bytes:
 
 def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
     """Write each figure as a PNG; returns the file names. Raises Interrupted."""
-    return write(((name, png(figure)) for name, figure in figures.items()), folder)
+    return write_pngs(((name, png(figure)) for name, figure in figures.items()), folder)
 
 
-def write(pngs: Iterable[tuple[str, bytes]], folder: Path) -> list[str]:
+def write_pngs(pngs: Iterable[tuple[str, bytes]], folder: Path) -> list[str]:
     """Writes PNGs by name; returns the file names. Raises Interrupted."""
     names = []
     for name, content in pngs:
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         path = folder / f"{name}.png"
         path.unlink(missing_ok=True)  # a link is replaced, not followed
         path.write_bytes(content)

@@ -29,7 +29,7 @@ def draws(scene: Scene, count: int, seed: int) -> Iterator[tuple[str, ...]]:
         if graphics is not None and isinstance(graphics.rate, int | float | str):
             rate = float(exact(graphics.rate)) * generator.uniform(1 - RATE, 1 + RATE)
             drawn |= {"graphics.rate": round(rate, 2)}
-        yield overrides.written({key: value for key, value in drawn.items() if value})
+        yield overrides.write_options({key: value for key, value in drawn.items() if value})
 
 
 def _hand(scene: Scene, generator: np.random.Generator) -> dict[str, Any]:

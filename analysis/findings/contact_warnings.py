@@ -38,11 +38,11 @@ def lines(results: Results) -> Iterator[str]:
     table = of_block(results, CONTACT_GAP)
     if table is None or not len(table["time"]) or not scene["linkage"] or not scene["contacts"]:
         return
-    yield from _unrendered(results, table)
+    yield from _warn_of_unrendered(results, table)
     linkage = scene_part(results, "linkage", Linkage)
     contacts = scene_part(results, "contacts", Contacts)
     if JOINT_COORDINATES in table:  # both are recorded
-        yield from pressed(linkage, contacts, table[JOINT_COORDINATES][0])
+        yield from warn_of_pressed_start(linkage, contacts, table[JOINT_COORDINATES][0])
         yield from _deep(table, linkage, contacts)
     mechanism = scene_part(results, "mechanism", Mechanism)
     method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
@@ -52,7 +52,9 @@ def lines(results: Results) -> Iterator[str]:
         yield from _stiff(linkage, contacts, step_s, method.bounded_by)
 
 
-def pressed(linkage: Linkage, contacts: Contacts, q: Sequence[float] | Vector) -> Iterator[str]:
+def warn_of_pressed_start(
+    linkage: Linkage, contacts: Contacts, q: Sequence[float] | Vector
+) -> Iterator[str]:
     """A line for the deepest contact at the joint coordinates with which a scene starts."""
     found = [(pair, float(depth[0])) for pair, depth in depths(linkage, contacts, np.array([q]))]
     pair, depth = max(found, key=lambda item: item[1], default=(None, 0.0))
@@ -63,7 +65,7 @@ def pressed(linkage: Linkage, contacts: Contacts, q: Sequence[float] | Vector) -
         )
 
 
-def _unrendered(results: Results, table: Table) -> Iterator[str]:
+def _warn_of_unrendered(results: Results, table: Table) -> Iterator[str]:
     """A line where contacts act on the mechanism and its own controller does not pass them on."""
     record = results.record
     sent = any(name.startswith(f"{ENVIRONMENT_WRENCH} -> ") for name in record.connections)

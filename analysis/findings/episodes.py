@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings.forces import largest_torque, torques, touching
 from hapticlink.analysis.findings.tracking import (
     COPY_BRANCH_OK,
-    constrained,
     constraint_counts,
+    count_constrained,
     of_block,
 )
-from hapticlink.analysis.findings.user_port import allowed, user_port
+from hapticlink.analysis.findings.user_port import tolerated_energy, user_port
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import all_devices
@@ -52,7 +52,7 @@ def episodes(results: Results) -> list[Episode]:
 
 def saturations(results: Results) -> list[Episode]:
     """The episodes of motors at their limit alone."""
-    return _episodes(_saturated(results))
+    return _episodes(_find_saturation(results))
 
 
 def _episodes(states: Iterable[State]) -> list[Episode]:
@@ -77,10 +77,10 @@ State = tuple[str, Vector, NDArray[np.bool_], str]
 def _states(results: Results) -> Iterator[State]:
     if branch := of_block(results, COPY_BRANCH_OK):
         yield "folded", branch["time"], branch[COPY_BRANCH_OK] == 0, ""
-    yield from _saturated(results)
+    yield from _find_saturation(results)
     if port := user_port(results):
-        yield "energy", port.time_s, port.generated_J > allowed(port.hand_work_J), ""
-    if counted := constrained(results):
+        yield "energy", port.time_s, port.generated_J > tolerated_energy(port.hand_work_J), ""
+    if counted := count_constrained(results):
         times, numbers = counted
         counts = constraint_counts(numbers)
         usual = max(counts, key=lambda number: counts[number], default=0.0)
@@ -94,7 +94,7 @@ def _states(results: Results) -> Iterator[State]:
         yield "outside", margin["time"], margin[WORKSPACE_MARGIN] < 0, ""
 
 
-def _saturated(results: Results) -> Iterator[State]:
+def _find_saturation(results: Results) -> Iterator[State]:
     for user, device in all_devices(results).items():
         if driven := torques(results, device, user, largest_torque):
             said = f"{EPISODES['saturated']}: {user}" if user else ""

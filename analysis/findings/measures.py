@@ -11,9 +11,9 @@ import numpy as np
 from hapticlink.analysis.findings.episodes import Episode, saturations
 from hapticlink.analysis.findings.forces import largest_torque, torques, wrenches
 from hapticlink.analysis.findings.tracking import (
-    constrained,
     constraint_counts,
-    folded,
+    count_constrained,
+    count_folded,
     further_users,
     has_tracking,
     of_block,
@@ -116,7 +116,7 @@ class Measures:
     @cached_property
     def constrained(self) -> Constrained | None:
         """The numbers of constrained directions."""
-        if (counted := constrained(self._results)) is None:
+        if (counted := count_constrained(self._results)) is None:
             return None
         numbers = self._within(*counted)
         switches = int(np.count_nonzero(np.diff(numbers)))
@@ -125,7 +125,7 @@ class Measures:
     @cached_property
     def folded(self) -> tuple[int, int]:
         """The frames of the whole run in which the graphics copy is folded, and all frames."""
-        return folded(self._results)
+        return count_folded(self._results)
 
     @cached_property
     def port(self) -> PortEnergy | None:

@@ -33,7 +33,7 @@ def lines(results: Results, measures: Measures) -> Iterator[str]:
     record = results.record
     yield from _outside(results)
     late = {name: age.max for name, age in record.delays.items() if age.max > 0.0}
-    guarded = _guarded(record.scene)
+    guarded = _find_guarded(record.scene)
     for name, age in late.items():
         source, target = name.split(" -> ")
         if _is_one(source, guarded, ("F_motor", "F")):
@@ -113,7 +113,7 @@ def _outside(results: Results) -> Iterator[str]:
             )
 
 
-def _guarded(scene: Mapping[str, Any]) -> list[str]:
+def _find_guarded(scene: Mapping[str, Any]) -> list[str]:
     """The FMUs with a passivity controller."""
     walls = [
         fmu["name"]

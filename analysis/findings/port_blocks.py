@@ -47,7 +47,7 @@ WRENCHES = {"drift": DRIFT_WRENCH, "topology": TOPOLOGY_WRENCH, "environment": E
 """By block, its wrench on the handle."""
 
 
-def needed(results: Results, users: Iterable[str]) -> set[str]:
+def needed_signals(results: Results, users: Iterable[str]) -> set[str]:
     """The signals from which the blocks of these users are found, as far as a run has them; the
     first user's name is empty."""
     signals: set[str] = set()

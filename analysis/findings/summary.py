@@ -12,7 +12,7 @@ from hapticlink.analysis.findings import friction_speed
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.tracking import of_block
-from hapticlink.analysis.findings.user_port import allowance, allowed, pushed_by_others
+from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
 from hapticlink.orchestrator.base.signal_names import (
@@ -38,7 +38,7 @@ from hapticlink.orchestrator.base.signal_names import (
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import TABLES, Results
 from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
-from hapticlink.orchestrator.scene.start_pose import outside
+from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 from hapticlink.orchestrator.system.system import Replacement
 
 
@@ -48,12 +48,12 @@ def ending(results: Results) -> str:
     if end.time is None:
         return "not ended: it is still running, or its process was killed"
     if end.reason == "stop_when":
-        return f"{stopped_by(results.record.stop_when)} at {end.time:.6g} s"
+        return f"{describe_stop(results.record.stop_when)} at {end.time:.6g} s"
     how = {"terminated": f"ended: {end.asked},", "duration": "done"}
     return f"{how.get(end.reason, end.reason)} at {end.time:.6g} s"
 
 
-def stopped_by(condition: str) -> str:
+def describe_stop(condition: str) -> str:
     """What the condition means that ended a run, in words where it is that of a device."""
     signal, _, limit = condition.partition(" < ")
     device, _, port = signal.partition(".")
@@ -70,7 +70,7 @@ def warnings(results: Results) -> Sequence[str]:
     return [*lines(results)] if recorded is None else recorded
 
 
-def printed(results: Results, name: str, known: Sequence[str] | None = None) -> Iterator[str]:
+def print_lines(results: Results, name: str, known: Sequence[str] | None = None) -> Iterator[str]:
     """The lines that `hapticlink run` and `print` show of a run: how it ended, its numbers (those
     that are `known`), warnings, time and files."""
     yield f"{name}: {ending(results)}"
@@ -102,12 +102,12 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
     if measures.forces:
         peaks = (f"{name} {short(force)} N" for name, force in measures.forces.items())
         yield f"largest forces: {'; '.join(peaks)}"
-        yield from _saturated(measures)
+        yield from _describe_saturation(measures)
     if port := measures.port:
         yield _energy(port)
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
-            yield f"held {name} {_generated(energy.peak, energy.generated)}"
+            yield f"held {name} {_describe_generated(energy.peak, energy.generated)}"
     if measures.closure_m is not None:
         yield f"loops close within {measures.closure_m:.2g} m"
 
@@ -133,15 +133,15 @@ def _energy(port: PortEnergy) -> str:
     """A line on the energy at the user's port, beside the work of the hands."""
     hands = [1e3 * work for name, work in port.works.items() if name.endswith("hand")]
     put_in = f"the hand put in {short(sum(hands))} mJ, " if hands else ""
-    is_over = port.peak > allowed(port.hand_work)
-    generated = _generated(port.peak, port.generated, f", at {port.time_of_peak:.3g} s")
+    is_over = port.peak > tolerated_energy(port.hand_work)
+    generated = _describe_generated(port.peak, port.generated, f", at {port.time_of_peak:.3g} s")
     return (
         f"energy at the user's port: {put_in}the rendering {generated}. A passive one generates "
         f"none; this is {'over' if is_over else 'within'} the tolerated {allowance(port.hand_work)}"
     )
 
 
-def _generated(peak: float, end: float, when: str = "") -> str:
+def _describe_generated(peak: float, end: float, when: str = "") -> str:
     """What was generated (J): at most, at the time `when`, and by the end."""
     by_the_end = f"{'generated' if end > 0 else 'dissipated'} {short(1e3 * abs(end))} mJ"
     if peak <= 0:
@@ -149,7 +149,7 @@ def _generated(peak: float, end: float, when: str = "") -> str:
     return f"generated at most {short(1e3 * peak)} mJ{when}, and by the end has {by_the_end}"
 
 
-def _saturated(measures: Measures) -> Iterator[str]:
+def _describe_saturation(measures: Measures) -> Iterator[str]:
     """A line for each user whose motors were at their torque limit, and for how long."""
     for said, spans in groupby(measures.saturations, key=lambda episode: episode.said):
         seconds = sum(span.end - span.begin for span in spans)
@@ -168,20 +168,20 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
             "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
         )
-    yield from replaced(record.replaced)
+    yield from describe_replacements(record.replaced)
     yield from _lacking(results)
-    yield from unrecorded(record.not_recorded, record.fmus)
+    yield from describe_unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
         yield (
             f"reported and drawn from one row in {every} (record.every): what happens between "
             "them, such as larger forces and energies, is not seen"
         )
-    for name in pushed_by_others(results):
+    for name in find_other_pushes(results):
         yield f"no energy at the user's port: {name} is not the force of the handle's own hand"
     yield from _steps(record)
     yield from friction_speed.coarse(results)
     yield from _passivity(results, measures)
-    yield from _stopped(results)
+    yield from _describe_stops(results)
     yield from _contacts(results)
     for name, link in record.links.items():
         if link.lost or link.overtaken:
@@ -190,7 +190,7 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
             )
     if record.unstable:
         yield f"warning: {record.unstable}: the loop is not passive"
-    yield from _refused_holds(record)
+    yield from _describe_refused_holds(record)
 
 
 def _steps(record: RunRecord) -> Iterator[str]:
@@ -208,7 +208,7 @@ def _steps(record: RunRecord) -> Iterator[str]:
         yield from long_steps(fmu, errors, record.fmus[fmu].block)
 
 
-def _refused_holds(record: RunRecord) -> Iterator[str]:
+def _describe_refused_holds(record: RunRecord) -> Iterator[str]:
     """A line for each default hold that connections did not take."""
     by_hold: dict[str, list[tuple[str, str]]] = {}
     for name, refused in sorted(record.holds_that_did_not_fit.items(), key=lambda i: i[1].hold):
@@ -227,7 +227,7 @@ def _passivity(results: Results, measures: Measures) -> Iterator[str]:
     yield from passivity_warnings.lines(results, measures)
 
 
-def _stopped(results: Results) -> Iterator[str]:
+def _describe_stops(results: Results) -> Iterator[str]:
     """A line if the passive midpoint method had to stop the mechanism, and one if contacts change
     its energy between steps."""
     table = of_block(results, MECHANISM_STOPS)
@@ -312,7 +312,7 @@ USED = {
 """The signals of what is reported and drawn of a run."""
 
 
-def unrecorded(left_out: Collection[str], fmus: Iterable[str] = ()) -> Iterator[str]:
+def describe_unrecorded(left_out: Collection[str], fmus: Iterable[str] = ()) -> Iterator[str]:
     """A line if signals that are not recorded are missing in what is reported and drawn of a run of
     these FMUs."""
     users = ["", *(user for name in fmus if (user := user_of_block(name, HAND)))]
@@ -356,7 +356,7 @@ def _percent(how: str, share: float) -> str:
     return f"more than {LARGEST_PERCENT} %" if far else f"{how} {percent:.2g} %"
 
 
-def replaced(replacements: Mapping[str, Replacement]) -> Iterator[str]:
+def describe_replacements(replacements: Mapping[str, Replacement]) -> Iterator[str]:
     """Lines for the ports that FMUs in the place of blocks call otherwise or lack, and for their
     inputs that nothing feeds."""
     for name, replacement in replacements.items():
@@ -395,7 +395,8 @@ def _start(results: Results) -> Iterator[str]:
         and len(device["time"])
         and device[WORKSPACE_MARGIN][0] < 0
     ):
-        yield f"warning: {outside(device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0])}"
+        start, margin = device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0]
+        yield f"warning: {describe_start_outside(start, margin)}"
     pulls = of_block(results, HAND_WRENCH, 3)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
         pull = float(PLANE.distance(pulls[HAND_WRENCH][0])) if len(pulls["time"]) else 0.0
@@ -410,10 +411,10 @@ def _start(results: Results) -> Iterator[str]:
     size = sum(JOINT_TYPES[joint["type"]].size for joint in linkage["joint"])
     table = of_block(results, JOINT_COORDINATES, size)
     if table and len(table["time"]):
-        yield from moved(linkage, table[JOINT_COORDINATES][0])
+        yield from describe_assembly(linkage, table[JOINT_COORDINATES][0])
 
 
-def moved(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
+def describe_assembly(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:
     """A line with both poses if assembly moved joints far from their start in [linkage]; q are the
     assembled joint coordinates."""
     starts = linkage["start"]

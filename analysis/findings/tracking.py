@@ -98,7 +98,7 @@ def tracking(results: Results) -> tuple[Vector, Vector]:
     return time, distance
 
 
-def constrained(results: Results) -> tuple[Vector, Vector] | None:
+def count_constrained(results: Results) -> tuple[Vector, Vector] | None:
     """Times (s) and numbers of constrained directions, at the rate of the block that the controller
     gets them from; None where there are none."""
     for signal in CONSTRAINT_COUNTS:
@@ -113,7 +113,7 @@ def constraint_counts(numbers: Vector) -> dict[float, int]:
     return {float(number): int(samples) for number, samples in found}
 
 
-def folded(results: Results) -> tuple[int, int]:
+def count_folded(results: Results) -> tuple[int, int]:
     """Number of frames in which the graphics copy is on another assembly of its loops than the
     mechanism, and number of all frames; (0, 0) if the run has no such output."""
     table = of_block(results, COPY_BRANCH_OK)

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.port_blocks import by_block, needed
+from hapticlink.analysis.findings.port_blocks import by_block, needed_signals
 from hapticlink.analysis.findings.tracking import (
     further_users,
     of_block,
@@ -95,14 +95,14 @@ class UserPort(NamedTuple):
         )
 
 
-def allowed(hand_work: float) -> float:
+def tolerated_energy(hand_work: float) -> float:
     """The energy (J) that a rendering may generate where the hand works so much (J)."""
     return max(NOTICEABLE_J, SHARE * hand_work)
 
 
 def allowance(hand_work: float) -> str:
     """What is `allowed`, in words."""
-    most = f"{short(1e3 * allowed(hand_work))} mJ"
+    most = f"{short(1e3 * tolerated_energy(hand_work))} mJ"
     if SHARE * hand_work < NOTICEABLE_J:
         return f"{most}, the least that a hand notices"
     return f"{most}, a quarter of the {short(1e3 * hand_work)} mJ that the hand gave and took back"
@@ -120,9 +120,9 @@ def hand_work(results: Results) -> float:
     return total
 
 
-def tolerated(results: Results) -> float:
+def tolerated_in_run(results: Results) -> float:
     """What is `allowed` (J) in a run."""
-    return allowed(hand_work(results))
+    return tolerated_energy(hand_work(results))
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
@@ -133,7 +133,7 @@ def user_port(results: Results) -> UserPort | None:
     mechanism, device = of_block(results, MECHANISM_ENERGY), of_block(results, HANDLE_POSE, 3)
     if mechanism is None or device is None or of_block(results, HAND_WRENCH, 3) is None:
         return None
-    if pushed_by_others(results) or not (len(device["time"]) and len(mechanism["time"])):
+    if find_other_pushes(results) or not (len(device["time"]) and len(mechanism["time"])):
         return None
     rows = rows_until(mechanism, device["time"][-1])
     time = mechanism["time"][rows]
@@ -159,7 +159,7 @@ def user_port(results: Results) -> UserPort | None:
             further = further + done
     stored = mechanism[MECHANISM_ENERGY]
     stored = stored[rows] - float(stored[0]) - further
-    lacks = needed(results, put_in) & {*results.record.not_recorded}
+    lacks = needed_signals(results, put_in) & {*results.record.not_recorded}
     blocks = {} if lacks else by_block(results, works, stored, put_in)
     on_handles: Vector = sum(put_in.values(), start=np.zeros(len(time)))
     generated, hands = stored - on_handles, on_handles + further
@@ -167,7 +167,7 @@ def user_port(results: Results) -> UserPort | None:
     return UserPort(time, hands, generated, blocks, single, hand_work(results))
 
 
-def pushed_by_others(results: Results) -> list[str]:
+def find_other_pushes(results: Results) -> list[str]:
     """The connections to handles from other sources than the hands of their users."""
     return [
         name
@@ -197,13 +197,13 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
     if contact := of_block(results, ENVIRONMENT_WRENCH, 3):
         done = work_of_source(time, contact, ENVIRONMENT_WRENCH, contact, POINT_POSE)
         found["F_env on the mechanism"] = last(done)
-    if (added := _held_mobility(results, device)) is not None:
+    if (added := _hold_mobility(results, device)) is not None:
         done = work_as_held(time, added.__getitem__, device["time"], device, HANDLE_POSE)
         found["held mobility"] = last(done)
     return found
 
 
-def _held_mobility(results: Results, device: Table) -> Vector | None:
+def _hold_mobility(results: Results, device: Table) -> Vector | None:
     """What holding the mobility adds to the motors' wrench, (n, 3) at the device's samples; None
     where it is not held, or not by zoh, or the mechanism's own is not put out."""
     held, own = (of_block(results, signal, 3, 3) for signal in MOBILITIES)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 from hapticlink.orchestrator.results.run_record import RunRecord
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 
 
 def arrivals(record: RunRecord, connection: str, table: Table, same_clock: bool) -> Vector:
@@ -24,19 +24,19 @@ def arrivals(record: RunRecord, connection: str, table: Table, same_clock: bool)
     of each sample. same_clock: whether the rows are those of the FMU's clock.
     """
     stamps = table["time"]
-    if (late := _drawn(record, connection, len(stamps))) is not None:
+    if (late := _draw_delays(record, connection, len(stamps))) is not None:
         return stamps + late
     age = record.delays.get(connection) if same_clock else None
     return stamps + age.max if age and age.max else stamps
 
 
-def _drawn(record: RunRecord, connection: str, samples: int) -> Vector | None:
+def _draw_delays(record: RunRecord, connection: str, samples: int) -> Vector | None:
     """The delay (s) of each sample, infinite where it was lost, as the link has drawn it."""
     latency, counted = record.latencies.get(connection), record.links.get(connection)
     if not latency or not counted or record.coupling == "jacobi":
         return None
     base = Fraction(record.base.split()[0])
-    link = Link(latency, base)
+    link = SampleLink(latency, base)
     ticks = np.array([link.draw() for _ in range(counted.sent)])
     # The sample of t = 0 is known at once; that of a sampled block is sent again beside it.
     again = counted.sent - (samples - 1)

@@ -110,7 +110,7 @@ def fit(
     Raises InputFault for a log that cannot be read or moves nothing, an unknown parameter, and a
     scene without a device.
     """
-    read, given = open_scene.load(scene, options), logs.read(log)
+    read, given = open_scene.load(scene, options), logs.read_log(log)
     arm = read.hand if isinstance(read.hand, ArmHand) else ArmHand(target=ORIGIN)
     if read.device is None:
         raise InputFault("fit: the scene has no [device]")

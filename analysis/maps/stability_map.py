@@ -34,7 +34,7 @@ class Map:
         return [row for row in self.rows if row.get("at") == at]
 
 
-@interrupt.held()
+@interrupt.defer_signals()
 def compute_map(
     scene: str | Path | Scene,
     options: Sequence[str],

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
-from hapticlink.analysis.findings.user_port import allowed, hand_work
+from hapticlink.analysis.findings.user_port import hand_work, tolerated_energy
 from hapticlink.analysis.sweep.row import METRIC, Row, of_results
 from hapticlink.components.device.workspace import workspace
 from hapticlink.components.specs.device import Device
@@ -99,13 +99,13 @@ class Limits:
         if energy_share(row) > 1.0:
             yield (
                 f"the user's port gives {short(1e3 * row[PEAK])} mJ, and may "
-                f"{short(1e3 * allowed(row[WORK]))}"
+                f"{short(1e3 * tolerated_energy(row[WORK]))}"
             )
 
 
 def energy_share(row: Row) -> float:
     """The largest energy generated at the user's port, relative to what is allowed."""
-    return max(0.0, float(row.get(PEAK, 0.0))) / allowed(float(row.get(WORK, 0.0)))
+    return max(0.0, float(row.get(PEAK, 0.0))) / tolerated_energy(float(row.get(WORK, 0.0)))
 
 
 @cache

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from hapticlink.orchestrator.base.signal_names import CONTROLLER
-from hapticlink.orchestrator.base.ticks import written
+from hapticlink.orchestrator.base.ticks import write_exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.system.system import System
 
@@ -59,7 +59,7 @@ closed-loop-direct."""
 
 def set_rate(clock: str, rate: Fraction) -> str:
     """The option that sets the rate (Hz) of "haptics" or "graphics"."""
-    return f"{clock}.rate={written(rate)}"
+    return f"{clock}.rate={write_exact(rate)}"
 
 
 @dataclass(frozen=True)

@@ -257,7 +257,7 @@ class ForwardSensitivity:
         slope, error = (sides[0] + sides[-1]) / 2, (sides[0] - sides[-1]) / 2
         along = along[:, read]
         if exact is not None:
-            slope, error = decided(exact @ along.T, slope, error)
+            slope, error = combine_slopes(exact @ along.T, slope, error)
         J, E = slope @ along, error @ along
         if known:
             J[:, inert], E[:, inert] = known[0].J[:, inert], known[0].E[:, inert]
@@ -373,7 +373,7 @@ class ForwardSensitivity:
                 return None
 
 
-def decided(exact: Matrix, slope: Matrix, error: Matrix) -> tuple[Matrix, Matrix]:
+def combine_slopes(exact: Matrix, slope: Matrix, error: Matrix) -> tuple[Matrix, Matrix]:
     """Slopes and their errors, a column each direction, from exact ones and differences."""
     most = KINK * np.maximum(SMALL, np.abs(slope).max(axis=0, initial=0.0))
     differ = ~(np.abs(slope - exact) <= most) | (np.abs(error) > most)

@@ -34,7 +34,7 @@ def without(system: System) -> tuple[System, list[str]]:
     fmus, lines = [], []
     for fmu in system.fmus:
         starts = []
-        for scalar, value, what in _removed(system, fmu):
+        for scalar, value, what in _find_removed(system, fmu):
             starts.append((scalar, value))
             lines.append(f"{fmu.name}.{scalar.name}: {what}, taken out")
         fmus.append(fmu.starting(tuple(starts)))
@@ -60,7 +60,7 @@ def without_friction(holds: Iterable[CompiledHold]) -> None:
             array(hold.account.beta, hold.account.n)[:] = 0.0
 
 
-def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
+def _find_removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
     """Parameters that are set, their values, and what they are."""
     block = system.block(fmu.name)
     for scalar in fmu.description.scalars:
@@ -76,7 +76,7 @@ def _removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str]]:
             yield scalar, NEXT_TO_NOTHING, "Coulomb friction"
 
 
-def kept(system: System) -> list[str]:
+def describe_switches(system: System) -> list[str]:
     """A line of text on each switch that stays as it is at the equilibrium."""
     lines = []
     for fmu in system.fmus:

@@ -39,7 +39,7 @@ def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlop
     the scene."""
     if not found.block:
         return None
-    if carried := _read(found.path, found.guid):
+    if carried := _read_graph(found.path, found.guid):
         return carried
     if generated := _GENERATED.get(found.guid):
         return generated
@@ -55,17 +55,17 @@ def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlop
 
 
 @lru_cache(KEPT)
-def _read(path: Path, guid: str) -> GraphSlopes | None:
+def _read_graph(path: Path, guid: str) -> GraphSlopes | None:
     with zipfile.ZipFile(path) as archive:
         if FUNCTIONS not in archive.namelist():
             return None
         texts, about = (json.loads(archive.read(name)) for name in (FUNCTIONS, ABOUT))
     texts.pop("initialize", "")
-    return _deserialized(tuple(texts.items()), about["timing"] == "sampled", about["substeps"])
+    return _deserialize(tuple(texts.items()), about["timing"] == "sampled", about["substeps"])
 
 
 @lru_cache(KEPT)
-def _deserialized(texts: tuple[tuple[str, str], ...], sampled: bool, substeps: int) -> GraphSlopes:
+def _deserialize(texts: tuple[tuple[str, str], ...], sampled: bool, substeps: int) -> GraphSlopes:
     """Once for all FMUs of the same functions."""
     functions = {name: ca.Function.deserialize(text) for name, text in texts}
     return GraphSlopes(functions, sampled, substeps)
@@ -84,12 +84,12 @@ class GraphSlopes:
         kept = ca.SX.sym("y", y.numel())
         self._sampled, self._others, before = sampled, substeps - 1, ca.vertcat(u, kept, x)
         self._n = [s.numel() for s in (t, u, p, y, x)]
-        self._advance = _mapped([before, p, t, h, end], ca.vertcat(u, y_end, after))
+        self._advance = _map_with_jacobian([before, p, t, h, end], ca.vertcat(u, y_end, after))
         got = before if sampled else ca.vertcat(u, y, x)
-        self._output = _mapped([before, p, t], got)
+        self._output = _map_with_jacobian([before, p, t], got)
         if self._others:
             further = ca.vertcat(u, kept, functions["substep"](x, u, p, t, h))
-            self._substep = _mapped([before, p, t, h, end], further)
+            self._substep = _map_with_jacobian([before, p, t, h, end], further)
 
     @property
     def n_u(self) -> int:
@@ -118,7 +118,7 @@ class GraphSlopes:
 _Mapped = tuple[ca.Function, ca.Function]
 
 
-def _mapped(arguments: list[ca.SX], result: ca.SX) -> _Mapped:
+def _map_with_jacobian(arguments: list[ca.SX], result: ca.SX) -> _Mapped:
     """A function, and its Jacobian by the first argument."""
     slopes = ca.densify(ca.jacobian(result, arguments[0]))
     values = ca.Function("values", arguments, [ca.densify(result)])

@@ -13,7 +13,15 @@ from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD, free, holds
 from hapticlink.analysis.stability.linear_period import LinearPeriod
-from hapticlink.analysis.stability.modes import Bounds, Mode, counted, kind, leading, modes, verdict
+from hapticlink.analysis.stability.modes import (
+    Bounds,
+    Mode,
+    judged_modes,
+    kind,
+    leading,
+    modes,
+    verdict,
+)
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.components.specs.hand import Hand
@@ -129,7 +137,7 @@ class InHands:
         period = self._period
         if hand is not None:
             period = period.held(dict.fromkeys(self._users, hand_slopes(hand, self._T)))
-        return counted(modes(period.linear, self._seconds))[0], period
+        return judged_modes(modes(period.linear, self._seconds))[0], period
 
     def _verdict(self, mode: Mode) -> str:
         slight = np.expm1(SLIGHT * self._seconds)

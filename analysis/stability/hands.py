@@ -68,7 +68,7 @@ def free(damping: float = 0.0, turning: float = 0.0) -> ConstantHand:
     return ConstantHand(wrench=(0.0, 0.0, 0.0), damping=(damping, damping, turning))
 
 
-def own_hand(hand: Hand) -> Hand:
+def linearise_hand(hand: Hand) -> Hand:
     """A hand of a scene with what its linearisation needs: it stands still, sampled."""
     if isinstance(hand, ConstantHand | ProfileHand):
         return ConstantHand(wrench=(0.0, 0.0, 0.0), damping=hand.damping)

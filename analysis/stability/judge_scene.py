@@ -20,18 +20,26 @@ import numpy as np
 from hapticlink.analysis.search.acceptance import broken_limit
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import in_poses
-from hapticlink.analysis.stability.hands import FREE, HANDS, OWN, OWN_FREE, UNHELD, holds, own_hand
+from hapticlink.analysis.stability.hands import (
+    FREE,
+    HANDS,
+    OWN,
+    OWN_FREE,
+    UNHELD,
+    holds,
+    linearise_hand,
+)
 from hapticlink.analysis.stability.margin_and_remedy import Visited, improvements
 from hapticlink.analysis.stability.modes import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import (
     Pose,
-    evenly_spaced,
+    choose_evenly_spaced,
     fault_of,
+    find_rest_poses,
+    is_hand_replaced,
     presses,
-    replaced,
     rest,
-    settled,
-    simulated,
+    simulate_scene,
 )
 from hapticlink.analysis.stability.short_hyperperiod import short
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
@@ -42,7 +50,7 @@ from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.scene.arguments import require
@@ -83,26 +91,26 @@ def stability(
             "a rate that varies is judged in mean square, at the equilibrium of the scene: "
             "--equilibrium, with a hand that holds it"
         )
-    if read.hand is None or replaced(read):
-        return _judged_at_rest(read, bounds, progress)
+    if read.hand is None or is_hand_replaced(read):
+        return _judge_at_rest(read, bounds, progress)
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
     hands = hands_of(read.hand)
     read, rounded = short(with_quicker_fmus(read))
-    with interrupt.held(), process_cache.unpacked_once():
+    with interrupt.defer_signals(), process_cache.keep_unpacked():
         (progress or _silent)("the scene's own run", 0, poses + 2)
-        own, own_run = _visited(read, poses, grid)
+        own, own_run = _visit_poses(read, poses, grid)
         own_fault = fault_of(own_run)
 
         def visits(changed: Scene) -> tuple[list[Pose], str]:
             if changed is read:
                 return own, ""
-            found, run = _visited(changed, poses, grid)
+            found, run = _visit_poses(changed, poses, grid)
             if (fault := fault_of(run)) and not own_fault:
                 raise InputFault(fault)
             return found, broken_limit(changed, run)
 
-        judged = _judged(read, visits, hands, bounds, progress, rounded)
+        judged = _judge(read, visits, hands, bounds, progress, rounded)
     return replace(judged, run_fault=own_fault)
 
 
@@ -122,14 +130,14 @@ def equilibrium_stability(
     _require_bounds(bounds)
     read = open_scene.load(scene, options)
     if varies(read):
-        with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+        with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
             return varying_stability(read)
-    return _judged_at_rest(read, bounds, progress)
+    return _judge_at_rest(read, bounds, progress)
 
 
 def _require_bounds(bounds: Bounds) -> None:
     if not isinstance(bounds, Bounds):
-        raise InputFault(f"bounds = {shortened(repr(bounds))}: give Bounds(hertz, growth)")
+        raise InputFault(f"bounds = {shorten(repr(bounds))}: give Bounds(hertz, growth)")
     if not (bounds.hertz >= 0.0 and bounds.growth >= 0.0):
         raise InputFault(
             f"drift up to {bounds.hertz:g} Hz and {bounds.growth:g} 1/s: give 0 or more"
@@ -143,32 +151,32 @@ def _silent(what: str, done: int, of: int) -> None:
 def hands_of(hand: Hand) -> dict[str, Hand]:
     """The family, with the hand of a scene, and no hand where that has no stiffness."""
     if holds(hand):
-        return {OWN: own_hand(hand), **HANDS}
+        return {OWN: linearise_hand(hand), **HANDS}
     damped = any(getattr(hand, "damping", None) or ())
-    return {**HANDS, (OWN_FREE if damped else FREE): own_hand(hand)}
+    return {**HANDS, (OWN_FREE if damped else FREE): linearise_hand(hand)}
 
 
-def _visited(read: Scene, count: int, grid: int) -> tuple[list[Pose], Results]:
+def _visit_poses(read: Scene, count: int, grid: int) -> tuple[list[Pose], Results]:
     """The poses that a scene's own run visits, and that run."""
     assert read.linkage is not None
-    run = simulated(read, {"duration": SPAN, "stop_when": ""})
-    poses = evenly_spaced(run, read.linkage, count)
+    run = simulate_scene(read, {"duration": SPAN, "stop_when": ""})
+    poses = choose_evenly_spaced(run, read.linkage, count)
     if presses(read):
         with suppress(InputFault):
-            poses += settled(read, read.linkage)
+            poses += find_rest_poses(read, read.linkage)
     if grid:
         poses += grid_poses(run, read, read.linkage, grid)
     return poses, run
 
 
-def _judged_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> Stability:
+def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> Stability:
     """The verdict where the run comes to rest, in the scene's own hand alone or as it is."""
     hands: Hands = {UNHELD: None}
-    if read.hand is not None and not replaced(read):
-        hands = {OWN: own_hand(read.hand)}
+    if read.hand is not None and not is_hand_replaced(read):
+        hands = {OWN: linearise_hand(read.hand)}
     read, rounded = short(with_quicker_fmus(read))
     try:
-        return _judged(read, _at_rest, hands, bounds, progress, rounded)
+        return _judge(read, _at_rest, hands, bounds, progress, rounded)
     except InputFault as fault:
         if read.hand or read.device or read.controller or read.fmu:
             raise
@@ -182,11 +190,11 @@ def _at_rest(read: Scene) -> tuple[list[Pose], str]:
     """Where the run of a scene comes to rest."""
     if read.linkage is None:
         raise InputFault("no linkage: nothing that comes to rest in a pose")
-    with interrupt.held():
+    with interrupt.defer_signals():
         return [rest(read, read.linkage)], ""
 
 
-def _judged(
+def _judge(
     read: Scene,
     visits: Visited,
     hands: Hands,
@@ -196,7 +204,7 @@ def _judged(
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
     step, (visited, _) = progress or _silent, visits(read)
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+    with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(
             read, visited, hands, bounds, lambda done, of: step("poses", done + 1, of + 2)
         )
@@ -217,7 +225,7 @@ def _judged(
         judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
         margin, remedies = improvements(read, judged, held, bounds, worst, visits)
         with linearisable(read) as (_, system, removed):
-            frozen = (*removed, *frozen_nonlinearities.kept(system))
+            frozen = (*removed, *frozen_nonlinearities.describe_switches(system))
     return Stability(
         title=read.title,
         bounds=bounds,

@@ -107,7 +107,7 @@ class LiftedMap:
         self._state.put(self._template, state)
         for tick, event in self._moments:
             self._run(tick, event)
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         return self._numbers()
 
     def recorded(self, point: Vector) -> tuple[float, list[tuple[Applied, ...]]]:
@@ -135,7 +135,7 @@ class LiftedMap:
                 moved = max(moved, (change / np.maximum(1.0, np.abs(point[moving]))).max(initial=0))
                 self._pin(point)
         self._numbers()
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         return float(moved), events
 
     def _pin(self, rest: Vector | None) -> Vector:
@@ -234,7 +234,7 @@ def long_enough(scene: Scene, system: System) -> System:
 
 
 @contextmanager
-def lifted_map(system: System, scene: Scene | None = None) -> Iterator[LiftedMap]:
+def open_lifted_map(system: System, scene: Scene | None = None) -> Iterator[LiftedMap]:
     """The lifted map of `system`, with its FMUs loaded; the state is perturbed within the loop
     closures of `scene`.
 

@@ -182,7 +182,7 @@ class _Search:
             return ()
         scale = min(1.0, margin.stiffness) / SAFE
         gains = place.gains
-        return tuple(overrides.written(gains.options(dict.fromkeys(gains.laws, scale))))
+        return tuple(overrides.write_options(gains.options(dict.fromkeys(gains.laws, scale))))
 
     def candidates(
         self, place: RestingScene, margin: Margin, softer: tuple[str, ...]
@@ -198,7 +198,7 @@ class _Search:
         for factor in DAMPINGS:
             for key, value in gains.options({"drift": factor**2}).items():
                 if key == f"{table}.damping":
-                    yield tuple(overrides.written({key: value}))
+                    yield tuple(overrides.write_options({key: value}))
         if read.graphics is not None:
             assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
             rate = exact(read.graphics.rate)

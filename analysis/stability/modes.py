@@ -129,7 +129,7 @@ def verdict(radius: float, uncertainty: float) -> str:
     return "unstable" if radius > 1.0 else "stable"
 
 
-def counted(modes: Sequence[Mode]) -> Sequence[Mode]:
+def judged_modes(modes: Sequence[Mode]) -> Sequence[Mode]:
     """The modes by which a scene is judged: neutral ones only where there are no others."""
     return [mode for mode in modes if not mode.neutral] or modes
 

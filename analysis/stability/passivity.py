@@ -36,7 +36,7 @@ import numpy as np
 from hapticlink.analysis.stability import two_port
 from hapticlink.analysis.stability.absolute_stability import damping_shortage, least
 from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
-from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
+from hapticlink.analysis.stability.lifted_map import long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.port_response import (
     LARGEST,
@@ -49,13 +49,13 @@ from hapticlink.analysis.stability.port_response import (
     response,
 )
 from hapticlink.analysis.stability.poses import in_own_hand
-from hapticlink.analysis.stability.short_hyperperiod import rounded
+from hapticlink.analysis.stability.short_hyperperiod import round_rate
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Vector
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.ticks import exact, written
+from hapticlink.orchestrator.base.ticks import exact, write_exact
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -137,12 +137,13 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     read, said = open_scene.load(scene, options), ""
     hand, mechanism, count = _ports(read)
     if count > LARGEST and read.graphics is not None:
-        read, said = rounded(read)
+        read, said = round_rate(read)
         hand, mechanism, count = _ports(read)
     if count > LARGEST:
+        higher = write_exact(exact(read.haptics.rate) / 16)
         raise InputFault(
             f"user's port: {count} forces in a hyperperiod, at most {LARGEST}: take a higher "
-            f"graphics rate, such as --set graphics.rate={written(exact(read.haptics.rate) / 16)}"
+            f"graphics rate, such as --set graphics.rate={higher}"
         )
     with in_own_hand(read) as (place, _):
         found = of(read.title, place.period({}), hand, mechanism, place.T)
@@ -154,7 +155,7 @@ def _ports(read: Scene) -> tuple[HandPort, MechanismPort | None, int]:
     with linearisable(read) as (_, system, _):
         hand = hand_port(system)
         mechanism = mechanism_port(system, hand)
-        with lifted_map(long_enough(read, system), read) as map_:
+        with open_lifted_map(long_enough(read, system), read) as map_:
             return hand, mechanism, forces(map_, hand, mechanism)
 
 
@@ -276,7 +277,7 @@ def _between(
     angles = port.within(np.union1d(angles, scale.resonances(cut)))
     angles = with_worst(angles, lambda angle: two_port.largest_shortage(two_port_at(angle)))
     ports = [(angle, two_port_at(angle)) for angle in angles]
-    return two_port.judged(ports, P, scale.turns, cut.radius, mechanism.kept)
+    return two_port.judge_ports(ports, P, scale.turns, cut.radius, mechanism.kept)
 
 
 def _angles(N: int) -> Vector:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.stability.hands import FIRM, own_hand, spring, standing
+from hapticlink.analysis.stability.hands import FIRM, linearise_hand, spring, standing
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import Joints
@@ -91,8 +91,8 @@ class Pose:
             return True
         held = {"hand": standing(hand, np.add(self.point, OFF))}
         changes = {**self.started, **held, "duration": LEAVING, "stop_when": ""}
-        run = simulated(read, changes)
-        moved = np.abs(_recorded(run)[POINT_POSE] - self.point).max(axis=0)
+        run = simulate_scene(read, changes)
+        moved = np.abs(_read_poses(run)[POINT_POSE] - self.point).max(axis=0)
         return bool(run.record.fault) or bool((moved > NEAR).any())
 
     @property
@@ -108,9 +108,9 @@ class Pose:
         return {"hand": spring(self.point, self.press, FIRM), **hands}
 
 
-def simulated(scene: str | Path | Scene, options: Options = ()) -> Results:
+def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
     """A run of the scene. Raises InputFault where it has no row."""
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         experiment = simulate(scene, room, options, csv=False)
         if not experiment.outcome.published:
             raise InputFault(f"the scene's own run fails: {experiment.outcome.fault}")
@@ -122,10 +122,10 @@ def fault_of(run: Results) -> str:
     return run.record.fault.message if run.record.fault else ""
 
 
-def evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
+def choose_evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     """Of a run, `count` evenly spaced ones from its start on, and the one in contact as the last
     one if there was any. Raises InputFault where the poses are not recorded."""
-    table = _recorded(run)
+    table = _read_poses(run)
     moments = [int(i * len(table["time"]) / count) for i in range(count)]
     size = PLANE.distance(_force(table))
     touching = np.flatnonzero(size)
@@ -134,14 +134,14 @@ def evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pose]:
     return [_pose(run, linkage, i) for i in moments]
 
 
-def settled(read: Scene, linkage: Linkage) -> list[Pose]:
+def find_rest_poses(read: Scene, linkage: Linkage) -> list[Pose]:
     """Where the constant wrench of a scene would come to rest, if it does, with a damped handle: at
     the end of a run, and about its mean if there is no equilibrium nearby. Raises InputFault where
     that fails."""
     assert isinstance(read.hand, ConstantHand)
     wrench = read.hand.wrench
     damped = {"type": "constant", "wrench": list(wrench), "damping": SETTLED_BY}
-    run = simulated(read, {"hand": damped, "duration": SETTLING, "stop_when": ""})
+    run = simulate_scene(read, {"hand": damped, "duration": SETTLING, "stop_when": ""})
     if run.record.fault:
         raise InputFault(f"its run with a damped handle fails: {run.record.fault.message}")
     near = (_average(run, linkage, since) for since in (1.0, 1.0 - CALM))
@@ -152,10 +152,10 @@ def rest(read: Scene, linkage: Linkage) -> Pose:
     """Where the run of a scene comes to rest within LONGEST, with what its hand presses there.
     Raises InputFault where it fails, or keeps moving."""
     hyperperiod(timeline(read))  # refuses rates without one
-    run = simulated(read, {"duration": LONGEST, "stop_when": ""})
+    run = simulate_scene(read, {"duration": LONGEST, "stop_when": ""})
     if run.record.fault:
         raise InputFault(f"the run does not come to rest: {run.record.fault.message}")
-    table = _recorded(run)
+    table = _read_poses(run)
     rates = table[JOINT_RATES][int((1.0 - LATE) * len(table["time"])) :]
     fastest = np.abs(rates).max(axis=0)
     if (speed := float(fastest.max())) > AT_REST:
@@ -195,34 +195,36 @@ def _own_equilibria(read: Scene) -> Iterator[tuple[Options, Joints | None, Hand 
     """The options of `in_own_hand`, its pose and its hand, in the order in which they are tried."""
     if not presses(read):
         yield (), None, None
-    if read.linkage is None or read.hand is None or replaced(read):
+    if read.linkage is None or read.hand is None or is_hand_replaced(read):
         return
-    leads = settled if presses(read) else lambda *scene: [rest(*scene)]
+    leads = find_rest_poses if presses(read) else lambda *scene: [rest(*scene)]
     for pose in leads(read, read.linkage):
-        yield pose.held, pose.joints, own_hand(read.hand)
+        yield pose.held, pose.joints, linearise_hand(read.hand)
 
 
 def presses(read: Scene) -> bool:
     """Whether the hand of a scene is a constant wrench, but none of 0."""
-    return isinstance(read.hand, ConstantHand) and any(read.hand.wrench) and not replaced(read)
+    return (
+        isinstance(read.hand, ConstantHand) and any(read.hand.wrench) and not is_hand_replaced(read)
+    )
 
 
-def replaced(read: Scene) -> bool:
+def is_hand_replaced(read: Scene) -> bool:
     """Whether an FMU of others is in place of the hand."""
     return any(f.replaces == HAND for f in read.fmu)
 
 
-def visited(run: Results) -> tuple[Matrix, Matrix]:
+def visited_poses(run: Results) -> tuple[Matrix, Matrix]:
     """The poses of the operational point, (k, 3), and the joint coordinates, (k, n), of a run.
     Raises InputFault as `evenly_spaced`."""
-    table = _recorded(run)
+    table = _read_poses(run)
     return table[POINT_POSE], table[JOINT_COORDINATES]
 
 
 def _average(run: Results, linkage: Linkage, since: float) -> Pose:
     """The mean pose over the part of a run from `since` (0 to 1) of it on. Raises InputFault as
     `evenly_spaced`."""
-    table = _recorded(run)
+    table = _read_poses(run)
     n = len(table["time"])
     part = slice(min(n - 1, int(since * n)), n)
     end = _pose(run, linkage, n - 1)
@@ -233,7 +235,7 @@ def _average(run: Results, linkage: Linkage, since: float) -> Pose:
     )
 
 
-def _recorded(run: Results) -> Table:
+def _read_poses(run: Results) -> Table:
     table = table_of(run, POINT_POSE)
     if table is None or JOINT_COORDINATES not in table or not len(table["time"]):
         raise InputFault(
@@ -248,7 +250,7 @@ def _force(table: Table) -> Matrix:
 
 
 def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
-    table = _recorded(run)
+    table = _read_poses(run)
     users = [user for user in run.record.scene.get("devices", {}) if _point(user) in table]
     return Pose(
         float(table["time"][i]),

@@ -14,7 +14,7 @@ from hapticlink.analysis.search.settings import Gains, Scales
 from hapticlink.analysis.stability.equilibrium import equilibrium
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import spring_hand
-from hapticlink.analysis.stability.lifted_map import LiftedMap, lifted_map, long_enough
+from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
@@ -35,7 +35,7 @@ SURE = 0.01
 """Uncertainty of an eigenvalue below which it may count as 1."""
 
 
-def _felt(mode: Mode) -> bool:
+def _is_felt(mode: Mode) -> bool:
     """Whether a mode that grows is more than a drift."""
     return kind(mode.growth, mode.omega / (2 * np.pi), DRIFT) != "drift"
 
@@ -92,7 +92,7 @@ class RestingScene:
         # An error as large as z says nothing of z = 1.
         counted = [mode for mode in all_modes if not (mode.neutral and mode.uncertainty < SURE)]
         return bool(counted) and not any(
-            mode.growth > 0.0 and _felt(period.traced(mode)) for mode in counted
+            mode.growth > 0.0 and _is_felt(period.traced(mode)) for mode in counted
         )
 
     def signal(self, port: str) -> Matrix:
@@ -154,7 +154,7 @@ def resting_system(
 
         def rested(scale: float) -> RestingScene:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
-            map_ = stack.enter_context(lifted_map(softer, read))
+            map_ = stack.enter_context(open_lifted_map(softer, read))
             return RestingScene(map_, gains, T, start, scale)
 
         try:

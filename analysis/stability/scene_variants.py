@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
-from hapticlink.analysis.stability.modes import counted, modes, verdict
+from hapticlink.analysis.stability.modes import judged_modes, modes, verdict
 from hapticlink.analysis.stability.poses import in_own_hand
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.smooth_scene import linearisable
@@ -80,7 +80,7 @@ class SceneVariants:
         self._starts = starts
         hands = {HAND: hand_slopes(self._hand, self._place.T)} if self._hand else {}
         period = self._place.period({}).held(hands)
-        leading = counted(modes(period.linear, self._place.map.period))[:1]
+        leading = judged_modes(modes(period.linear, self._place.map.period))[:1]
         radius, uncertainty = (abs(leading[0].z), leading[0].uncertainty) if leading else (0.0, 0.0)
         return Radius(radius, uncertainty, self._place.map.period)
 

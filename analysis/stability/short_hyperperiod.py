@@ -20,10 +20,10 @@ def short(read: Scene) -> tuple[Scene, str]:
     period = repetition(read)
     if read.graphics is None or period * float(read.haptics.rate) <= EVENTS:
         return read, ""
-    return rounded(read)
+    return round_rate(read)
 
 
-def rounded(read: Scene) -> tuple[Scene, str]:
+def round_rate(read: Scene) -> tuple[Scene, str]:
     """A scene that has a graphics rate in whole frames, and a sentence that says so. Raises
     InputFault for one that varies."""
     whole = float(exact(read.haptics.rate)) / frame_length(read)

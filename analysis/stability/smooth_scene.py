@@ -22,7 +22,7 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.orchestrator.system.system import Fmu, System
 
 Joints = Mapping[str, float | list[float]]
@@ -41,9 +41,9 @@ def linearisable(
     """The scene with `options`, its system without quantisation, friction and passivity
     controllers, and a line of text on each that was removed; with `joints`, at rest in that pose.
     Within the context signals are deferred, and numbers that overflow raise no warnings."""
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+    with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         read = open_scene.load(scene, options)
-        with built(read) as whole:
+        with build_system(read) as whole:
             if joints is not None and read.linkage is not None:
                 whole = at_rest(whole, read.linkage, joints)
             yield read, *frozen_nonlinearities.without(whole)

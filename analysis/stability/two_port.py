@@ -119,7 +119,7 @@ def rounded_up(damping: float) -> str:
     return f"{float(np.ceil(damping * 10.0**digits * (1.0 - 1e-9)) / 10.0**digits):.5g}"
 
 
-def judged(
+def judge_ports(
     ports: Sequence[tuple[float, Hybrid]],
     period: float,
     turns: float,

@@ -16,7 +16,7 @@ import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import behind_start, lifted_map
+from hapticlink.analysis.stability.lifted_map import behind_start, open_lifted_map
 from hapticlink.analysis.stability.linear_period import linear_period
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.switching import (
@@ -135,7 +135,7 @@ def varying_stability(scene: str | Path | Scene, options: Options = ()) -> Varyi
         exponent=exponent,
         confidence=width,
         seed=seed,
-        frozen=(*removed, *frozen_nonlinearities.kept(system)),
+        frozen=(*removed, *frozen_nonlinearities.describe_switches(system)),
     )
 
 
@@ -157,7 +157,7 @@ def edges_of(scene: Scene | None, system: System, place: int, lengths: list[int]
     """The matrices of frames of the clock at `place`, of equally probable lengths (ticks)."""
     middle = lengths[len(lengths) // 2]
     seconds = system.timeline.seconds
-    with lifted_map(alternating(system, place, middle, middle), scene) as map_:
+    with open_lifted_map(alternating(system, place, middle, middle), scene) as map_:
         point = equilibrium(map_, map_.start).point
         V = np.stack(list(map_.directions(point)), axis=1)
 
@@ -201,7 +201,7 @@ def alternating(
     whole, count = ends[-1], len(cycle)
     starts = [0, *ends[:-1]]
     base = system.timeline
-    rounds = 4 + -(-_settled(system) // whole)
+    rounds = 4 + -(-_settling_ticks(system) // whole)
     frames = Frames(lambda i: i // count * whole + starts[i % count], (rounds + 2) * count, count)
     paces = list(base.clocks)
     paces[place] = Clock(paces[place].name, frames)
@@ -212,7 +212,7 @@ def alternating(
     return replace(system, timeline=Timeline(base.base, rounds * whole, tuple(paces), base.of))
 
 
-def _settled(system: System) -> int:
+def _settling_ticks(system: System) -> int:
     """Ticks after which frames are taken: so many that lengths, which holds keep beside stamps, are
     far smaller than those, and slopes of one length are not taken for another
     (forward_sensitivity.py)."""
@@ -226,6 +226,6 @@ def window(system: System, place: int) -> tuple[int, int]:
     i = next(
         i
         for i in range(len(frames))
-        if i % frames.round == frames.round - 1 and frames[i] >= _settled(system)
+        if i % frames.round == frames.round - 1 and frames[i] >= _settling_ticks(system)
     )
     return frames[i], frames[i + 1] - frames[i]

@@ -112,10 +112,10 @@ class Stability:
             calm = f"stable in {len(held - edge)} of {hands} and marginal in the others, {in_poses}"
         worst = self.worst
         if self.verdict == "unstable":
-            return f"unstable: {_named(worst)}"
+            return f"unstable: {_name_case(worst)}"
         if self.verdict == "drifts":
             where = f"in {hands} and {in_poses}"
-            return f"drifts slowly, and does not vibrate, {where}: {_named(worst)}"
+            return f"drifts slowly, and does not vibrate, {where}: {_name_case(worst)}"
         if self.verdict == "not held":
             loose = max((c for c in self.cases if c.free), key=lambda c: c.severity)
             if loose.verdict != "unstable":
@@ -126,7 +126,7 @@ class Stability:
                 ends = f"small motions decay with about {self.damping:.2g} N.s/m of damping"
             return f"not held: in free air it {does} at {loose.growth:.2g} 1/s, and {ends}; {calm}"
         if self.verdict == "marginal":
-            return f"{calm}: {_named(worst)}"
+            return f"{calm}: {_name_case(worst)}"
         return f"{calm}; slowest to decay at {-worst.growth:.3g} 1/s, {_where(worst)}"
 
     def __str__(self) -> str:
@@ -206,6 +206,6 @@ def _where(case: Case) -> str:
     return f"in {case.hand} at {case.pose}"
 
 
-def _named(case: Case) -> str:
+def _name_case(case: Case) -> str:
     how = "grows" if case.growth > 0.0 else "decays"
     return f"{case.kind} of {case.hertz:.3g} Hz {how} at {abs(case.growth):.3g} 1/s {_where(case)}"

@@ -52,7 +52,7 @@ def passive_damping(T: float, periods: int, K: Matrix, B: Matrix) -> Matrix:
     return found
 
 
-def delayed(b: float, T: float, delay: float, B: float = 0.0) -> float:
+def limit_with_delay(b: float, T: float, delay: float, B: float = 0.0) -> float:
     """K = (b + B)/(T/2 + t_d), up to which the wall is stable for small gains, t_d (s) the delay.
 
     Gil, Avello, Rubio, Florez, IEEE Trans. Control Systems Technology 12 (2004), 583, with the
@@ -63,7 +63,7 @@ def delayed(b: float, T: float, delay: float, B: float = 0.0) -> float:
     return max(0.0, (b + B) / (T / 2.0 + delay))
 
 
-def quantised(b: float, T: float, friction: float, quantum: float) -> float:
+def limit_with_quantum(b: float, T: float, friction: float, quantum: float) -> float:
     """K = min(2 b/T, 2 f_c/quantum), up to which a wall without damper is passive although the
     position is measured in whole quanta.
 
@@ -75,7 +75,7 @@ def quantised(b: float, T: float, friction: float, quantum: float) -> float:
     return min(2.0 * b / T, 2.0 * friction / quantum)
 
 
-def undamped(m: float, T: float, B: float) -> float:
+def limit_without_damping(m: float, T: float, B: float) -> float:
     """The stability limit for b = 0 without delay: with alpha = K T^2/m and beta = B T/m < 2,
 
         z^3 + (-2 + (alpha + beta)/2) z^2 + (1 + alpha/2) z - beta/2
@@ -88,7 +88,7 @@ def undamped(m: float, T: float, B: float) -> float:
     return max(0.0, 2.0 * beta * (2.0 - beta) / (2.0 + beta)) * m / T**2
 
 
-def undamped_measured(T: float, B: float) -> float:
+def limit_with_measured_velocity(T: float, B: float) -> float:
     """K = 2 B/T, the stability limit for b = 0 with a velocity that is read directly and
     B < 2 m/T (`damper`): the map of (x, v) over T has the determinant 1 - beta + alpha/2."""
     _require_positive(T=T)

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hapticlink.analysis.findings.contact_warnings import PRESSED
-from hapticlink.analysis.stability.poses import Pose, by_joint, visited
+from hapticlink.analysis.stability.poses import Pose, by_joint, visited_poses
 from hapticlink.components.contact.depth import depths
 from hapticlink.components.device.workspace import margin
 from hapticlink.components.linkage.inverse_kinematics import InverseKinematics, Reached
@@ -34,7 +34,7 @@ CLOSED = 1e-9
 def grid_poses(run: Results, read: Scene, linkage: Linkage, count: int) -> list[Pose]:
     """The poses at `count` times `count` places around a `run` of a scene, named by the place in
     mm; a scene without [device] has the reach of its linkage."""
-    points, coordinates = visited(run)
+    points, coordinates = visited_poses(run)
     widened = mean_link_length(linkage) / 2
     low, high = points[:, :2].min(axis=0) - widened, points[:, :2].max(axis=0) + widened
     cell = (high - low) / count
@@ -56,7 +56,7 @@ def grid_poses(run: Results, read: Scene, linkage: Linkage, count: int) -> list[
                     break
         known += [(there.point[:2], there.q) for there in reached.values()]
         for there in reached.values():
-            if _allowed(read, linkage, there):
+            if _is_allowed(read, linkage, there):
                 pose = _pose(read, linkage, there)
                 poses.setdefault(pose.name, pose)
         if not reached:
@@ -64,7 +64,7 @@ def grid_poses(run: Results, read: Scene, linkage: Linkage, count: int) -> list[
         left = [place for i, place in enumerate(left) if i not in reached]
 
 
-def _allowed(read: Scene, linkage: Linkage, reached: Reached) -> bool:
+def _is_allowed(read: Scene, linkage: Linkage, reached: Reached) -> bool:
     """Whether the devices reach a pose, joints are within their limits, and nothing is inside an
     obstacle."""
     for user, device in read.all_devices.items():

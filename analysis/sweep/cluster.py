@@ -34,7 +34,7 @@ def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
         left = set(futures)
         try:
             while left:
-                interrupt.check()
+                interrupt.raise_if_interrupted()
                 with suppress(TimeoutError):
                     wait(left, timeout=0.2, return_when="FIRST_COMPLETED")
                 for future in [future for future in left if future.done()]:

@@ -59,10 +59,10 @@ def job(
 ) -> Job:
     """The job of `scene` with `options`, listed in the table as `point`. Raises Interrupted for a
     signal."""
-    interrupt.check()  # 100,000 points take minutes
+    interrupt.raise_if_interrupted()  # 100,000 points take minutes
     try:
         loaded = open_scene.load(scene, options)
-        return Job(point, loaded, key(loaded), plugins=tuple(plugins.loaded()))
+        return Job(point, loaded, key(loaded), plugins=tuple(plugins.list_plugins()))
     except Fault as fault:
         return Job(point, None, refusal=str(fault))
 
@@ -70,7 +70,7 @@ def job(
 def key(scene: Scene) -> str:
     """SHA-256 of everything that a run depends on: the resolved scene, its FMU files, versions and
     sources, also those of plugins. Raises InputFault for an FMU file that cannot be read."""
-    computed_with = [*_computed_with(), plugins.loaded()]
+    computed_with = [*_list_code(), plugins.list_plugins()]
     whole: dict[str, Any] = {"scene": scene.plain(), "made_with": computed_with}
     try:
         paths = [Path(f.path) for f in scene.fmu if f.path]
@@ -81,7 +81,7 @@ def key(scene: Scene) -> str:
 
 
 @cache
-def _computed_with() -> list[str]:
+def _list_code() -> list[str]:
     """What computes a row: Python, packages and sources, in C too, but nothing that only draws."""
     code = sources(
         hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.analysis

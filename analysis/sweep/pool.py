@@ -39,24 +39,26 @@ def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
     processes have ended."""
     queue = deque(jobs)
     while queue:
-        suspects = yield from _spread(work, queue, count)
+        suspects = yield from _run_in_processes(work, queue, count)
         for job in suspects:
-            if (yield from _spread(work, deque([job]), 1)):
+            if (yield from _run_in_processes(work, deque([job]), 1)):
                 yield job, failed(DIED, "the process of this run crashed")
 
 
-def _spread(work: Work, queue: deque[Job], count: int) -> Generator[Done, None, list[Job]]:
+def _run_in_processes(
+    work: Work, queue: deque[Job], count: int
+) -> Generator[Done, None, list[Job]]:
     """Runs jobs from `queue` until it is empty; if a process dies, returns the jobs in progress."""
     in_progress: dict[Future[Row], Job] = {}
     with _executor(min(count, len(queue))) as pool:
         while queue or in_progress:
             try:
                 while queue and len(in_progress) < count:
-                    with _signals_blocked():
+                    with _block_signals():
                         in_progress[pool.submit(work, queue[0])] = queue[0]
                     queue.popleft()
                 ready = wait(in_progress, timeout=0.2, return_when=FIRST_COMPLETED).done
-                interrupt.check()
+                interrupt.raise_if_interrupted()
                 for future in ready:
                     row = future.result()
                     yield in_progress.pop(future), row
@@ -79,11 +81,11 @@ class _Worker(SpawnProcess):
             sys.modules["__main__"] = main
 
     def run(self) -> None:
-        process.search_cycles_seldom()
-        process.search_none_of_these()  # what is loaded by now
-        with process_cache.unpacked_once():
+        process.raise_gc_threshold()
+        process.freeze_gc()  # what is loaded by now
+        with process_cache.keep_unpacked():
             super().run()
-        process.search_none_of_these()
+        process.freeze_gc()
         process.leave_threads(0)
 
 
@@ -124,7 +126,7 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def _signals_blocked() -> Iterator[None]:
+def _block_signals() -> Iterator[None]:
     """Processes and threads that are created in this context get no Ctrl-C from the terminal, not
     even during their imports."""
     if sys.platform == "win32":

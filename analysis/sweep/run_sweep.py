@@ -71,7 +71,7 @@ def run(job: Job, results: Path, measure: Measure = measure) -> Row:
 def _room(job: Job, folder: Path | None) -> Iterator[Path]:
     """Where the results of a job are, if they are in files: a folder that is created by them."""
     if folder is None:
-        with temporary_folders.room() as room:
+        with temporary_folders.temporary_folder() as room:
             yield room
         return
     room = folder / job.key
@@ -104,7 +104,7 @@ def sweep(
     return tabulate(jobs, folder, judge, processes, scheduler=scheduler, tell=tell)
 
 
-@interrupt.held()
+@interrupt.defer_signals()
 def tabulate(
     jobs: Sequence[Job],
     folder: Path,

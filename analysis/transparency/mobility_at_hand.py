@@ -26,7 +26,7 @@ import numpy as np
 
 from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.port_response import hand_port, response
-from hapticlink.analysis.stability.poses import Pose, evenly_spaced, fault_of, simulated
+from hapticlink.analysis.stability.poses import Pose, choose_evenly_spaced, fault_of, simulate_scene
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.tune.felt_stiffness import CONSTRAINED, RIGID, mobility
@@ -37,7 +37,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
-from hapticlink.orchestrator.base.terminal_output import aligned
+from hapticlink.orchestrator.base.terminal_output import align_columns
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
@@ -116,13 +116,13 @@ class Transparency:
                 inert = f"a spring of {short(-felt.real * w * w)} N/m"
             turned = f", turned by {short(float(at_slow(d.angle)))} degrees" * (felt.real > 0.0)
             yield (
-                f"  along {_named(d.along)} a mechanism of {short(d.inertia)} kg is felt as "
-                f"{inert} and {short(-w * felt.imag)} N.s/m at {SLOW:g} Hz{turned}; right "
+                f"  along {_name_direction(d.along)} a mechanism of {short(d.inertia)} kg is felt "
+                f"as {inert} and {short(-w * felt.imag)} N.s/m at {SLOW:g} Hz{turned}; right "
                 f"up to {_hertz(d.right_up_to)}"
             )
         for c in self.constrained:
             stiff = "rigid" if np.isinf(c.slow) else f"{short(c.slow)} N/m at {SLOW:g} Hz"
-            yield f"  against {_named(c.along)}, which is constrained: {stiff}"
+            yield f"  against {_name_direction(c.along)}, which is constrained: {stiff}"
         if self.constrained and self.free:
             yield (
                 f"  Z-width (constrained over free impedance at {SLOW:g} Hz): {_width(self.width)}"
@@ -160,12 +160,12 @@ def transparency(
     again, with frames of whole haptic periods. Raises InputFault for a scene without device,
     controller or linkage, and where no pose has an equilibrium."""
     read = open_scene.load(scene, options)
-    poses, whole = _visited(read, count), whole_frames(read)
+    poses, whole = _visit_poses(read, count), whole_frames(read)
     found, why = [], ""
     for pose in poses:
         try:
             with resting(whole, pose.held, joints=pose.joints) as place:
-                found.append(_felt(read, place, pose.name, {}))
+                found.append(_measure_felt(read, place, pose.name, {}))
         except (InputFault, FmuFault) as fault:
             why = f"{pose.name}: {fault}"
     if not found:
@@ -173,17 +173,17 @@ def transparency(
     return found
 
 
-def _visited(read: Scene, count: int) -> list[Pose]:
+def _visit_poses(read: Scene, count: int) -> list[Pose]:
     """Poses of the scene's own run, which is said where it fails."""
     linkage = _linkage(read)
-    run = simulated(read)
+    run = simulate_scene(read)
     if why := fault_of(run):
         warning = "warning: the scene's own run fails: %s; its poses are those up to there"
         logging.getLogger(__name__).warning(warning, why)
-    return evenly_spaced(run, linkage, count)
+    return choose_evenly_spaced(run, linkage, count)
 
 
-def _felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
+def _measure_felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
     cut = response(place.period(scales), hand_port(place.map.system))
     X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
     return of(read.title, name, X, mobility(place), mean_link_length(_linkage(read)))
@@ -249,7 +249,7 @@ def costs(
     """How the scene feels at its start with other rates, delays and holds, and how stiff it can be
     made."""
     read = open_scene.load(scene, options)
-    pose = _visited(read, 1)[0]
+    pose = _visit_poses(read, 1)[0]
     rate = float(exact(read.haptics.rate))
     late = {"motors": ("controller.F_motor",), "handle": ("haptic_device.x", "haptic_device.v")}
     late["mechanism"] = ("virtual_mechanism.x", "virtual_mechanism.v")
@@ -275,12 +275,15 @@ def costs(
 
 
 def _cost(read: Scene, place: RestingScene, change: str) -> Cost:
-    felt = _felt(read, place, change, {})
+    felt = _measure_felt(read, place, change, {})
     try:
         judge = Judge({change: place})
         times = judge.margin({})
         return Cost(
-            change, felt, times, _felt(read, place, change, dict.fromkeys(judge.laws, times))
+            change,
+            felt,
+            times,
+            _measure_felt(read, place, change, dict.fromkeys(judge.laws, times)),
         )
     except (InputFault, FmuFault):
         return Cost(change, felt, None, None)
@@ -298,7 +301,7 @@ def cost_lines(found: Sequence[Cost]) -> Iterator[str]:
     for cost in found:
         rows.setdefault(cost.cells(), []).append(cost.change)
     table = [HEADS, *((", ".join(names), *cells) for cells, names in rows.items())]
-    yield from aligned(table)
+    yield from align_columns(table)
 
 
 def _stiffness(felt: Transparency) -> str:
@@ -340,6 +343,6 @@ def _hertz(frequency: float) -> str:
     return f"{short(frequency)} Hz" if frequency else f"less than {HERTZ[0]:g} Hz"
 
 
-def _named(along: Vector) -> str:
+def _name_direction(along: Vector) -> str:
     x, y, turn = along if along[int(np.argmax(np.abs(along)))] > 0 else -along
     return f"({x:.2f}, {y:.2f}; {turn:.2f})"

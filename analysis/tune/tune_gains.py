@@ -30,7 +30,12 @@ import numpy as np
 from hapticlink.analysis.search.acceptance import METRIC, PEAK, Limits, judged_numbers
 from hapticlink.analysis.search.search import COARSE, FINE, raise_laws
 from hapticlink.analysis.search.settings import Scales
-from hapticlink.analysis.stability.poses import Pose, at_equilibrium, evenly_spaced, simulated
+from hapticlink.analysis.stability.poses import (
+    Pose,
+    at_equilibrium,
+    choose_evenly_spaced,
+    simulate_scene,
+)
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.analysis.sweep.row import Row
@@ -75,7 +80,7 @@ def tune(
     if not margin >= 1.0:
         raise InputFault(f"margin {margin:g}: give 1 or more, the factor up to instability")
     tell, keep = tell or (lambda text: None), keep or (lambda tuned: None)
-    with interrupt.held(), np.errstate(invalid="ignore", over="ignore"):
+    with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         tuning = _Tuning(open_scene.load(scene, options), margin, tell, keep)
         scales = tuning.judge_at_own_rates(tuning.search())
         tuning.judge_at_near_rates(scales)
@@ -106,8 +111,8 @@ class _Tuning:
         haptic periods."""
         quick = whole_frames(self._read)
         self._tell("the scene's own run, for its poses")
-        run = simulated(self._read)
-        moments = evenly_spaced(run, self._linkage, POSES)
+        run = simulate_scene(self._read)
+        moments = choose_evenly_spaced(run, self._linkage, POSES)
         with at_equilibrium(quick, moments, self._tell) as (resting, held):
             pressed = [pose for pose in resting if pose.touches]
             if any(pose.touches for pose in moments) and not pressed:
@@ -206,7 +211,7 @@ class _Tuning:
         self._keep(result)
 
     def _run(self, feel: Feel, scales: Scales) -> Row:
-        return judged_numbers(simulated(self._read, feel.gains.options(scales)))
+        return judged_numbers(simulate_scene(self._read, feel.gains.options(scales)))
 
     def _at_equilibrium(
         self, read: Scene

@@ -125,5 +125,5 @@ class Tuned:
                 f"{gains} gains: along the run, {far}, "
                 f"at most {1e3 * run['energy_peak']:.3g} mJ generated at the user's port"
             )
-        for option in overrides.written(self.gains):
+        for option in overrides.write_options(self.gains):
             yield f"--set '{option}'" if "[" in option else f"--set {option}"

@@ -64,7 +64,7 @@ class _Rate:
     end: float
 
     def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         return self.loop.rate(min(t, self.end), y, self.mode)
 
 

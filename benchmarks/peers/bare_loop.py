@@ -41,10 +41,10 @@ def seconds(scene: str, options: list[str], steps: int, folder: Path) -> float:
     from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
     from hapticlink.orchestrator.results.run_results import RunResults
     from hapticlink.orchestrator.run.simulation import Simulation
-    from hapticlink.orchestrator.system.build_system import built
+    from hapticlink.orchestrator.system.build_system import build_system
 
     run = bare_loop(folder).loop
-    with built(open_scene.load(scene, options)) as system, ExitStack() as stack:
+    with build_system(open_scene.load(scene, options)) as system, ExitStack() as stack:
         simulation = Simulation(system, RunResults(), stack)
         simulation.start()
         kept: list[object] = []

@@ -121,7 +121,7 @@ def _plant(block: Block) -> ca.Function:
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])
 
 
-def _moved(block: Block, tau: ca.SX, substeps: int) -> ca.SX:
+def advance_device(block: Block, tau: ca.SX, substeps: int) -> ca.SX:
     """[x_true, v_true] after h, with the torques tau and the hand's wrench held."""
     plant, h, inputs = _plant(block), block.h / substeps, ca.vertcat(tau, block.u["F_hand"])
     motion = ca.vertcat(block.x["x_true"], block.x["v_true"])
@@ -178,7 +178,7 @@ def haptic_device(device: Device, encoders: bool = False) -> Component:
         else (x["x_true"], x["v_true"], u["F_hand"])
     )
     tau = pantograph.motor_torques(u["F_motor"], pose, p)
-    motion = _moved(block, tau, device.substeps)
+    motion = advance_device(block, tau, device.substeps)
     initial = {"x_true": p["x_start"], "v_true": ca.SX.zeros(SPACE.size)}
     step = {"x_true": motion[:3], "v_true": motion[3:]}
     if measured:

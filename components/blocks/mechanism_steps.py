@@ -141,7 +141,7 @@ class MechanismSteps(MechanicalSystem):
 
     @cached_property
     def _further_points(self) -> list[further_points.Pushed]:
-        return further_points.pushed(self._model, self._block.u)
+        return further_points.forces_at_points(self._model, self._block.u)
 
     @cached_property
     def _displacements(self) -> ca.SX:

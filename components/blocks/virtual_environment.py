@@ -83,7 +83,7 @@ def virtual_environment(
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:
-        output["contacts"] = contact_forces.detected(model, contacts)
+        output["contacts"] = contact_forces.detect_contacts(model, contacts)
     if local_model:
         output |= held_matrices.values(model)
     component = block.component(

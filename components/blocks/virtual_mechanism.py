@@ -34,7 +34,7 @@ from hapticlink.components.dynamics import (
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.constrained_directions import ConstrainedDirections
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
-from hapticlink.components.dynamics.massless_bodies import carried, notes, require_inertia
+from hapticlink.components.dynamics.massless_bodies import notes, refuse_jumps, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import (
     direction_outputs,
@@ -181,7 +181,7 @@ class _Equations:
         pose = block.x["q"], block.x["qd"]
         deflection = block.x.get("deflection")
         self.model = LinkageModel(parts.linkage, block.p, *pose, tabled, block.t, deflection)
-        held = local_model.held(self.model, block.u) if parts.frame_s else None
+        held = local_model.held_terms(self.model, block.u) if parts.frame_s else None
         self._space = OperationalSpace(self.model, held)
         drawn = self._space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
         self._others = further_points.efforts(self.model, block.u)
@@ -201,7 +201,7 @@ class _Equations:
         places = (
             touches(model, contacts, block.p)
             if contacts.detection == "haptics"
-            else contact_forces.held(model, contacts, block.u["contacts"])
+            else contact_forces.held_contacts(model, contacts, block.u["contacts"])
         )
         return ContactForces(model, contacts, block.p, places, block.x.get("contact_deflection"))
 
@@ -226,7 +226,7 @@ class _Equations:
         steps = MechanismSteps(self._block, parts.mechanism, self._space, *acting)
         after = integrators.mechanism_step(parts.method, steps)
         if k := model.deflection.numel():
-            after[2 * n : 2 * n + k] = friction.bounded(model, after[2 * n : 2 * n + k])
+            after[2 * n : 2 * n + k] = friction.clip_deflection(model, after[2 * n : 2 * n + k])
         return after
 
     @cached_property
@@ -264,7 +264,7 @@ class _Equations:
         )
         counted = (x[name] for name in method.counters)
         return ca.vertcat(
-            carried(self.model, moved[:n], moved[n : 2 * n], self._block.h),
+            refuse_jumps(self.model, moved[:n], moved[n : 2 * n], self._block.h),
             moved[n:],
             ca.vertcat(ca.SX(0, 1), *counted) + growth,
             *(directed.after for directed in self._directions.values()),

@@ -93,7 +93,7 @@ def gap(model: LinkageModel, touch: Touch) -> ca.SX:
     return ca.dot(touch.normal, point - touch.plane) - model.p[f"{touch.body}.radius"]
 
 
-def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
+def detect_contacts(model: LinkageModel, contacts: Contacts) -> ca.SX:
     """The rows of the `contacts` port at the model's pose; a place is active within the margin."""
     rows = []
     for touch in touches(model, contacts, model.p):
@@ -104,7 +104,7 @@ def detected(model: LinkageModel, contacts: Contacts) -> ca.SX:
     return ca.vertcat(*rows)
 
 
-def held(model: LinkageModel, contacts: Contacts, rows: ca.SX) -> list[Touch]:
+def held_contacts(model: LinkageModel, contacts: Contacts, rows: ca.SX) -> list[Touch]:
     """The places given by the rows of the `contacts` port, whose planes move with their bodies."""
     touching = []
     pairs = [pair for pair in near(model.linkage, contacts) for _ in range(pair.places)]
@@ -173,7 +173,9 @@ class ContactForces(OneSidedForces):
         pushes, rubs = self._pushes(laws), ca.SX(len(self.sides), 1)
         if self._z is not None:
             breaks, tau = self._breaks(pushes), self._p["tau_contact"]
-            rubs = -self._p["k_contact"] * dry_friction.held(self._z, self._slides, breaks, tau)
+            rubs = -self._p["k_contact"] * dry_friction.friction_effort(
+                self._z, self._slides, breaks, tau
+            )
         wrenches: dict[str, ca.SX] = {}
         for i, (touch, arms) in enumerate(zip(self._touches, self._arms, strict=True)):
             F = touch.normal * pushes[i] + _along(touch) * rubs[i]

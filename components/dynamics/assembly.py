@@ -60,7 +60,7 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
         q = newton(q, parameters)
     solvers = [least]
     if model.linkage.start_velocity:
-        Z = ca.diag(ca.SX(1.0 - _given(model.linkage)))
+        Z = ca.diag(ca.SX(1.0 - given_rates(model.linkage)))
         solvers = [ClosedLoopSolver(UnitInertia(n), ca.sparsify(symbolic.W @ Z), count, MU), least]
     for project in map(projected, solvers):
         for _ in range(RATE_STEPS):
@@ -75,7 +75,7 @@ def start_coordinates(linkage: Linkage) -> NDArray[np.float64]:
     return np.array(ca.Function("start", [p.vector], [q])(p.starts)).ravel()
 
 
-def _given(linkage: Linkage) -> NDArray[np.bool_]:
+def given_rates(linkage: Linkage) -> NDArray[np.bool_]:
     """Whether `start_velocity` gives the rate of each coordinate, (n,)."""
     named = {j.name: (1.0,) * j.kind.size for j in linkage.joint}
     given = {name: value for name, value in named.items() if name in linkage.start_velocity}
@@ -100,7 +100,7 @@ def require_assembled(component: Component, model: LinkageModel) -> None:
             )
     wanted = np.array(coordinates(model.linkage, model.linkage.start_velocity))
     largest = np.abs([*wanted, *qd]).max(initial=0.0)
-    if (np.abs(qd - wanted) > TOLERANCE * largest)[_given(model.linkage)].any():
+    if (np.abs(qd - wanted) > TOLERANCE * largest)[given_rates(model.linkage)].any():
         raise AssemblyError(
             f"`linkage.start_velocity` gives {', '.join(_rates(model.linkage, wanted))}, and the "
             "loops do not allow these rates together: leave out those that follow from others, or "

@@ -52,7 +52,7 @@ def eigen(A: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.diag(A), V
 
 
-def locked(open_mobility: ca.SX) -> ca.SX:
+def locking_threshold(open_mobility: ca.SX) -> ca.SX:
     """The eigenvalue (1/kg) below which a direction is locked, from S J D^-1 J' S of the linkage
     with open loops."""
     return LOCKED * ca.trace(open_mobility)
@@ -123,7 +123,7 @@ def constrained_directions(
     S = scaling(space.model.linkage.space, p["length_scale"])
     mobility = space.Lambda_inv if J is None else space.mobility(J)
     opened = space.open_mobility(space.terms.J_h if J is None else J)
-    given, both = (block.u.vector, p.vector), [S @ mobility @ S, locked(S @ opened @ S)]
+    given, both = (block.u.vector, p.vector), [S @ mobility @ S, locking_threshold(S @ opened @ S)]
     scaled = ca.Function("scaled", [q, *given], both, {"cse": True})
     tolerance, hysteresis = p["rank_tolerance"], p["hysteresis"]
 

@@ -10,7 +10,12 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.dynamics.constrained_directions import eigen, largest, locked, scaling
+from hapticlink.components.dynamics.constrained_directions import (
+    eigen,
+    largest,
+    locking_threshold,
+    scaling,
+)
 from hapticlink.components.port_space import PortSpace
 
 # Directions with an eigenvalue below this share of the largest one are left out of F_env, and so
@@ -36,7 +41,7 @@ def equivalent_wrench(
     open_mobility is J D^-1 J' of the linkage with open loops."""
     S = scaling(space, length_scale)
     values, vectors = eigen(S @ Lambda_inv @ S)
-    least = locked(S @ open_mobility @ S)
+    least = locking_threshold(S @ open_mobility @ S)
     mobile = values > ca.fmax(RANK * largest(values), least)
     inverse = ca.if_else(mobile, 1 / ca.if_else(mobile, values, 1), 0)
     return S @ (vectors @ (inverse * (vectors.T @ (S @ acceleration))))

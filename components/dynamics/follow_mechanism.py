@@ -63,7 +63,7 @@ def step(block: Block, model: LinkageModel, copy: GraphicsCopy) -> tuple[ca.SX, 
     """(q, qd) after a frame (exact) or a substep of it (pulled)."""
     if copy.sync == "exact":
         return _exact(block, model)
-    return _pulled(block, model, copy.sync == "joint")
+    return pull_copy(block, model, copy.sync == "joint")
 
 
 def _exact(block: Block, model: LinkageModel) -> tuple[ca.SX, ca.SX]:
@@ -73,7 +73,7 @@ def _exact(block: Block, model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     return q, qd
 
 
-def _pulled(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
+def pull_copy(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.SX, ca.SX]:
     u, p, h, q, qd = block.u, block.p, block.h, model.q, model.qd
     D = TreeInertia(model)
     if joint_sync:

@@ -75,7 +75,7 @@ class Pushed:
     wrench: ca.SX
 
 
-def pushed(model: LinkageModel, u: Signals) -> list[Pushed]:
+def forces_at_points(model: LinkageModel, u: Signals) -> list[Pushed]:
     """The further points, with the wrenches of hands and of virtual couplings."""
     points = []
     for point in model.linkage.point:
@@ -89,7 +89,7 @@ def pushed(model: LinkageModel, u: Signals) -> list[Pushed]:
 def efforts(model: LinkageModel, u: Signals) -> ca.SX:
     """Sum of J_k' F_k, n x 1."""
     Q = ca.SX(model.q.numel(), 1)
-    for point in pushed(model, u):
+    for point in forces_at_points(model, u):
         Q += ca.jtimes(point.x, model.q, point.wrench, True)
     return Q
 
@@ -110,7 +110,7 @@ def values(
 ) -> dict[str, ca.SX]:
     """The outputs; `applied` are the generalised forces (n x 1) of all wrenches and contacts."""
     model, outputs = space.model, dict[str, ca.SX]()
-    for point in pushed(model, block.u):
+    for point in forces_at_points(model, block.u):
         outputs[f"{point.name}.x"], outputs[f"{point.name}.v"] = point.x, model.rate(point.x)
         if mobility:
             outputs |= mobilities(space, (point.name,))

@@ -46,7 +46,7 @@ def _way(linkage: Linkage, body: str) -> set[str]:
     return way
 
 
-def own_inertia(joint: Joint, body: Body) -> list[float]:
+def smallest_inertia(joint: Joint, body: Body) -> list[float]:
     """The smallest inertia of a body at each coordinate of its joint (kg or kg.m2)."""
     arm = math.dist(body.center or (0.0, 0.0), joint.at_child or (0.0, 0.0))
     turning = body.inertia + body.mass * arm**2
@@ -66,7 +66,7 @@ def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
         mean = sum(b.mass + b.inertia / length**2 for b in moved) / len(moved)
         turning, light = [], []
         for joint in group:
-            for i, own in enumerate(own_inertia(joint, bodies[joint.child])):
+            for i, own in enumerate(smallest_inertia(joint, bodies[joint.child])):
                 index = model.coordinate(joint.name) + i
                 turns = joint.kind.freedoms[i].turns
                 turning += [index] if turns else []

@@ -69,7 +69,7 @@ def _at_start(linkage: Linkage) -> dict[str, tuple[float, ...]]:
     }
 
 
-def held(model: LinkageModel, u: Mapping[str, ca.SX]) -> Terms:
+def held_terms(model: LinkageModel, u: Mapping[str, ca.SX]) -> Terms:
     """The terms of (B.15) from the ports `u`."""
     n, loop = model.q.numel(), model.linkage.closed
     W = u["W"] if loop else ca.SX(0, n)

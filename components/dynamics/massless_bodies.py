@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.components.component import Component
-from hapticlink.components.dynamics.light_bodies import groups, own_inertia
+from hapticlink.components.dynamics.light_bodies import groups, smallest_inertia
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import mean_link_length
 
@@ -63,13 +63,13 @@ def massless_coordinates(model: LinkageModel) -> dict[int, tuple[str, float]]:
         for group in groups(model.linkage)
         for joint in group
         for i, (unit, own) in enumerate(
-            zip(joint.kind.units, own_inertia(joint, bodies[joint.child]), strict=True)
+            zip(joint.kind.units, smallest_inertia(joint, bodies[joint.child]), strict=True)
         )
         if own == 0
     }
 
 
-def carried(model: LinkageModel, q: ca.SX, qd: ca.SX, h: ca.SX) -> ca.SX:
+def refuse_jumps(model: LinkageModel, q: ca.SX, qd: ca.SX, h: ca.SX) -> ca.SX:
     """q, made NaN or infinite where a massless coordinate moves too far within h."""
     q = ca.SX(q)
     for i, (_, most) in massless_coordinates(model).items():

@@ -27,7 +27,7 @@ KINDS = (gravity, springs, joints, friction, drives)
 FORCES: Registry[type[Force]] = Registry("force", {}, lambda part: no_subclass(part, Force))
 
 
-def named(linkage: Linkage) -> tuple[Force, ...]:
+def make_forces(linkage: Linkage) -> tuple[Force, ...]:
     """The forces of [[linkage.force]]. Raises ValueError for an entry that is no `Force`."""
     for force in linkage.force:
         if not isinstance(force, Force):
@@ -38,7 +38,7 @@ def named(linkage: Linkage) -> tuple[Force, ...]:
 def parameters(linkage: Linkage) -> list[Variable]:
     """The parameters of all forces."""
     own = [v for kind in KINDS for v in kind.parameters(linkage)]
-    return own + [v for force in named(linkage) for v in force.parameters()]
+    return own + [v for force in make_forces(linkage) for v in force.parameters()]
 
 
 def efforts(model: LinkageModel, *, weight: bool = True) -> ca.SX:
@@ -49,7 +49,7 @@ def efforts(model: LinkageModel, *, weight: bool = True) -> ca.SX:
     kinds = [kind for kind in KINDS if weight or kind is not gravity]
     parts = [Q for kind in kinds if (Q := kind.efforts(model)) is not None]
     n = model.q.numel()
-    for force in named(model.linkage):
+    for force in make_forces(model.linkage):
         try:
             Q = ca.SX(force.efforts(model))
         except KeyError as error:  # of frames, joints or parameters
@@ -67,7 +67,7 @@ def sources(model: LinkageModel) -> ca.SX:
     [[linkage.force]] apart from their potentials."""
     driven = drives.efforts(model)
     parts = [] if driven is None else [driven]
-    for force in named(model.linkage):
+    for force in make_forces(model.linkage):
         parts.append(ca.SX(force.efforts(model)) + ca.gradient(force.energy(model), model.q))
     return sum(parts, start=ca.SX(model.q.numel(), 1))
 
@@ -75,4 +75,4 @@ def sources(model: LinkageModel) -> ca.SX:
 def energy(model: LinkageModel) -> ca.SX:
     """Sum of all potential energies (J)."""
     parts = [V for kind in KINDS if (V := kind.energy(model)) is not None]
-    return sum([*parts, *(f.energy(model) for f in named(model.linkage))], start=ca.SX(0))
+    return sum([*parts, *(f.energy(model) for f in make_forces(model.linkage))], start=ca.SX(0))

@@ -20,11 +20,11 @@ import casadi as ca
 LAG = 4  # default of tau, in integration steps: of its modes in a step, none is faster than 1/4
 
 
-def held(z: ca.SX, v: ca.SX, d: ca.SX, tau: ca.SX | float) -> ca.SX:
+def friction_effort(z: ca.SX, v: ca.SX, d: ca.SX, tau: ca.SX | float) -> ca.SX:
     """e, in the unit of the deflection z."""
     return ca.fmin(ca.fmax(z + tau * v, -d), d)
 
 
 def deflection_rate(z: ca.SX, v: ca.SX, d: ca.SX, tau: ca.SX | float) -> ca.SX:
     """z'."""
-    return (held(z, v, d, tau) - z) / tau
+    return (friction_effort(z, v, d, tau) - z) / tau

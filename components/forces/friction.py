@@ -70,10 +70,10 @@ def efforts(model: LinkageModel) -> ca.SX | None:
     if not rubbing(model.linkage):
         return None
     j = Joints(model)
-    return -j.jacobian.T @ (j.f * dry_friction.held(j.z, j.v, j.d, j.tau) / j.d)
+    return -j.jacobian.T @ (j.f * dry_friction.friction_effort(j.z, j.v, j.d, j.tau) / j.d)
 
 
-def bounded(model: LinkageModel, z: ca.SX) -> ca.SX:
+def clip_deflection(model: LinkageModel, z: ca.SX) -> ca.SX:
     """z within +-d, where it always is unless a step is too long for tau."""
     d = Joints(model).d
     return ca.fmin(ca.fmax(z, -d), d)

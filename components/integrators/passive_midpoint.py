@@ -73,12 +73,12 @@ class PassiveMidpoint(Integrator):
     def mechanism_step(self, mechanism: MechanicalSystem) -> ca.SX:
         import casadi as ca
 
-        after, moved = _moved(mechanism)
-        after, stops = _balanced(mechanism, mechanism.projected(after), moved)
+        after, moved = _advance(mechanism)
+        after, stops = _balance(mechanism, mechanism.projected(after), moved)
         return ca.vertcat(after, stops)
 
 
-def _moved(m: MechanicalSystem) -> tuple[ca.SX, ca.SX]:
+def _advance(m: MechanicalSystem) -> tuple[ca.SX, ca.SX]:
     """x(t + h) before its closures are corrected, and the displacements h r' at the rates s."""
     import casadi as ca
 
@@ -123,7 +123,7 @@ def _linear_forces(m: MechanicalSystem) -> tuple[ca.Function, bool]:
     return pull, slope.nnz() > 0
 
 
-def _balanced(m: MechanicalSystem, after: ca.SX, moved: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _balance(m: MechanicalSystem, after: ca.SX, moved: ca.SX) -> tuple[ca.SX, ca.SX]:
     """`after`, with rates made smaller by the factor that the balance needs, and whether their
     whole energy does not suffice: the mechanism then stops at x instead."""
     import casadi as ca

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.components.specs.paths import AnySine, Interpolation
-from hapticlink.components.time_signals import LookUp, Rows, TimeSignal, checked
+from hapticlink.components.time_signals import LookUp, Rows, TimeSignal, check_rows
 
 
 class TimeTable(TimeSignal):
@@ -28,7 +28,7 @@ class TimeTable(TimeSignal):
     """
 
     def __init__(self, rows: Rows, name: str) -> None:
-        data = checked(rows, name)
+        data = check_rows(rows, name)
         self.rows, self.size = rows, data.shape[1] - 1
         self.size_over = 3 * self.size
         if len(rows) > 1:
@@ -72,7 +72,7 @@ class TimeSpline(TimeSignal):
     """
 
     def __init__(self, rows: Rows, name: str) -> None:
-        data = checked(rows, name)
+        data = check_rows(rows, name)
         self.rows, self.size = rows, data.shape[1] - 1
         if len(rows) < 2:
             return

@@ -19,7 +19,7 @@ import numpy as np
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus.engine.mjcf import HAND, chain, coordinates, mjcf, offset, points
 from hapticlink.fmus.errors import FmuError
-from hapticlink.fmus.python_fmu_entries import packed
+from hapticlink.fmus.python_fmu_entries import pack_entries
 
 INTEGRATORS = {
     "semi-implicit-euler": "Euler",
@@ -55,7 +55,7 @@ def entries(
     mechanism = settings.get("mechanism")
     sync = None if mechanism else settings["graphics"].sync
     integrator = INTEGRATORS[mechanism.integrator] if mechanism else "Euler"
-    reduced = _reduced(component)
+    reduced = _reduce(component)
     about = {
         "block": component.name,
         "sync": sync,
@@ -83,7 +83,7 @@ def entries(
         "resources/engine.json": json.dumps(about).encode(),
     }
     module = Path(__file__).with_name("mujoco_functions.py").read_bytes()
-    return packed(reduced, functions, {"n_shared": 0}, module, **experiment)
+    return pack_entries(reduced, functions, {"n_shared": 0}, module, **experiment)
 
 
 def _misfits(component: Component, settings: Mapping[str, Any]) -> Iterator[str]:
@@ -117,7 +117,7 @@ def _sizes(variables: Iterable[Variable]) -> dict[str, int]:
     return {v.name: v.size for v in variables}
 
 
-def _reduced(component: Component) -> Component:
+def _reduce(component: Component) -> Component:
     """The component with the ports, parameters and states that the engine's block has. Its
     functions give the structure of dependencies alone; it starts at the assembled pose."""
     x0 = np.array(component.initialize(component.start_inputs, component.start_parameters)).ravel()

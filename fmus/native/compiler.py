@@ -127,7 +127,7 @@ def binaries(
     targets = [target for platform in platforms for target in TARGETS[platform]]
     files = source if len(targets) == 1 else [*source]
     with ThreadPoolExecutor(len(targets)) as pool:
-        compiled = pool.map(lambda target: _compiled(files, folder, target, options), targets)
+        compiled = pool.map(lambda target: _compile(files, folder, target, options), targets)
         made = dict(zip(targets, compiled, strict=True))
     for platform in platforms:
         slices = [made[target] for target in TARGETS[platform]]
@@ -138,10 +138,10 @@ def compile_webassembly(source: Iterable[Path], folder: Path, options: Sequence[
     """A WebAssembly module of C files, which exports what has an `export_name`. It imports a few
     functions of WASI, for files, which it does not call. Raises as `compile_library`."""
     compiler_version()
-    return _compiled(source, folder, WEBASSEMBLY, options)
+    return _compile(source, folder, WEBASSEMBLY, options)
 
 
-def _compiled(source: Iterable[Path], folder: Path, target: str, options: Sequence[str]) -> bytes:
+def _compile(source: Iterable[Path], folder: Path, target: str, options: Sequence[str]) -> bytes:
     own_folder = folder / target
     own_folder.mkdir()
     link = [*LINK, *(["-Wl,-Bsymbolic", "-lm"] if "linux" in target else [])]
@@ -210,7 +210,7 @@ def linker_cache(target: str) -> Iterator[dict[str, str]]:
     """The environment variables to link for a target; none where no cache can be written."""
     root = cache.user_folder() / "zig"
     if ZIG_CACHE not in os.environ and _writable(root):
-        with lock.held(root / f"{target}.lock", lambda: None):
+        with lock.hold_lock(root / f"{target}.lock", lambda: None):
             yield {ZIG_CACHE: str(root / target)}
     else:
         yield {}

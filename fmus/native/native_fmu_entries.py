@@ -72,7 +72,7 @@ def entries(
         for file, text in own.items():
             (room / file).write_bytes(text)
         interface = [room / file for file in own if file.endswith(".c")]
-        sources = chain(interface, _written(pieces, room))
+        sources = chain(interface, _write_pieces(pieces, room))
         files |= binaries(sources, component.name, room, platforms)
         own |= {path.name: path.read_bytes() for path in sorted(room.glob("piece*.c"))}
     own |= {file: (HEADERS / file).read_bytes() for file in FMI2_HEADERS}
@@ -81,7 +81,7 @@ def entries(
     return files | model_description.files(about, guid, fmi, listed)
 
 
-def _written(pieces: Iterable[str], folder: Path) -> Iterator[Path]:
+def _write_pieces(pieces: Iterable[str], folder: Path) -> Iterator[Path]:
     for k, piece in enumerate(pieces):
         path = folder / f"piece{k:03}.c"
         path.write_text(piece)

@@ -11,7 +11,7 @@ import casadi as ca
 
 from hapticlink.components.component import Component
 from hapticlink.fmus.fmu_functions import one_pass
-from hapticlink.fmus.native.split_functions import split
+from hapticlink.fmus.native.split_functions import split_functions
 
 
 def component_source(component: Component) -> tuple[str, Iterable[str]]:
@@ -81,4 +81,4 @@ def functions(given: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
         generator.add(function if function.is_a("SXFunction") else function.expand())
     text = "#define CASADI_SYMBOL_EXPORT static\n" + generator.dump()
     text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", text)
-    return split(re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
+    return split_functions(re.sub(r"if \(res\[\d+\]!=0\) ", "", text))

@@ -30,7 +30,7 @@ _SLOT = re.compile(r"\ba\d+\b")
 _HELPER = re.compile(r"^(?=(?:casadi_real|casadi_int|void) casadi_)", re.MULTILINE)
 
 
-def split(text: str) -> tuple[str, Iterable[str]]:
+def split_functions(text: str) -> tuple[str, Iterable[str]]:
     """The C text with each long function replaced by calls of its pieces, and the files of pieces,
     each made when it is asked for, so that the ones before can be compiled meanwhile; () where no
     function is long. `text` is CasADi's, with static functions."""

@@ -36,7 +36,7 @@ def came() -> bool:
     return _count > 0
 
 
-def check(time: float | None = None) -> None:
+def raise_if_interrupted(time: float | None = None) -> None:
     """Raises Interrupted, with the simulated `time` (s), if a signal has arrived."""
     if _count:
         from hapticlink.orchestrator.base.errors import Interrupted  # loaded within `held`
@@ -56,7 +56,7 @@ def remove(action: Action) -> None:
 
 
 @contextmanager
-def held(end: Action | None = None, after: Any = None) -> Iterator[None]:
+def defer_signals(end: Action | None = None, after: Any = None) -> Iterator[None]:
     """Defers signals within the context. Nested contexts and threads other than the main one, which
     receive no signals, change nothing. Signals that were ignored before stay ignored.
 
@@ -84,7 +84,7 @@ def held(end: Action | None = None, after: Any = None) -> Iterator[None]:
     for number in before:
         signal.signal(number, take)
     try:
-        with _watched(end) if end and os.name == "posix" else nullcontext():
+        with _watch(end) if end and os.name == "posix" else nullcontext():
             yield
     finally:
         for number, handler in before.items():
@@ -101,7 +101,7 @@ def _end(last: Action | None) -> None:
 
 
 @contextmanager
-def _watched(end: Action) -> Iterator[None]:
+def _watch(end: Action) -> Iterator[None]:
     """A watchdog thread that ends the process where the main thread does not get to its handler."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)

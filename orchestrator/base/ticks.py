@@ -30,7 +30,7 @@ def exact(number: int | float | str) -> Fraction:
     return Fraction(text)
 
 
-def written(number: Fraction) -> str:
+def write_exact(number: Fraction) -> str:
     """A number as `exact` reads it: decimal where six digits hold it, a fraction otherwise."""
     decimal = f"{float(number):g}"
     return decimal if exact(decimal) == number else str(number)
@@ -164,7 +164,9 @@ def periodic(
     return Frames(lambda i: int(begin) + (i - 1) * int(ticks) if i else 0, count + 1, 1)
 
 
-def aligned(period: Fraction, base: Fraction, end: int, first: Fraction | None = None) -> Frames:
+def align_to_ticks(
+    period: Fraction, base: Fraction, end: int, first: Fraction | None = None
+) -> Frames:
     """Frame i at the first tick at or after i periods, ceil(i period / base), or with `first` (s),
     at or after `first` and i - 1 periods.
 
@@ -218,7 +220,7 @@ def bounds(slowest: Fraction, fastest: Fraction, base: Fraction) -> tuple[int, i
     return low, high
 
 
-def listed(times: Sequence[Fraction], base: Fraction) -> tuple[int, ...]:
+def round_up_to_ticks(times: Sequence[Fraction], base: Fraction) -> tuple[int, ...]:
     """Starts of steps (ticks): 0, and the first tick at or after each of the times (s).
 
     Raises ValueError where two times fall on one tick or are not in order.

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.fmi.description import PLATFORMS
 from hapticlink.orchestrator.fmi.status import require_success
 
 
-def loaded(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: str) -> Any:
+def load_slave(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: str) -> Any:
     """An instance of FMPy's class `kind` for the FMU of that guid and model identifier, unpacked in
     `folder`; `name` is that of the instance. Raises OSError where the library cannot be loaded, and
     AttributeError where it lacks a function of FMI."""
@@ -26,8 +26,10 @@ def loaded(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: s
     slave.component = slave.callbacks = None
     slave._functions = {}
     library = Path(folder, "binaries", PLATFORMS[fmi], f"{identifier}{sharedLibraryExtension}")
-    slave.dll = ctypes.CDLL(str(python_libraries.shared(Path(folder), library) or library))
-    for function, declared in _declared(kind).items():
+    slave.dll = ctypes.CDLL(
+        str(python_libraries.find_shared_library(Path(folder), library) or library)
+    )
+    for function, declared in _declare_arguments(kind).items():
         slave._functions[function] = called = getattr(slave.dll, function)
         called.argnames, called.argtypes, called.restype = declared
     require_success(slave)
@@ -35,7 +37,7 @@ def loaded(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: s
 
 
 @cache
-def _declared(kind: Any) -> dict[str, tuple[Any, Any, Any]]:
+def _declare_arguments(kind: Any) -> dict[str, tuple[Any, Any, Any]]:
     """The names and types of the arguments of each FMI function of FMPy's class `kind`, and the
     type of its result, which FMPy reads from the signatures of its methods for each library."""
     recording = kind.__new__(kind)

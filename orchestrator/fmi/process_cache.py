@@ -31,18 +31,18 @@ _lock = Lock()
 _stay = False
 
 
-def described(path: Path) -> Description:
+def describe_once(path: Path) -> Description:
     """The description of an FMU, read once as long as the file does not change. Raises InputFault
     as `describe` does."""
     try:
         file = file_at(path)
     except OSError:
         return describe(path)  # which raises an InputFault with the reason
-    return _described(file)
+    return _describe(file)
 
 
 @lru_cache(MAX_UNPACKED)
-def _described(file: File) -> Description:
+def _describe(file: File) -> Description:
     return describe(file[0])
 
 
@@ -53,7 +53,7 @@ def file_at(path: Path) -> File:
 
 
 @contextmanager
-def unpacked_once() -> Iterator[None]:
+def keep_unpacked() -> Iterator[None]:
     """Within the outermost context, FMUs of this project stay unpacked until `trim` drops them."""
     global _stay
     before, _stay = _stay, True
@@ -75,16 +75,16 @@ def unpack(description: Description, folder: str) -> str:
     """
     own = description.block is not None
     if folder or not own:
-        return _extracted(description.path, folder, own)
+        return _extract(description.path, folder, own)
     with _lock:
         file = file_at(description.path)
-        _unpacked[file] = _unpacked.pop(file, "") or _extracted(description.path, "", own)
+        _unpacked[file] = _unpacked.pop(file, "") or _extract(description.path, "", own)
         _instances[_unpacked[file]] += 1
         return _unpacked[file]
 
 
-def _extracted(path: Path, folder: str, own: bool) -> str:
-    folder = folder or temporary_folders.new()
+def _extract(path: Path, folder: str, own: bool) -> str:
+    folder = folder or temporary_folders.make_folder()
     try:
         extract(path, folder, _is_needed if own else None)
     except BaseException:

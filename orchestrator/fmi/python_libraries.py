@@ -106,7 +106,7 @@ def _telling(method: Callable[..., Any], module: str, own_files: Path) -> Callab
     return telling
 
 
-def shared(folder: Path, library: Path) -> Path | None:
+def find_shared_library(folder: Path, library: Path) -> Path | None:
     """The path from which to load the `library` of a Python FMU that is unpacked in `folder`: the
     same one for all libraries of the same bytes. None for other FMUs, and for a library that other
     files lie beside, which it may need."""
@@ -115,10 +115,10 @@ def shared(folder: Path, library: Path) -> Path | None:
     if [*library.parent.iterdir()] != [library]:
         return None
     content = library.read_bytes()
-    return _stored(content, hashlib.sha256(content).hexdigest())
+    return _store(content, hashlib.sha256(content).hexdigest())
 
 
-def _stored(content: bytes, digest: str) -> Path:
+def _store(content: bytes, digest: str) -> Path:
     path = _libraries(fmu_cache.folder()) / f"{digest}{sharedLibraryExtension}"
     with suppress(OSError):
         if hashlib.sha256(path.read_bytes()).hexdigest() == digest:
@@ -139,6 +139,6 @@ def _libraries(root: Path | None) -> Path:
             fmu_cache.private(folder)
             if os.access(folder, os.W_OK | os.X_OK):
                 return folder
-    folder = Path(temporary_folders.new())
+    folder = Path(temporary_folders.make_folder())
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder

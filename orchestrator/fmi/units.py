@@ -61,12 +61,12 @@ def conversion(source: Unit | None, target: Unit | None, relative: bool = False)
         unknown = source.name if source.base is None else target.name
         raise ValueError(f"{unknown} has no BaseUnit, so it cannot be converted")
     if source.base != target.base:
-        raise ValueError(f"{_written(source)} is not {_written(target)}")
+        raise ValueError(f"{_write_unit(source)} is not {_write_unit(target)}")
     offset = 0.0 if relative else (source.offset - target.offset) / target.factor
     return Linear(source.factor / target.factor, offset)
 
 
-def _written(unit: Unit) -> str:
+def _write_unit(unit: Unit) -> str:
     assert unit.base is not None
     powers = ((b, n) for b, n in zip(BASES, unit.base, strict=True) if n)
     return ".".join(b if n == 1 else f"{b}{n}" for b, n in powers) or "1"
@@ -85,7 +85,7 @@ def turn(unit: Unit | None) -> float | None:
     return math.tau / unit.factor if unit.base == _ANGLE else None
 
 
-def misfit(kind: str, units: Sequence[Unit | None]) -> str | None:
+def why_unsuitable(kind: str, units: Sequence[Unit | None]) -> str | None:
     """The reason why entries with these units cannot be of a kind, None if they can."""
     n = len(units)
     if kind in MATRICES and math.isqrt(n) ** 2 != n:

@@ -74,7 +74,7 @@ class Answer(Message):
 
 def request_of(message: bytes) -> Request:
     """The request in a message. Raises Malformed."""
-    fields = _unpacked(message)
+    fields = _unpack(message)
     _require_types("request", fields, _REQUEST)
     request = Request(*fields)
     if request.call not in ARGUMENTS:
@@ -91,7 +91,7 @@ def request_of(message: bytes) -> Request:
 
 def answer_of(message: bytes, call: str, outputs: int) -> Answer:
     """The answer in a message, to a call of an FMU with so many outputs. Raises Malformed."""
-    fields = _unpacked(message)
+    fields = _unpack(message)
     if not isinstance(fields, list) or len(fields) != 6:
         raise Malformed("answer: six fields")
     _require_types("answer", fields[:5], _ANSWER)
@@ -124,7 +124,7 @@ def _is_fault(content: Any) -> bool:
     return form and all(isinstance(text, str) for text in content[2])
 
 
-def _unpacked(message: bytes) -> Any:
+def _unpack(message: bytes) -> Any:
     try:
         return msgpack.unpackb(message)
     except (ValueError, TypeError, msgpack.UnpackException) as error:

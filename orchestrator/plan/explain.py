@@ -39,7 +39,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
             if u.clock == clock.name
         )
         yield f"  {clock.name}: {_steps(clock)}: {fmus}"
-    yield from _fetched(system)
+    yield from _count_fetched(system)
     yield from _holds(system)
     for loop in plan.loops():
         yield f"  loop {loop.ring}: {', '.join(loop.fmus)} in this order"
@@ -78,14 +78,14 @@ def _steps(clock: Clock) -> str:
     return f"steps of {clock.shortest} to {clock.longest} ticks"
 
 
-def _fetched(system: System) -> Iterator[str]:
+def _count_fetched(system: System) -> Iterator[str]:
     """How many outputs of each FMU are fetched, and how many of these are written."""
     written = system.recording.outputs
     rows = f" in every row of {system.recording.every}" if system.recording.every > 1 else ""
     for u in system.fmus:
         names = [s.name for s in u.description.outputs]
         many = len([n for n in names if written is None or f"{u.name}.{n}" in written])
-        some = f", {len(u.seldom)} of them for rows alone" if u.seldom else ""
+        some = f", {len(u.recorded_only)} of them for rows alone" if u.recorded_only else ""
         yield f"  {u.name}: {len(names)} outputs fetched{some}, {many} recorded{rows}"
 
 

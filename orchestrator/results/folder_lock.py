@@ -19,7 +19,7 @@ _holders: dict[tuple[int, int], int] = {}
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Within the context no other run, of this process or another one of this machine, writes to
     `folder`, which is created if necessary and removed again if it stays empty. The lock ends with
     the process, and leaves no file. A thread may enter the context again.
@@ -35,7 +35,7 @@ def held(folder: Path) -> Iterator[None]:
         yield
         return
     try:
-        with _locked(folder) as locked:
+        with _try_lock(folder) as locked:
             if not locked:
                 raise InputFault(
                     f"--out {folder}: another run writes there{_process(folder)}; wait for its "
@@ -53,12 +53,12 @@ def held(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[bool]:
+def _try_lock(folder: Path) -> Iterator[bool]:
     """Whether the lock is held within the context: that of the folder itself; on Windows, where a
     folder has none, of a file in it. A file system without locks gives it to everyone."""
     if sys.platform == "win32":
         path = folder / ".run.lock"
-        with lock.attempted(path) as locked:
+        with lock.try_lock(path) as locked:
             yield locked
         if locked:
             path.unlink(missing_ok=True)

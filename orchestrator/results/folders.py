@@ -43,7 +43,7 @@ def add(
     return run
 
 
-def named(folders: Sequence[Path | str]) -> dict[str, Results]:
+def load_by_name(folders: Sequence[Path | str]) -> dict[str, Results]:
     """The runs of folders by the names that tell those apart. Raises InputFault as `load`, and for
     a folder that is named twice."""
     return dict(zip(names(folders), map(load, folders), strict=True))

@@ -160,7 +160,7 @@ class Results:
     def record(self) -> RunRecord:
         """The content of run.json as a record. Raises InputFault where it is of another version, or
         was changed."""
-        return run_record.read(self.run, self.folder)
+        return run_record.read_record(self.run, self.folder)
 
     @property
     def haptics(self) -> Table:
@@ -210,7 +210,7 @@ def load(folder: Path | str, from_rows: bool = False, record: RunRecord | None =
     another version, or one that was changed."""
     folder = Path(folder)
     run = run_json(folder)
-    record = record or run_record.read(run, folder)
+    record = record or run_record.read_record(run, folder)
     tables = FolderTables(folder, record, from_rows)
     return with_record(Results(folder, run, dict(tables)), record)
 
@@ -288,7 +288,7 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector]:
 def _require_file(path: Path) -> None:
     """Raises InputFault for a device, a pipe or a folder, which may have no end."""
     if path.exists() and not path.is_file():
-        raise InputFault(f"{path}: it is no file: run the scene again")
+        raise InputFault(f"{path}: not a regular file: run the scene again")
 
 
 def _malformed(path: Path) -> str:

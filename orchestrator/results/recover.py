@@ -33,11 +33,11 @@ def recover(
     process = None if ended or os.name != "posix" else load(folder).record.end.process
     if process and temporary_folders.lives(process):
         raise InputFault(f"{folder}: its run goes on, in process {process}")
-    with folder_lock.held(folder):
-        return _recovered(folder, kind, message)
+    with folder_lock.lock_folder(folder):
+        return _recover_tables(folder, kind, message)
 
 
-def _recovered(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
+def _recover_tables(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
     record = load(folder).record
     recovered = {}
     for name in record.rates:

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.results.write_files import (
     FileRecorder,
     text,
-    write,
+    write_atomically,
     write_json,
     write_over,
 )
@@ -48,7 +48,7 @@ class RunFolder(RunResults):
         super().__init__(folder)
         self._csv, self._setup = csv, content(setup)
         # What the first row needs, before the time of the loop is taken.
-        self._earlier = _listed(folder)
+        self._earlier = _list_files(folder)
         self._begun = self._text(End(process=os.getpid()))
 
     def __enter__(self) -> RunFolder:
@@ -77,7 +77,7 @@ class RunFolder(RunResults):
         recorders = self._recorders.values()
         if any(recorder.last is None for recorder in recorders):
             return
-        write(self.folder / RUN, self._begun + b" " * ROOM)
+        write_atomically(self.folder / RUN, self._begun + b" " * ROOM)
         super()._publish()
         own = {RUN, *(name for recorder in recorders for name in recorder.files)}
         for name in self._earlier - own:
@@ -113,7 +113,7 @@ class RunFolder(RunResults):
     def _broken_off(self, reason: str, error: BaseException) -> None:
         if self.published:
             fault = RecordedFault(type(error).__name__, self.last, str(error))
-            write(self.folder / RUN, self._text(End(reason, self.last), fault))
+            write_atomically(self.folder / RUN, self._text(End(reason, self.last), fault))
 
     def _text(self, end: End, fault: RecordedFault | None = None) -> bytes:
         """The run.json of a run that has not ended regularly."""
@@ -124,7 +124,7 @@ class RunFolder(RunResults):
 
 def _has_rows(folder: Path) -> bool:
     """Whether an earlier run in `folder` has a row behind the header of a table."""
-    for name in _listed(folder):
+    for name in _list_files(folder):
         if name.endswith((".csv", rows_file.SUFFIX)):
             path = folder / name
             with suppress(OSError):
@@ -138,7 +138,7 @@ def _is_longer_than_a_line(path: Path) -> bool:
         return bool(file.readline(MAX_HEADER_BYTES) and file.read(1))
 
 
-def _listed(folder: Path) -> set[str]:
+def _list_files(folder: Path) -> set[str]:
     """The files that the run.json of an earlier run lists, without paths outside of `folder`, and
     the rows that a run leaves that was killed."""
     try:

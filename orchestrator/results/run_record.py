@@ -270,7 +270,7 @@ def content(section: RunSetup | RunEnding | PortEnergy) -> dict[str, Any]:
     return values
 
 
-def read(run: Mapping[str, Any], folder: Path | None) -> RunRecord:
+def read_record(run: Mapping[str, Any], folder: Path | None) -> RunRecord:
     """The content of a run.json as a record. Raises InputFault where it is of another version, or
     was changed."""
     try:

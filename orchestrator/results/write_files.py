@@ -107,10 +107,10 @@ def remove_rows(path: Path) -> None:
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write a JSON file atomically."""
-    write(path, text(content))
+    write_atomically(path, text(content))
 
 
-def write(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes) -> None:
     """Write a file atomically."""
     with atomic_file(path) as unfinished:
         unfinished.write_bytes(content)

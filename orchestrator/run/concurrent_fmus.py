@@ -151,7 +151,7 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
     return able, unable
 
 
-def beside_or_refused(plan: Plan) -> dict[str, str]:
+def require_concurrent(plan: Plan) -> dict[str, str]:
     """The FMUs whose steps can be taken beside the haptic loop, with their clocks. Raises
     InputFault where one that cannot is on another computer: the loop would wait for it."""
     able, unable = beside(plan)

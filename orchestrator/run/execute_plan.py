@@ -69,7 +69,7 @@ class Outcome:
             case KeyboardInterrupt():  # a second signal does not wait for the end of the event
                 self.reason, self.fault = "interrupted", Interrupted(results.last)
             case _:
-                if (message := plugins.blamed(error)) is None:
+                if (message := plugins.blame_plugin(error)) is None:
                     raise error
                 self.reason, self.fault = "fault", Fault(message)
 
@@ -104,8 +104,12 @@ def run(
     loop: CompiledLoop | None = None
     try:
         # Non-finite values are detected by 0 x NaN, for which numpy would warn.
-        with interrupt.held(), ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
-            interrupt.check()
+        with (
+            interrupt.defer_signals(),
+            ExitStack() as stack,
+            np.errstate(invalid="ignore", over="ignore"),
+        ):
+            interrupt.raise_if_interrupted()
             simulation = Simulation(plan.system, results, stack)
             if real_time:
                 stack.enter_context(real_time.of(plan, simulation))
@@ -123,7 +127,7 @@ def run(
         outcome.end_time = results.last
     if simulation and loop:
         outcome.details = _details(plan, simulation, loop, real_time)
-        if outcome.fault is None and (diverged := _judged(outcome, simulation)):
+        if outcome.fault is None and (diverged := _judge_energy(outcome, simulation)):
             outcome.reason, outcome.fault = "diverged", diverged
     if progress:
         progress(outcome.end_time)
@@ -144,7 +148,7 @@ def _run_events(
     def turn(tick: int) -> None:
         nonlocal shown
         time = plan.system.timeline.seconds(tick)
-        interrupt.check(time)
+        interrupt.raise_if_interrupted(time)
         if real_time:
             real_time.turn(loop)
         if progress and perf_counter() - shown > PAUSE:
@@ -191,7 +195,7 @@ def _details(
     )
 
 
-def _judged(outcome: Outcome, simulation: Simulation) -> Diverged | None:
+def _judge_energy(outcome: Outcome, simulation: Simulation) -> Diverged | None:
     """The fault of a run that reached its end but has diverged; None if it has not."""
     system, condition = simulation.system, simulation.system.ends_when
     if (

@@ -19,14 +19,14 @@ from hapticlink.orchestrator.run.step_check import StepCheck
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
-def with_fetched(system: System) -> System:
+def choose_fetched(system: System) -> System:
     """The system with the outputs of each FMU that a run of it fetches."""
     recording = system.recording
     if recording.outputs is None and recording.every == 1:
         return system
     every = tuple(f"{u.name}.{s.name}" for u in system.fmus for s in u.description.outputs)
     written = every if recording.outputs is None else recording.outputs
-    often, rows = {*_read(system)}, {*written}
+    often, rows = {*_find_read(system)}, {*written}
     fmus = tuple(_with(u, often, rows, recording.every > 1) for u in system.fmus)
     return replace(system, fmus=fmus, recording=replace(recording, outputs=written))
 
@@ -39,15 +39,17 @@ def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
         {s.port for s in every if f"{fmu.name}.{s.name}" in names} for names in (often, rows)
     )
     outputs = [s for s in every if s.port in read | written]
-    seldom = frozenset(s.name for s in outputs if separate and s.port not in read)
-    outputs.sort(key=lambda s: s.name in seldom)
+    recorded_only = frozenset(s.name for s in outputs if separate and s.port not in read)
+    outputs.sort(key=lambda s: s.name in recorded_only)
     others = [s for s in fmu.description.scalars if s.causality != "output"]
     return replace(
-        fmu, description=replace(fmu.description, scalars=(*others, *outputs)), seldom=seldom
+        fmu,
+        description=replace(fmu.description, scalars=(*others, *outputs)),
+        recorded_only=recorded_only,
     )
 
 
-def _read(system: System) -> Iterator[str]:
+def _find_read(system: System) -> Iterator[str]:
     """The outputs, `fmu.output`, that are read at each communication point."""
     signals = SignalVector(system)
     _ = [*metered(signals)]

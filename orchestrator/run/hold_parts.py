@@ -88,7 +88,7 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
     of = spring(connection, system.energy.springs) if kind.needs == "spring" else None
     kept = None if kind.gives_samples else connection.kind
     matrix = kept if kept in ("projector", "semidefinite") else None
-    further = ports.beside(connection, system.fmu)
+    further = ports.companion_outputs(connection, system.fmu)
     return HoldParts(
         name=connection.hold,
         kind=kind,
@@ -117,7 +117,7 @@ def _turns(connection: Connection, system: System) -> dict[int, float]:
     assert connection.hold is not None
     if HOLDS[connection.hold].needs != "integral":
         return {}
-    of = replace(connection, outputs=ports.beside(connection, system.fmu))
+    of = replace(connection, outputs=ports.companion_outputs(connection, system.fmu))
     held = (
         c.kind
         for c in system.out_of(connection.source)

@@ -19,7 +19,7 @@ from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.solvers import Matrix, Newton, Vector
-from hapticlink.orchestrator.scene.start_pose import outside
+from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 
 SWEEPS = 50
 TOLERANCE = 1e-12
@@ -38,7 +38,7 @@ def initialize(fmus: LoadedFmus) -> bool:
     holds = [(signals.hold(c.name), signals.sources(c)) for c in system.connections if c.hold]
     setters = []
     for fmu in system.fmus:
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         instance = instances[fmu.name]
         longest = timeline.clock(fmu.clock).longest
         instance.enter_initialization(timeline.seconds(timeline.end + longest))
@@ -145,6 +145,6 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
             start = dict(zip(names, instance.outputs.tolist(), strict=True))
             if (margin := start["workspace_margin"]) < 0:
                 pose = [start[f"x_true[{i}]"] for i in range(1, 1 + PLANE.size)]
-                raise FmuFault(fmu, outside(pose, margin), 0.0, repeatable=True)
+                raise FmuFault(fmu, describe_start_outside(pose, margin), 0.0, repeatable=True)
     for instance in instances.values():
         instance.require_finite()

@@ -15,12 +15,12 @@ from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated
 from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.network.remote_fmu import Remote
-from hapticlink.orchestrator.run.python_modules import bundled, clashes
+from hapticlink.orchestrator.run.python_modules import clashes, find_bundled
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
-def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
+def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     """The FMUs that run in a process of their own, here or elsewhere, by name, with the reason.
     Raises InputFault for one of which a text is connected."""
     fmus = tuple(fmus)
@@ -31,7 +31,7 @@ def isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
         for u in fmus
         if u.name not in asked
         and NEEDS_TOOL in u.description.flags
-        and not bundled(u.description.path)  # whose tool is Python, which is there
+        and not find_bundled(u.description.path)  # whose tool is Python, which is there
     }
     alone = asked | tools | clashes(u for u in fmus if u.name not in tools)
     for u in (u for u in fmus if u.name in alone):
@@ -48,15 +48,15 @@ class LoadedFmus:
 
     def __init__(self, system: System, stack: ExitStack) -> None:
         self.system, self.signals = system, SignalVector(system)
-        self.isolated = isolated(system.fmus)
+        self.isolated = find_isolated(system.fmus)
         self.instances: dict[str, Instance] = {}
         for fmu in system.fmus:
-            interrupt.check()
+            interrupt.raise_if_interrupted()
             kind = Isolated if fmu.name in self.isolated else in_process(fmu.description)
             outputs = self.signals.values[self.signals.fmu(fmu.name)]
             opening = partial(Remote, fmu.served) if fmu.served else kind
             instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
-            instance.seldom = fmu.seldom
+            instance.recorded_only = fmu.recorded_only
             self.instances[fmu.name] = stack.enter_context(instance)
 
     def setter(

@@ -69,7 +69,7 @@ class Pace:
         gc.freeze()
         sys.setswitchinterval(SWITCH)
         try:
-            with real_time_priority.raised() as self.priority:
+            with real_time_priority.raise_priority() as self.priority:
                 self.c.origin = self.clock()
                 yield
         finally:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import process_cache
-from hapticlink.orchestrator.fmi.archive import opened
+from hapticlink.orchestrator.fmi.archive import open_archive
 from hapticlink.orchestrator.system.system import Fmu
 
 Modules = dict[str, dict[str, int]]
@@ -33,18 +33,18 @@ _loaded: Modules = {}
 """Modules of all FMUs that this process has loaded; they stay imported when FMUs are freed."""
 
 
-def bundled(path: Path) -> Modules:
+def find_bundled(path: Path) -> Modules:
     """The modules in the resources/ of a Python FMU, read once as long as the file does not change;
     {} for other FMUs, and for a file that cannot be read, which is reported when it is loaded."""
     try:
-        return _bundled(process_cache.file_at(path))
+        return _find_bundled(process_cache.file_at(path))
     except (InputFault, OSError):
         return {}
 
 
 @lru_cache(process_cache.MAX_UNPACKED)
-def _bundled(at: process_cache.File) -> Modules:
-    with opened(at[0], "FMU") as archive:
+def _find_bundled(at: process_cache.File) -> Modules:
+    with open_archive(at[0], "FMU") as archive:
         crcs = {e.filename: e.CRC for e in archive.infolist()}
     modules: Modules = {}
     for file, crc in crcs.items() if "resources/slavemodule.txt" in crcs else ():
@@ -61,7 +61,7 @@ def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
     for fmu in fmus:
         if fmu.isolate:
             continue
-        modules = bundled(fmu.description.path)
+        modules = find_bundled(fmu.description.path)
         other = next((n for n, files in modules.items() if not _is_mine(n, files)), None)
         if other is None:
             if "pythonfmu" in modules:

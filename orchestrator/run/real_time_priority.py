@@ -22,7 +22,7 @@ _CURRENT, _FUTURE = 1, 2  # MCL_CURRENT, MCL_FUTURE of mlockall(2)
 
 
 @contextmanager
-def raised() -> Iterator[dict[str, str]]:
+def raise_priority() -> Iterator[dict[str, str]]:
     """A context in which the calling thread has what the user may have of it. Gives what that is,
     and for what was refused the reason: `scheduler`, `memory`, `core`. What the thread had before,
     as under `chrt`, is not lowered, and is there again afterwards."""

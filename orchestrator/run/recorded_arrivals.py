@@ -81,7 +81,7 @@ class RecordedArrivals(RealTimeRun):
 
     def __init__(self, folder: Path, scene: Scene) -> None:
         self._folder = folder
-        before = run_record.read(text_files.read_json(folder / "run.json"), folder)
+        before = run_record.read_record(text_files.read_json(folder / "run.json"), folder)
         if not before.real_time:
             raise InputFault(f"{folder}: no run in real time, so that it has no arrivals")
         plain = scene.tables()

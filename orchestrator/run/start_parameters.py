@@ -14,13 +14,13 @@ from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.system.system import System
 
 
-def settled(system: System) -> System:
+def apply_initial_connections(system: System) -> System:
     """The system without the connections that act in initialisation only: each target starts with
     the values that they carry once the FMUs of the system are initialised.
 
     Raises FmuFault where an FMU fails or the values do not settle.
     """
-    carried = _carried(system)
+    carried = _carry_starts(system)
     fmus = tuple(fmu.starting(carried.get(fmu.name, ())) for fmu in system.fmus)
     connections = tuple(c for c in system.connections if not c.initial)
     return replace(system, fmus=fmus, connections=connections)
@@ -29,14 +29,14 @@ def settled(system: System) -> System:
 def by_port(system: System) -> dict[str, dict[str, tuple[float, ...]]]:
     """What those connections carry, by FMU and parameter. Raises FmuFault as `settled` does."""
     carried: dict[str, dict[str, tuple[float, ...]]] = {}
-    for name, starts in _carried(system).items():
+    for name, starts in _carry_starts(system).items():
         ports = carried.setdefault(name, {})
         for scalar, value in starts:
             ports[scalar.port] = (*ports.get(scalar.port, ()), float(value))
     return carried
 
 
-def _carried(system: System) -> dict[str, Starts]:
+def _carry_starts(system: System) -> dict[str, Starts]:
     once = [c for c in system.connections if c.initial]
     if not once:
         return {}

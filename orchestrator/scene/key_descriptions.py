@@ -17,7 +17,7 @@ from hapticlink.orchestrator.scene.toml_keys import Path
 from hapticlink.orchestrator.scene.types_of_keys import (
     annotations_at,
     as_written,
-    measured,
+    find_quantities,
     types_at,
 )
 
@@ -31,15 +31,15 @@ def vector(path: Path, data: Any) -> str:
     return " or ".join(dict.fromkeys(words(k) + _beside(unit(k)) for k in arrays))
 
 
-def expected(path: Path, data: Any) -> str:
+def describe_expected(path: Path, data: Any) -> str:
     """What the value at `path` may be, in words."""
-    kinds = [pair for kind in annotations_at(path, data) for pair in measured(kind)]
+    kinds = [pair for kind in annotations_at(path, data) for pair in find_quantities(kind)]
     return _in_words(kinds, lambda kind, q: _beside(q.unit if q else unit(kind)))
 
 
 def number(path: Path, data: Any) -> str:
     """The number that may be at `path` with its range and unit, `number > 0 (kg)`."""
-    kinds = [pair for hint in annotations_at(path, data) for pair in measured(hint)]
+    kinds = [pair for hint in annotations_at(path, data) for pair in find_quantities(hint)]
     plain = Quantity("1")  # for a part of a registry that declares no quantity
     numbers = [(kind, quantity or plain) for kind, quantity in kinds if kind in (float, int)]
     word = "whole number" if all(kind is int for kind, _ in numbers) else "number"
@@ -54,7 +54,7 @@ def _beside(unit: str) -> str:
 
 def words(kind: Any) -> str:
     """The type of a value in words: `a number`, `three numbers`, `"a" or "b"`, `a table`."""
-    return _in_words(measured(kind), lambda kind, q: "")
+    return _in_words(find_quantities(kind), lambda kind, q: "")
 
 
 def _in_words(
@@ -107,7 +107,7 @@ def limits(kind: Any) -> str:
 
 def _of_numbers(kind: Any, what: Callable[[Quantity], str]) -> str:
     texts = []
-    for branch, quantity in measured(kind):
+    for branch, quantity in find_quantities(kind):
         if quantity:
             texts.append(what(quantity))
         elif typing.get_origin(branch) in (tuple, Mapping):

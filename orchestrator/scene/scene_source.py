@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hapticlink.orchestrator.base.errors import Finding
-from hapticlink.orchestrator.scene.overrides import as_typed
+from hapticlink.orchestrator.scene.overrides import as_command_line
 from hapticlink.orchestrator.scene.toml_keys import Path, Place, place_of
 
 
@@ -29,7 +29,7 @@ class Source:
         key = self._dotted(path)
         for length in range(len(path), 0, -1):
             if path[:length] in self.set_by:
-                return Finding(key, message, option=as_typed(self.set_by[path[:length]]))
+                return Finding(key, message, option=as_command_line(self.set_by[path[:length]]))
         file, line = place_of(path, self.places)
         return Finding(key, message, line or None, file=file)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from hapticlink.components.port_space import PLANE
 
 
-def outside(pose: Sequence[float], margin: float) -> str:
+def describe_start_outside(pose: Sequence[float], margin: float) -> str:
     """The message for a start pose (m, m, rad) outside the device's workspace, by -`margin` (m)."""
     numbers = ", ".join(f"{value:.4g}" for value in pose)
     entries = ", ".join(map(" ".join, zip(PLANE.names, PLANE.pose.units, strict=True)))

@@ -32,7 +32,7 @@ def types(kind: Any) -> tuple[str, ...]:
     return typing.get_args(hints(kind)["type"]) if "type" in keys([kind]) else ()
 
 
-def chosen(kinds: list[Any], table: Any) -> list[Any]:
+def choose_by_type(kinds: list[Any], table: Any) -> list[Any]:
     """The records among `kinds` that `table` selects by its `type`; all where it selects none."""
     name = table.get("type") if isinstance(table, dict) else None
     return [k for k in _records(kinds) if name in types(k)] or kinds
@@ -50,7 +50,7 @@ def annotations_at(path: Path, data: Any = None) -> list[Any]:
         return [Scene]
     if record := registry_tables.record_of(path, data):
         return [record]
-    above, part = chosen(types_at(path[:-1], data), value(data, path[:-1])), path[-1]
+    above, part = choose_by_type(types_at(path[:-1], data), value(data, path[:-1])), path[-1]
     if isinstance(part, int):
         tuples = [typing.get_args(k) for k in above if typing.get_origin(k) is tuple]
         entries = [t[0] if Ellipsis in t else t[part] for t in tuples if t[part:] or Ellipsis in t]
@@ -61,10 +61,12 @@ def annotations_at(path: Path, data: Any = None) -> list[Any]:
 
 def branches(kind: Any) -> list[Any]:
     """The members of a union, without their annotations."""
-    return [branch for branch, _ in measured(kind)]
+    return [branch for branch, _ in find_quantities(kind)]
 
 
-def measured(kind: Any, quantity: Quantity | None = None) -> Iterator[tuple[Any, Quantity | None]]:
+def find_quantities(
+    kind: Any, quantity: Quantity | None = None
+) -> Iterator[tuple[Any, Quantity | None]]:
     """The members of a union, each with the quantity in its annotation; names of a registry become
     literals."""
     origin = typing.get_origin(kind)
@@ -72,10 +74,12 @@ def measured(kind: Any, quantity: Quantity | None = None) -> Iterator[tuple[Any,
         inner, *beside = typing.get_args(kind)
         if names := next((b for b in beside if isinstance(b, Names)), None):
             inner = typing.Literal[tuple(names)]
-        yield from measured(inner, next((b for b in beside if isinstance(b, Quantity)), quantity))
+        yield from find_quantities(
+            inner, next((b for b in beside if isinstance(b, Quantity)), quantity)
+        )
     elif origin in (typing.Union, UnionType):
         for member in typing.get_args(kind):
-            yield from measured(member, quantity)
+            yield from find_quantities(member, quantity)
     else:
         yield kind, quantity
         if kind is VariableRate:

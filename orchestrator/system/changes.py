@@ -10,9 +10,9 @@ from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.assign_holds import misfit
+from hapticlink.orchestrator.system.assign_holds import why_unsuitable
 from hapticlink.orchestrator.system.ports import power_across_rates, scalars_of
-from hapticlink.orchestrator.system.springs import limited_gains
+from hapticlink.orchestrator.system.springs import find_limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
 
 
@@ -24,7 +24,7 @@ def settable(system: System, name: str) -> tuple[Scalar, ...]:
         raise InputFault(f"{name} is fed by a connection, {fed[0].name}")
     if any(s.causality == "parameter" and s.variability != "tunable" for s in scalars):
         raise InputFault(f"{name} is not tunable: change its start value, in the scene")
-    if name in limited_gains(system):
+    if name in find_limited_gains(system):
         raise InputFault(
             f"{name} is a gain of a spring whose energy `pspm` limits, which counts with that "
             "of the start: change its start value, in the scene"
@@ -39,16 +39,18 @@ def feeding(system: System, name: str) -> list[Connection]:
     return [c for c in into if named & {s.name for s in c.inputs}]
 
 
-def held_by(c: Connection, hold: str | None, delay: float | None) -> Connection:
+def with_hold(c: Connection, hold: str | None, delay: float | None) -> Connection:
     """The connection with another hold or another constant latency (s); None leaves either."""
     latency = c.latency if delay is None else Latency(min=delay) if delay else None
     return replace(c, hold=hold or c.hold, latency=latency)
 
 
-def changed(system: System, c: Connection, hold: str | None, delay: float | None) -> Connection:
+def check_changed(
+    system: System, c: Connection, hold: str | None, delay: float | None
+) -> Connection:
     """`held_by`. Raises InputFault where the hold does not fit, or cannot be changed in a run."""
-    new = held_by(c, hold, delay)
-    why = misfit(new.hold or "", new, system.fmu, system.energy.power, False)
+    new = with_hold(c, hold, delay)
+    why = why_unsuitable(new.hold or "", new, system.fmu, system.energy.power, False)
     if system.coupling.scheme == "iterated":
         why = "steps are repeated"
     spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
@@ -78,7 +80,7 @@ def choices(system: System, c: Connection) -> list[str]:
     holds = [c.hold or ""]
     for hold in HOLDS:
         with suppress(InputFault):
-            changed(system, c, hold, None)
+            check_changed(system, c, hold, None)
             holds += [hold] if hold != c.hold else []
     return holds
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
-from hapticlink.orchestrator.fmi.units import misfit
+from hapticlink.orchestrator.fmi.units import why_unsuitable
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import PowerPort
@@ -17,7 +17,7 @@ from hapticlink.orchestrator.system.ports import between_plants, names, size
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
-def unfit(scene: Scene, system: System) -> Iterator[Problem]:
+def check_system(scene: Scene, system: System) -> Iterator[Problem]:
     """A finding for each name in these tables that the system does not have, and for each entry
     that does not fit it."""
     held = [c for c in system.connections if not c.initial]
@@ -32,10 +32,10 @@ def unfit(scene: Scene, system: System) -> Iterator[Problem]:
     for key, kind in scene.kinds.items():
         for c in (c for c in held if key in names(c)):
             source = system.fmu[c.source].description
-            if why := misfit(kind, [source.unit(s) for s in c.outputs]):
+            if why := why_unsuitable(kind, [source.unit(s) for s in c.outputs]):
                 message = f"{c.source}.{c.source_port} {why}; take another kind, or leave it out"
                 yield ("kinds", key), message
-    yield from _refused(scene, system)
+    yield from _check_holds(scene, system)
     plants = [u.name for u in system.fmus if not u.sampled]
     why = f"is no plant of this scene; there are {', '.join(plants)}"
     yield from ((("substeps", name), why) for name in scene.substeps if name not in plants)
@@ -46,7 +46,7 @@ def unfit(scene: Scene, system: System) -> Iterator[Problem]:
         yield from _power(i, p, system.fmu)
     yield from springs.unfit(scene, system.fmu)
     yield from _step_sizes(system)
-    yield from _iterated(system)
+    yield from _check_iterated(system)
 
 
 NOWHERE = {
@@ -59,7 +59,7 @@ NOWHERE = {
 """Why a default hold fits no connection, by what it needs."""
 
 
-def _refused(scene: Scene, system: System) -> Iterator[Problem]:
+def _check_holds(scene: Scene, system: System) -> Iterator[Problem]:
     """A finding for each requested hold that does not fit, at its key in the scene. For a default
     that fits no connection: one for each connection that sets a spring, or else a single one."""
     wires = {f"{w.from_} -> {w.to}": i for i, w in enumerate(scene.connection) if w.hold}
@@ -106,7 +106,7 @@ def _step_sizes(system: System) -> Iterator[Problem]:
         )
 
 
-def _iterated(system: System) -> Iterator[Problem]:
+def _check_iterated(system: System) -> Iterator[Problem]:
     """A finding where coupling "iterated" has no connected plants of one rate to iterate."""
     between = any(between_plants(c, system.fmu) and not c.initial for c in system.connections)
     if system.coupling.scheme == "iterated" and not between:

@@ -45,7 +45,7 @@ def fmu_files(
     begun = count(1)
 
     def file(block: BlockPlan) -> Path:
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         LOG.info("building block %d of %d: %s", next(begun), len(every), block.name)
         given: Starts = {}
         experiment: dict[str, float] = {}
@@ -67,10 +67,10 @@ def fmu_files(
                 fmi=fmi,
                 starts=given,
                 engine=block.engine,
-                poll=interrupt.check,
+                poll=interrupt.raise_if_interrupted,
             )
         except CompilerError as error:
-            interrupt.check()  # Ctrl-C in a terminal ends the compiler too
+            interrupt.raise_if_interrupted()  # Ctrl-C in a terminal ends the compiler too
             raise Fault(str(error)) from error
         except FmuError as error:
             raise InputFault(str(error)) from error

@@ -21,7 +21,7 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene.scene_tables import Latency
 
 
-class Link:
+class SampleLink:
     """The samples in transit on one connection. A latency is drawn uniformly between min and max
     (s), a loss with the given probability, both from PCG64 with the seed."""
 

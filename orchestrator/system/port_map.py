@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.units import misfit
+from hapticlink.orchestrator.fmi.units import why_unsuitable
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ Mapped = dict[str, tuple[str, ...]]
 """By the block's port, the names of the FMU's scalars, row by row."""
 
 
-def mapped(
+def map_ports(
     description: Description, block: Component, given: Mapping[str, str | tuple[str, ...]]
 ) -> Mapped:
     """What is called otherwise in an FMU than in the block that it replaces. Raises ValueError for
@@ -37,7 +37,7 @@ def mapped(
             there = unknown("port of the block", port, ports)
             hint = "what it has with other settings alone is fed by a [[connection]]"
             raise ValueError(f"{there}; {hint}")
-        renamings[port] = tuple(s.name for s in _named(description, names))
+        renamings[port] = tuple(s.name for s in _find_scalars(description, names))
         if len(renamings[port]) != (size := len(_places(ports[port][0]))):
             raise ValueError(f"{len(renamings[port])} variables for the {size} entries of {port}")
         if {s.name for s in description.scalars if port in (s.name, s.port)} - {*renamings[port]}:
@@ -54,7 +54,7 @@ def mapped(
     return renamings
 
 
-def renamed(description: Description, names: Mapped, block: Component) -> Description:
+def rename_ports(description: Description, names: Mapped, block: Component) -> Description:
     """The description with the scalars of `mapped` under the block's names."""
     every = {v.name: v for v in (*block.inputs, *block.outputs, *block.parameters)}
     new = {
@@ -86,7 +86,11 @@ def with_declarations(description: Description, block: Component) -> Description
     rates: dict[str, str] = {}
     for v in block.outputs:
         entries = there(v.name, "output")
-        if v.kind and entries and not misfit(v.kind, [description.unit(s) for s in entries]):
+        if (
+            v.kind
+            and entries
+            and not why_unsuitable(v.kind, [description.unit(s) for s in entries])
+        ):
             kinds[v.name] = v.kind
         if v.derivative_of:
             values = there(v.derivative_of, "output")
@@ -104,7 +108,7 @@ def with_declarations(description: Description, block: Component) -> Description
     )
 
 
-def _named(description: Description, names: str | tuple[str, ...]) -> Iterator[Scalar]:
+def _find_scalars(description: Description, names: str | tuple[str, ...]) -> Iterator[Scalar]:
     """The scalars of names, each of a variable or of a whole vector. Raises ValueError."""
     for name in [names] if isinstance(names, str) else names:
         there = [s for s in description.scalars if name in (s.name, s.port)]

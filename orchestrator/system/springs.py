@@ -19,7 +19,9 @@ def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     return next((s for s in springs if _end(c) in s.ports), None)
 
 
-def declared(fmus: Iterable[Fmu], connections: Collection[Connection]) -> Iterator[SetSpring]:
+def find_declared_springs(
+    fmus: Iterable[Fmu], connections: Collection[Connection]
+) -> Iterator[SetSpring]:
     """The spring-dampers that FMUs declare in their annotations, by their names in a system, with
     the start values of their gains. Springs whose gains a connection sets are left out: their
     values are only known once the run begins."""
@@ -41,7 +43,7 @@ def _start_values(fmu: Fmu, parameter: str) -> tuple[float, ...]:
     return tuple(float(given.get(s.name, s.start)) for s in entries)
 
 
-def limited_gains(system: System) -> set[str]:
+def find_limited_gains(system: System) -> set[str]:
     """The gains, `fmu.parameter`, of springs whose energy a hold limits: its tank has their values
     at the start, so that they may not change while the scene runs."""
     held = {_end(c) for c in system.connections if c.needs == "spring"}

@@ -13,11 +13,11 @@ from hapticlink.orchestrator.base.ticks import (
     Clock,
     Frames,
     Timeline,
-    aligned,
+    align_to_ticks,
     common_base,
     exact,
-    listed,
     periodic,
+    round_up_to_ticks,
     variable,
 )
 from hapticlink.orchestrator.scene.blocks import Blocks, blocks
@@ -51,7 +51,7 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
             except ValueError as error:
                 raise SceneFault(scene.title, [scene.place(pace.path, str(error))]) from error
         if name == "graphics":
-            starts = _changed(scene, starts, base, a_tick, steps * a_tick)
+            starts = _apply_rate_changes(scene, starts, base, a_tick, steps * a_tick)
         stepped.append(Clock(name, starts, pace.path))
     return Timeline(base, steps * a_tick, tuple(stepped), given.of)
 
@@ -62,7 +62,7 @@ GRAPHICS_RATE = "graphics.rate"
 """What `[[at]]` sets of a clock."""
 
 
-def _changed(
+def _apply_rate_changes(
     scene: Scene, starts: Sequence[int], base: Fraction, a_tick: int, end: int
 ) -> Sequence[int]:
     """The starts of graphics steps with the rates that `[[at]]` sets: from the first one at or
@@ -72,7 +72,7 @@ def _changed(
         if (rate := event.set.get(GRAPHICS_RATE)) is None:
             continue
         try:
-            period = changed_period(rate, base, a_tick)
+            period = period_in_ticks(rate, base, a_tick)
         except ValueError as error:
             where = scene.place(("at", i, "set", GRAPHICS_RATE), str(error))
             raise SceneFault(scene.title, [where]) from error
@@ -84,7 +84,7 @@ def _changed(
     return starts
 
 
-def changed_period(rate: object, base: Fraction, a_tick: int) -> Fraction:
+def period_in_ticks(rate: object, base: Fraction, a_tick: int) -> Fraction:
     """The period, in ticks of `base` (s), of a clock that is given another rate (Hz) in a run.
     Raises ValueError for one below SLOWEST or above the haptic one, of steps of `a_tick` ticks."""
     fastest = 1 / (a_tick * base)
@@ -96,25 +96,25 @@ def changed_period(rate: object, base: Fraction, a_tick: int) -> Fraction:
     raise ValueError(f"{rate!r}: give a rate (Hz) {limits}")
 
 
-def _period(pace: Pace) -> Fraction:
+def _period(pace: ClockRate) -> Fraction:
     assert isinstance(pace.rate, Fraction)
     return 1 / pace.rate
 
 
-def _on_ticks(pace: Pace, haptic: Fraction, steps: int) -> Sequence[int]:
+def _on_ticks(pace: ClockRate, haptic: Fraction, steps: int) -> Sequence[int]:
     """Starts of steps that are aligned to haptic ticks, counted in haptic ticks."""
     if isinstance(pace.rate, VariableRate):
         low, high, seed = exact(pace.rate.min), exact(pace.rate.max), pace.rate.seed
         return variable(low, high, seed, haptic, steps)
     if isinstance(pace.rate, tuple):
-        starts = listed([exact(time) for time in pace.rate], haptic)
+        starts = round_up_to_ticks([exact(time) for time in pace.rate], haptic)
         # One more step, so that a last time at the end of the run has a communication point.
         return (*starts, 2 * starts[-1] - starts[-2])
-    return aligned(_period(pace), haptic, steps, pace.first)
+    return align_to_ticks(_period(pace), haptic, steps, pace.first)
 
 
 @dataclass(frozen=True)
-class Pace:
+class ClockRate:
     """When the clock `name` steps. rate: Hz, bounds (Hz), or the times (s) at which steps end.
     first: end of the first step (s), None where the rate varies. on_ticks: steps end on haptic
     ticks. path: the scene's key for it."""
@@ -131,7 +131,7 @@ class Clocks:
     """of: the clock of each FMU. paces: the pace of each clock, the haptic one first."""
 
     of: Mapping[str, str]
-    paces: Mapping[str, Pace]
+    paces: Mapping[str, ClockRate]
 
 
 def clocks(scene: Scene, planned: Blocks | None = None) -> Clocks:
@@ -145,7 +145,7 @@ def clocks(scene: Scene, planned: Blocks | None = None) -> Clocks:
     return Clocks({fmu: pace.name for fmu, pace in of.items()}, paces)
 
 
-def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> Pace:
+def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> ClockRate:
     pace = _pace(rate, path, scene)
     if fmu not in scene.phases or exact(scene.phases[fmu]) == pace.first:
         return pace
@@ -154,7 +154,7 @@ def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> Pace:
     return replace(pace, name=name, first=first, path=("phases", fmu))
 
 
-def _pace(rate: AnyRate, path: Path, scene: Scene) -> Pace:
+def _pace(rate: AnyRate, path: Path, scene: Scene) -> ClockRate:
     if rate == "haptics":
         return _pace(scene.haptics.rate, ("haptics", "rate"), scene)
     if rate == "graphics":
@@ -166,13 +166,13 @@ def _pace(rate: AnyRate, path: Path, scene: Scene) -> Pace:
         return replace(pace, name="graphics", first=first, on_ticks=on_ticks)
     if isinstance(rate, VariableRate):
         low, high = _text(exact(rate.min)), _text(exact(rate.max))
-        return Pace(f"{low}to{high}hz_seed{rate.seed}", rate, None, True, path)
+        return ClockRate(f"{low}to{high}hz_seed{rate.seed}", rate, None, True, path)
     if isinstance(rate, tuple):
         name = next((fmu.name for fmu in scene.fmu if fmu.rate == rate), "graphics")
-        return Pace(f"times_of_{name}", rate, None, True, path)
+        return ClockRate(f"times_of_{name}", rate, None, True, path)
     same = exact(rate) == exact(scene.haptics.rate)
     name = "haptics" if same else f"{_text(exact(rate))}hz"
-    return Pace(name, exact(rate), 1 / exact(rate), False, path)
+    return ClockRate(name, exact(rate), 1 / exact(rate), False, path)
 
 
 def _text(number: Fraction) -> str:

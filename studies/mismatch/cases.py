@@ -70,7 +70,7 @@ class Case:
             found["contacts.enclosure"] = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
             found |= {"contacts.stiffness": 1000.0, "contacts.damping": 10.0}
             found["controller.contact"] = True
-        return overrides.written(found)
+        return overrides.write_options(found)
 
 
 def trained() -> list[Case]:

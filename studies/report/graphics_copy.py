@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import folded, tracking
+from hapticlink.analysis.findings.tracking import count_folded, tracking
 from studies import draw
 from studies.report.report_page import Entry, Runs, command
 
@@ -25,7 +25,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         ):
             results = runs("closed-loop", *options, f"controller.bias={bias}")
             time, gap = tracking(results)
-            found[bias, label] = (*folded(results), gap.max())
+            found[bias, label] = (*count_folded(results), gap.max())
             axis.semilogy(time, np.maximum(gap, 1e-4), color=colour, label=label)
         graphics = results.graphics  # of the pulled copy
         off = graphics["time"][graphics["virtual_environment.branch_ok"] == 0]

@@ -10,7 +10,7 @@ from pathlib import Path
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Results
-from hapticlink.orchestrator.scene.overrides import as_typed
+from hapticlink.orchestrator.scene.overrides import as_command_line
 
 HEAD = """# The report's figures, from runs of the FMUs
 
@@ -48,13 +48,13 @@ class Runs:
             self.tell(f"running {command(scene, *options)}")
             folder = self.room / str(len(self._made))
             self._made[key] = simulate(scene, folder, options).results
-            interrupt.check()
+            interrupt.raise_if_interrupted()
         return self._made[key]
 
 
 def command(scene: str, *options: str) -> str:
     """The command line of a run."""
-    return " ".join(["hapticlink run", scene, *map(as_typed, options)])
+    return " ".join(["hapticlink run", scene, *map(as_command_line, options)])
 
 
 def write(folder: Path, entries: Sequence[Entry]) -> Path:

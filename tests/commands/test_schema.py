@@ -34,9 +34,9 @@ def test_the_command_prints_a_valid_schema(capsys: pytest.CaptureFixture[str]) -
     assert printed == json.loads(json.dumps(json_schema()))
 
 
-@pytest.mark.parametrize("name", find_scene.shipped())
+@pytest.mark.parametrize("name", find_scene.list_shipped())
 def test_shipped_scenes_follow_it(name: str) -> None:
-    validator().validate(tomllib.loads(find_scene.find(name)[1]))
+    validator().validate(tomllib.loads(find_scene.find_scene(name)[1]))
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_every_way_to_write_a_key_follows_it(more: str) -> None:
     text = f"{more}\n{text.replace('[graphics]', '')}" if "graphics" in more else f"{more}\n{text}"
     if more.startswith("controller"):
         text = text.replace("[controller]\n", "")
-    read_and_check.read(text)
+    read_and_check.read_scene(text)
     validator().validate(tomllib.loads(text))
 
 

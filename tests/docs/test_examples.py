@@ -28,7 +28,7 @@ from tests.plugins import hapticlink
 
 ELSEWHERE = {"docs/extending.md", "docs/api.md"}
 WITH_EXAMPLES = [p for p in PAGES if name(p) not in ELSEWHERE and [*blocks(p, "sh", "python")]]
-SHIPPED = tuple(find_scene.shipped())
+SHIPPED = tuple(find_scene.list_shipped())
 SHORTER = {"hapticlink sweep": 0.02} | {
     f"hapticlink run {name}": 0.2 for name in (*SHIPPED, "watt.toml")
 }

@@ -15,7 +15,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.fmus import cache, lock
 from hapticlink.fmus.build_fmu import build
-from hapticlink.fmus.cache import cached
+from hapticlink.fmus.cache import get_or_build
 from hapticlink.fmus.check import check_fmu
 from tests.fmus import sample_components
 
@@ -50,7 +50,7 @@ def files(place: Path) -> list[str]:
 
 def test_built_once(place, room):
     builder = Builder()
-    first, second = cached(MATERIAL, builder, room), cached(MATERIAL, builder, room)
+    first, second = get_or_build(MATERIAL, builder, room), get_or_build(MATERIAL, builder, room)
     assert builder.calls == 1
     assert first == second
     assert first.is_relative_to(place)
@@ -67,7 +67,7 @@ def test_an_archive_without_a_model_is_built_once(place, room):
             archive.writestr("page.wasm", b"module")
         return folder / "page.fmu"
 
-    assert cached(MATERIAL, build, room) == cached(MATERIAL, build, room)
+    assert get_or_build(MATERIAL, build, room) == get_or_build(MATERIAL, build, room)
     assert len(calls) == 1
 
 
@@ -92,12 +92,12 @@ def test_sources_are_part_of_the_key(monkeypatch):
 @pytest.mark.parametrize("damage", [b"", b"not a zip", None])
 def test_a_damaged_file_is_built_again(place, room, damage):
     builder = Builder()
-    path = cached(MATERIAL, builder, room)
+    path = get_or_build(MATERIAL, builder, room)
     whole = path.read_bytes()
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 0xFF
     path.write_bytes(bytes(flipped) if damage is None else damage)
-    assert cached(MATERIAL, builder, room).read_bytes() == whole
+    assert get_or_build(MATERIAL, builder, room).read_bytes() == whole
     assert builder.calls == 2
 
 
@@ -107,7 +107,7 @@ def test_a_failed_build_leaves_nothing(place, room):
         raise RuntimeError("no")
 
     with pytest.raises(RuntimeError, match="no"):
-        cached(MATERIAL, fail, room)
+        get_or_build(MATERIAL, fail, room)
     assert files(place) == []
 
 
@@ -117,7 +117,7 @@ def test_what_a_killed_copy_has_left_goes_with_the_next_build(place, room):
     for name in (".half", ".fresh"):
         (place / name).write_bytes(b"half")
     os.utime(place / ".half", (0, 0))
-    cached(MATERIAL, Builder(), room)
+    get_or_build(MATERIAL, Builder(), room)
     assert sorted(files(place)) == [".fresh", "gain.fmu"]
 
 
@@ -130,14 +130,14 @@ def test_a_killed_build_leaves_nothing_in_the_cache(place, room):
         assert [path.name for path in place.iterdir()] == ["locks"]
         return build(sample_components.stateless(), folder)
 
-    assert cached(MATERIAL, builder, room).parent == place / cache.key(MATERIAL)
+    assert get_or_build(MATERIAL, builder, room).parent == place / cache.key(MATERIAL)
     assert seen == [room]
     assert list(room.iterdir()) == []
 
 
 def test_a_cache_that_cannot_be_written_is_told_and_done_without(place, room, caplog):
     place.write_text("a file where the cache should be")
-    path = cached(MATERIAL, Builder(), room)
+    path = get_or_build(MATERIAL, Builder(), room)
     assert path.is_relative_to(room)
     assert check_fmu(path) == []
     assert f"the cache {place} cannot be written" in caplog.text
@@ -153,7 +153,7 @@ def test_processes_of_two_machines_end_with_one_whole_file(place, room, monkeypa
             together.wait(timeout=30)  # all found the cache empty
             return build(sample_components.stateless(), folder)
 
-        paths.append(cached(MATERIAL, builder, room))
+        paths.append(get_or_build(MATERIAL, builder, room))
 
     threads = [threading.Thread(target=race) for _ in range(4)]
     for thread in threads:
@@ -185,11 +185,11 @@ def test_who_needs_the_same_fmu_waits_for_it_and_tells_of_another_process(
         return builder(folder)
 
     def wait() -> None:
-        paths.append(cached({"block": "gain"}, builder, room, lambda: polled.append(True)))
+        paths.append(get_or_build({"block": "gain"}, builder, room, lambda: polled.append(True)))
 
     paths: list[Path] = []
     other = threading.Thread(target=wait)
-    paths.append(cached({"block": "gain"}, slow, room))
+    paths.append(get_or_build({"block": "gain"}, slow, room))
     other.join()
     assert builder.calls == 1
     assert paths[0] == paths[1]
@@ -202,11 +202,11 @@ def test_whoever_waits_can_be_interrupted(place, room):
         raise KeyboardInterrupt
 
     def build(folder: Path) -> Path:
-        return cached(MATERIAL, Builder(), room, interrupted)  # waits for this very build
+        return get_or_build(MATERIAL, Builder(), room, interrupted)  # waits for this very build
 
     with pytest.raises(KeyboardInterrupt):
-        cached(MATERIAL, build, room)
-    assert cached(MATERIAL, Builder(), room).exists()
+        get_or_build(MATERIAL, build, room)
+    assert get_or_build(MATERIAL, Builder(), room).exists()
 
 
 def test_a_process_that_ends_at_once_removes_its_locks(place, room):
@@ -218,14 +218,14 @@ def test_a_process_that_ends_at_once_removes_its_locks(place, room):
         found.append(len([*(place / "locks").iterdir()]))
         return Builder()(folder)
 
-    cached(MATERIAL, ended, room)
+    get_or_build(MATERIAL, ended, room)
     assert found == [1, 0]
 
 
 def test_off_builds_every_time_and_keeps_nothing(monkeypatch, room):
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")
     builder = Builder()
-    assert cached(MATERIAL, builder, room) != cached(MATERIAL, builder, room)
+    assert get_or_build(MATERIAL, builder, room) != get_or_build(MATERIAL, builder, room)
     assert builder.calls == 2
     assert cache.folder() is None
 
@@ -245,7 +245,7 @@ def test_locks_and_libraries_lie_where_no_other_user_gets(
     root = tmp_path / "home" / "cache"
     monkeypatch.setenv("HAPTICLINK_CACHE", str(root))
     seen: list[Path] = []
-    attempted = lock.attempted
+    attempted = lock.try_lock
 
     def noted(path: Path) -> AbstractContextManager[bool]:
         seen.append(path)

@@ -14,7 +14,7 @@ from hapticlink.components.port_space import PLANE
 from hapticlink.fmus.description_common import described as of_component
 from hapticlink.fmus.errors import InvalidUnit
 from hapticlink.fmus.model_description import files
-from hapticlink.fmus.scalar_variables import feed_through, initial_dependencies
+from hapticlink.fmus.scalar_variables import find_feed_through, initial_dependencies
 from hapticlink.fmus.units import BASES, base_unit
 from tests.fmus import sample_components
 
@@ -92,11 +92,11 @@ def test_outputs_of_a_sampled_block_are_discrete(fmus):
 
 def test_dependencies():
     spring, controller = sample_components.spring(), sample_components.controller()
-    assert feed_through(spring) == [[], [], [0], []]
+    assert find_feed_through(spring) == [[], [], [0], []]
     # x0 = F/k + 1 brings F and k into x[1]; a = (F - k x0)/m = -k/m loses F for good only
     # numerically: the structure keeps it.
     assert initial_dependencies(spring) == [[0, 2], [], [0, 1, 2], []]
-    assert feed_through(controller) == [[0, 1, 2, 3], [0, 1, 4, 5], [], []]
+    assert find_feed_through(controller) == [[0, 1, 2, 3], [0, 1, 4, 5], [], []]
 
 
 def test_model_structure(fmus):

@@ -51,7 +51,7 @@ from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native import compile_library, compiler, split_functions
 from hapticlink.fmus.native.compiler import linker_cache
 from hapticlink.fmus.native.source import component_source
-from hapticlink.fmus.reproducible_zip import write
+from hapticlink.fmus.reproducible_zip import write_zip
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import blocks
 from tests.fmus import sample_components
@@ -247,7 +247,7 @@ def rebuilt(path: Path, room: Path, build: Callable[[Path], object]) -> Path:
     made = {str(f.relative_to(room)): f.read_bytes() for f in room.rglob("*") if f.is_file()}
     target = room.with_suffix(".fmu")
     with target.open("wb") as file:
-        write(made, file)
+        write_zip(made, file)
     return target
 
 

@@ -8,14 +8,14 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.orchestrator.system.connections import connect
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused, System
 
 
 def system_of(scene: object, *options: str) -> System:
     """The system of a scene, by its name or path. Its FMU files need not exist any more."""
-    with built(open_scene.load(str(scene), options)) as system:
+    with build_system(open_scene.load(str(scene), options)) as system:
         return system
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator.base.ticks import (
     Clock,
     Timeline,
-    aligned,
+    align_to_ticks,
     common_base,
     exact,
     periodic,
@@ -27,7 +27,7 @@ def fixed(haptics: Fraction, graphics: Fraction, steps: int, align: str = "exact
     fast, slow = 1 / haptics, 1 / graphics
     base = common_base([fast, slow]) if align == "exact" else fast
     end = steps * int(fast / base)
-    frames = periodic(slow, base, end) if align == "exact" else aligned(slow, base, end)
+    frames = periodic(slow, base, end) if align == "exact" else align_to_ticks(slow, base, end)
     return Timeline(
         base, end, (Clock("haptics", periodic(fast, base, end)), Clock("graphics", frames))
     )

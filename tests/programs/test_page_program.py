@@ -25,7 +25,7 @@ from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.programs.build import components
 from hapticlink.programs.page_program import write_page_sources
 from hapticlink.programs.ports import ports
@@ -78,8 +78,8 @@ def page_of(options: tuple[str, ...]) -> str:
 
 def under_node(text: str, changes: list[tuple[int, dict[str, Any]]]) -> np.ndarray:
     """The vector of signals of a page after each haptic event."""
-    data = json.loads(one_file.unpacked(text, "data"))
-    program = base64.b64encode(one_file.unpacked(text, "program")).decode()
+    data = json.loads(one_file.unpack_text(text, "data"))
+    program = base64.b64encode(one_file.unpack_text(text, "program")).decode()
     given = {"data": data, "program": program, "changes": changes}
     return np.array(javascript("program.js", RUN, given | {"events": EVENTS}))
 
@@ -88,7 +88,7 @@ def changed_run(scene: Scene, apply: Callable[[LiveRun, Any], None]) -> np.ndarr
     """The same of a run in the loop of every run, whose holds, rate and gains change as those of a
     run in real time, without waiting for a clock."""
     rows, changes = list[np.ndarray](), [*CHANGES]
-    with built(scene) as system, ExitStack() as stack:
+    with build_system(scene) as system, ExitStack() as stack:
         simulation = Simulation(system, RunResults(), stack)
         loop = CompiledLoop(Plan(system), simulation)
         simulation.start()

@@ -53,13 +53,13 @@ def as_json(data: Any) -> str:
     return text.replace("<", "\\u003c")
 
 
-def packed(content: bytes) -> str:
+def pack_text(content: bytes) -> str:
     """Compressed bytes as text of base 85, 6 % shorter than base 64, with "," for "<", which could
     end the element; packed.js unpacks them."""
     return base64.b85encode(gzip.compress(content, 9, mtime=0)).decode().replace("<", ",")
 
 
-def unpacked(html: str, element: str) -> bytes:
+def unpack_text(html: str, element: str) -> bytes:
     """The packed bytes in an element of a page."""
     _, _, rest = html.partition(f'id="{element}">')
     return gzip.decompress(base64.b85decode(rest.partition("</script>")[0].replace(",", "<")))
@@ -68,15 +68,15 @@ def unpacked(html: str, element: str) -> bytes:
 def bundle(name: str) -> str:
     """A module of the page with those that it imports, each a function that returns what it
     exports, in the order in which they need each other; it comes last, and as it is."""
-    *needed, last = _ordered(name, [])
+    *needed, last = _order_modules(name, [])
     wrapped = (f"const {_variable(n)} = (() => {{\n{_module(n)}{_end(n)}}})();\n" for n in needed)
     return "".join([*wrapped, _module(last)])
 
 
-def _ordered(name: str, before: list[str]) -> list[str]:
+def _order_modules(name: str, before: list[str]) -> list[str]:
     """The modules `before`, then those that a module needs and they lack, then the module."""
     for needed in _needs(name):
-        before = before if needed in before else _ordered(needed, before)
+        before = before if needed in before else _order_modules(needed, before)
     return [*before, name]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.forces import wrenches
 from hapticlink.analysis.findings.tracking import (
-    constrained,
+    count_constrained,
     has_tracking,
     of_block,
     pose_error,
@@ -53,7 +53,7 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
         "constraints": (
             "At most {} constrained directions",
             "constrained directions",
-            {n: counted for n, r in runs.items() if (counted := constrained(r))},
+            {n: counted for n, r in runs.items() if (counted := count_constrained(r))},
         ),
     }
     made = {

@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.tracking import further_users
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
-from hapticlink.visualization.figure_axes import legend_above_curves, titled
+from hapticlink.visualization.figure_axes import legend_above_curves, titled_axes
 from hapticlink.visualization.figures.curves import curve
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     if driven:
         share = 100 * max(np.abs(tau).max() / limits[user] for user, (_, *tau) in driven.items())
         title += f"; motors reach {short(share)} % of their torque limit"
-    figure, axes = titled(results, title, "time (s)", *labels)
+    figure, axes = titled_axes(results, title, "time (s)", *labels)
     styles = dict(zip(["", *further_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
     for name, (time, force, moment) in drawn.items():

@@ -9,7 +9,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.summary import deadlines
 from hapticlink.orchestrator.results.read_results import Results
-from hapticlink.visualization.figure_axes import titled
+from hapticlink.visualization.figure_axes import titled_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +28,7 @@ def real_time(
     report = results.record.real_time
     assert report
     title = "; ".join(filter(None, (deadlines(report), more)))
-    figure, axes = titled(results, title, "time (ms)", "share of ticks that exceed it")
+    figure, axes = titled_axes(results, title, "time (ms)", "share of ticks that exceed it")
     histograms = report["histograms"]
     own = {"step time": histograms["step_time"], "lateness": histograms["lateness"]}
     for (label, histogram), style in zip(

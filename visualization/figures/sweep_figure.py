@@ -17,7 +17,7 @@ from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.table import columns
 from hapticlink.fmus.cache import sha, sources
 from hapticlink.fmus.versions import version
-from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
+from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -50,7 +50,7 @@ LAST_CHUNK = b"IEND\xaeB`\x82"
 """Of a PNG that is whole."""
 
 
-def check(metric: str, scenes: Sequence[Scene]) -> None:
+def check_metric(metric: str, scenes: Sequence[Scene]) -> None:
     """Raises InputFault, before anything runs, for a metric that no run of `scenes` can have.
 
     Connections are not known yet, so any `generated_J` column is accepted.
@@ -76,7 +76,7 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
     if metric not in known:
         return None
     if "_J" in metric:
-        rows = [r | {metric: 1e3 * r[metric]} if _shown(r, metric) else r for r in rows]
+        rows = [r | {metric: 1e3 * r[metric]} if _is_shown(r, metric) else r for r in rows]
     numeric = [k for k in keys if all(number(r.get(k, "")) is not None for r in rows)]
     others = [k for k in keys if k not in numeric[:1]]
     lines = len({_label(r, others) for r in rows})
@@ -87,9 +87,9 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
         _lines(axes, rows, numeric[0], others, metric)
     else:
         _bars(axes, rows, keys, metric)
-    best = min((r for r in rows if _shown(r, metric)), key=lambda r: r[metric], default=None)
+    best = min((r for r in rows if _is_shown(r, metric)), key=lambda r: r[metric], default=None)
     if best:
-        lost = sum(not _shown(r, metric) for r in rows)
+        lost = sum(not _is_shown(r, metric) for r in rows)
         text = finding(best, best[metric], _named(metric), keys, lost, len(rows))
         headline(axes, text, 80)
     return figure
@@ -100,7 +100,7 @@ def save(figure: Figure, path: Path, comment: str | None = None) -> None:
     figure.savefig(path, dpi=130, metadata={"Software": None, "Comment": comment})
 
 
-def write(path: Path, rows: Sequence[Row], keys: Sequence[str], metric: str | None) -> bool:
+def write_figure(path: Path, rows: Sequence[Row], keys: Sequence[str], metric: str | None) -> bool:
     """Write the figure of `draw`, unless the file there is that one already: loading Matplotlib and
     drawing take longer than finding a finished sweep. Returns whether there is a figure. Raises as
     `draw` does."""
@@ -162,11 +162,11 @@ def _label(row: Row, keys: Sequence[str]) -> str:
     """The values of a row; of many keys those that it gives, by name."""
     if len(keys) <= FEW_KEYS:
         return plain(", ".join(str(row.get(k, "as in the scene")) for k in keys))
-    given = ", ".join(shortened(f"{k}={row[k]}") for k in _naming(row, keys))
+    given = ", ".join(shorten(f"{k}={row[k]}") for k in _naming(row, keys))
     return plain(fill(given, 50)) or "as in the scene"
 
 
-def _shown(row: Row, metric: str) -> bool:
+def _is_shown(row: Row, metric: str) -> bool:
     value = row.get(metric)
     return isinstance(value, int | float) and bool(np.isfinite(value)) and row["end"] in GOOD
 
@@ -182,21 +182,21 @@ def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric
     for i, (label, group) in enumerate(groups.items()):
         group.sort(key=lambda r: float(r[x]))
         positions = np.array([float(r[x]) for r in group])
-        value = np.array([r[metric] if _shown(r, metric) else np.nan for r in group])
+        value = np.array([r[metric] if _is_shown(r, metric) else np.nan for r in group])
         colour, dash = colours[i % FEW], ("-", "--", ":", "-.")[i // FEW % 4]
         axes.plot(positions, value, dash, color=colour, marker=".", label=label or None)
         drawn += [v for v in value if np.isfinite(v)]
-        bad = [float(r[x]) for r in group if not _shown(r, metric)]
+        bad = [float(r[x]) for r in group if not _is_shown(r, metric)]
         # Ended early: on the upper edge, a little apart for each line.
         axes.plot(
             bad, [0.99 - 0.02 * (i % 20)] * len(bad), "x", color=colour, ms=5,
             transform=axes.get_xaxis_transform(), clip_on=False,
         )  # fmt: skip
-    if any(not _shown(r, metric) for r in rows):
+    if any(not _is_shown(r, metric) for r in rows):
         axes.plot([], [], "kx", label="ended early or failed")
     _scale(axes, drawn)
     axes.set(xlabel=axis(x), ylabel=_named(metric))
-    if len(groups) > 1 or any(not _shown(r, metric) for r in rows):
+    if len(groups) > 1 or any(not _is_shown(r, metric) for r in rows):
         title = ", ".join(others) if others else None
         axes.legend(
             title=title, fontsize="small", loc="center left", bbox_to_anchor=(1.01, 0.5),
@@ -208,7 +208,7 @@ def _map(figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: st
     xs, ys = (sorted({float(r[k]) for r in rows}) for k in (x, y))
     values = np.full((len(ys), len(xs)), np.nan)
     for r in rows:
-        if _shown(r, metric):
+        if _is_shown(r, metric):
             values[ys.index(float(r[y])), xs.index(float(r[x]))] = r[metric]
     axes.set_facecolor("0.85")  # where a run ended early or failed
     axes.grid(False)
@@ -221,7 +221,7 @@ def _map(figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: st
 
 def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str) -> None:
     labels = [_label(r, keys) for r in rows]
-    values = [r[metric] if _shown(r, metric) else np.nan for r in rows]
+    values = [r[metric] if _is_shown(r, metric) else np.nan for r in rows]
     axes.barh(range(len(rows)), values, tick_label=labels)
     for i, value in enumerate(values):
         if np.isnan(value):

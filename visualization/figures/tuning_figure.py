@@ -20,13 +20,13 @@ def draw(tuned: Tuned) -> Figure:
     """Bars of the felt stiffnesses and of the margins."""
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _felt(left, tuned)
+    _draw_felt(left, tuned)
     _margins(right, tuned)
     headline(figure, f"{tuned.title}: {tuned.finding}", 100)
     return figure
 
 
-def _felt(axes: Axes, tuned: Tuned) -> None:
+def _draw_felt(axes: Axes, tuned: Tuned) -> None:
     width = 0.8 / len(tuned.along)
     for i, name in enumerate(tuned.along):
         values = np.array([felt[name] for felt in tuned.felt.values()])

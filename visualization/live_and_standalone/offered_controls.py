@@ -12,7 +12,7 @@ from hapticlink.analysis.findings import labels
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.changes import choices_of_slower
-from hapticlink.orchestrator.system.springs import limited_gains
+from hapticlink.orchestrator.system.springs import find_limited_gains
 from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
 
@@ -67,12 +67,12 @@ class Offered:
         """The controls by `key`, each with its value and what bounds it, as JSON has it."""
         controls: list[dict[str, Any]] = []
         if self.rate is not None:
-            rate = {"key": RATE, "value": self.own_rate, "words": _titled(self._of)}
+            rate = {"key": RATE, "value": self.own_rate, "words": _title(self._of)}
             controls += [rate, {"key": JITTER, "value": 0.0}]
         if self.topology:
             controls.append({"key": RENDERED, "value": True})
         for name, choices in self.holds.items():
-            words = _titled(labels.connection(name))
+            words = _title(labels.connection(name))
             controls += [
                 {"key": f"holds.{name}", "value": choices[0], "words": words, "choices": choices},
                 {"key": f"delays.{name}", "value": 0.0, "words": words},
@@ -93,7 +93,7 @@ class Offered:
         return names if len(names) >= len(TOPOLOGY) else []
 
 
-def _titled(text: str) -> str:
+def _title(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
@@ -115,7 +115,7 @@ def target(user: str) -> str:
 def _gains(scene: Scene, system: System) -> dict[str, tuple[NDArray[np.float64], list[str]]]:
     """Values and units of the parameters that a page can scale, by their name."""
     gains: dict[str, tuple[NDArray[np.float64], list[str]]] = {}
-    fixed = limited_gains(system)
+    fixed = find_limited_gains(system)
     names = [MECHANISM, *(block_of_user(b, user) for user in users(scene) for b in GAINS)]
     for fmu in (system.fmu[name] for name in names if name in system.fmu):
         tunable = [

@@ -21,8 +21,8 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import built
-from hapticlink.orchestrator.system.changes import held_by
+from hapticlink.orchestrator.system.build_system import build_system
+from hapticlink.orchestrator.system.changes import with_hold
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
@@ -90,9 +90,9 @@ def judge_hands(
         raise InputFault("nobody holds the mechanism")
     changed = _at_rate(scene, settings.get(RATE))
     with (
-        interrupt.held(),
+        interrupt.defer_signals(),
         np.errstate(invalid="ignore", over="ignore"),
-        built(scene) as whole,
+        build_system(scene) as whole,
     ):
         _require_quick(changed, whole)
         system = replace(
@@ -100,7 +100,7 @@ def judge_hands(
             timeline=timeline(changed),
             fmus=tuple(_with_parameters(fmu, parameters) for fmu in whole.fmus),
             connections=tuple(
-                held_by(c, settings.get(f"holds.{c.name}"), settings.get(f"delays.{c.name}"))
+                with_hold(c, settings.get(f"holds.{c.name}"), settings.get(f"delays.{c.name}"))
                 for c in whole.connections
             ),
         )

@@ -9,7 +9,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import HAND, block_of_user
-from hapticlink.orchestrator.scene.overrides import Options, written
+from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.scene.scene import Scene
 
 STIFFNESS, DAMPING = (100.0, 100.0, 0.0), (5.0, 5.0, 0.005)
@@ -27,7 +27,7 @@ def load_viewed_scene(name: str, options: Options = (), duration: float = DURATI
             f"{name}: has no [linkage], so that there is nothing to take hold of; view shows "
             "mechanisms, for instance `hapticlink view closed-loop`"
         )
-    read = open_scene.load(name, (*written({"packaging": "native"}), *written(options)))
+    read = open_scene.load(name, (*write_options({"packaging": "native"}), *write_options(options)))
     hands = [block_of_user(HAND, user) for user in ("", *read.devices)]
     if any(fmu.replaces in hands for fmu in read.fmu):
         raise InputFault(

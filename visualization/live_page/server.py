@@ -29,7 +29,12 @@ from websockets.http11 import Request, Response
 
 from hapticlink.visualization.browser_code.one_file import PAGE, headers
 from hapticlink.visualization.live_page import messages
-from hapticlink.visualization.live_page.server_pipe import ChildProcess, read, to_caller, write
+from hapticlink.visualization.live_page.server_pipe import (
+    ChildProcess,
+    read_message,
+    to_caller,
+    write_message,
+)
 from hapticlink.visualization.live_page.stability_process import StabilityProcess
 
 if TYPE_CHECKING:
@@ -181,7 +186,7 @@ class Pages:
         """Tell the run that a change is of, or both of a hand and a button."""
         of_second = isinstance(message, messages.Set) and message.b and self._second
         if not of_second:
-            write(self._out, message)
+            write_message(self._out, message)
         if self._second and (of_second or not isinstance(message, messages.Set)):
             self._second.send(message)
 
@@ -215,8 +220,8 @@ async def _served(
     try:
         server = await _bound(pages, host, ports)
     except OSError as error:
-        return write(out, {"error": error.strerror or str(error)})
-    write(out, {"port": server.sockets[0].getsockname()[1]})
+        return write_message(out, {"error": error.strerror or str(error)})
+    write_message(out, {"port": server.sockets[0].getsockname()[1]})
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
 
     def failed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -227,7 +232,7 @@ async def _served(
 
     def receive() -> None:
         try:
-            while (message := read(sys.stdin.buffer)) is not None:
+            while (message := read_message(sys.stdin.buffer)) is not None:
                 if message["type"] == "opening":
                     from hapticlink.visualization.live_and_standalone import first_messages
 
@@ -246,7 +251,7 @@ def main() -> None:
     """Serve until the standard input ends."""
     out = to_caller()
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # connections that fail are no news
-    if (arguments := read(sys.stdin.buffer)) is None:
+    if (arguments := read_message(sys.stdin.buffer)) is None:
         return
     host, ports, token, *second_run = arguments
     try:

@@ -52,7 +52,7 @@ class Pipe:
         self._sent.put(None)
 
     def _receive(self) -> None:
-        while (message := read(self._incoming)) is not None:
+        while (message := read_message(self._incoming)) is not None:
             self._received.append(message)
         self.alive = False
 
@@ -112,13 +112,13 @@ def to_caller() -> IO[bytes]:
     return out
 
 
-def write(stream: IO[bytes], message: Any) -> None:
+def write_message(stream: IO[bytes], message: Any) -> None:
     """Write a message to a stream, for `read`."""
     pickle.dump(message, stream)
     stream.flush()
 
 
-def read(stream: IO[bytes]) -> Any:
+def read_message(stream: IO[bytes]) -> Any:
     """The next message of a stream, None at its end."""
     try:
         return pickle.load(stream)

@@ -10,7 +10,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from hapticlink.fmus.durations import measured
+from hapticlink.fmus.durations import record_duration
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
@@ -79,7 +79,7 @@ class Session:
         drawing = (scene.linkage, scene.all_devices, scene.contacts)
         self._say("opening", title=scene.title, picture=drawing)
         with self._before:  # it ends where the first run begins
-            took = self._before.enter_context(measured(f"{scene.title}: FMUs of its page"))
+            took = self._before.enter_context(record_duration(f"{scene.title}: FMUs of its page"))
             Building(self._link, took)
             self._repeat()
 
@@ -183,7 +183,7 @@ class Session:
         reason = result.run["end"]["reason"]
         self._tell(ended=str(result.fault or f"the run has ended: {reason}"), recording=None)
         while True:
-            interrupt.check()
+            interrupt.raise_if_interrupted()
             self._require_server()
             received = self._link.received()
             self._waiting += [m for m in received if not isinstance(m, messages.Time)]

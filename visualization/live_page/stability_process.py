@@ -19,7 +19,12 @@ from typing import Any
 
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Interrupted
-from hapticlink.visualization.live_page.server_pipe import ChildProcess, read, to_caller, write
+from hapticlink.visualization.live_page.server_pipe import (
+    ChildProcess,
+    read_message,
+    to_caller,
+    write_message,
+)
 
 REST, LOOK = 0.3, 0.02
 """Times (s) for which nothing was changed before the verdict is computed, and between two looks for
@@ -76,10 +81,10 @@ def main() -> None:
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the other processor is for the haptic loop
     out, questions = to_caller(), queue.SimpleQueue[Any]()
     signal.signal(signal.SIGINT, lambda *_: None)
-    read(sys.stdin.buffer)  # the arguments, of which there are none
+    read_message(sys.stdin.buffer)  # the arguments, of which there are none
 
     def receive() -> None:
-        while (question := read(sys.stdin.buffer)) is not None:
+        while (question := read_message(sys.stdin.buffer)) is not None:
             if not interrupt.came():
                 signal.raise_signal(signal.SIGINT)  # ends what is being computed, not this question
             questions.put(question)
@@ -94,8 +99,8 @@ def main() -> None:
         number, scene, *changes = questions.get()
         with suppress(Interrupted):
             for answer in predict_stepwise(unpack_scene(scene), *changes):
-                write(out, (number, answer))
-            write(out, (number, None))
+                write_message(out, (number, answer))
+            write_message(out, (number, None))
 
 
 if __name__ == "__main__":

@@ -21,9 +21,9 @@ from hapticlink.visualization.mechanism.marks import (
     Mark,
     Place,
     Point,
-    attached,
+    attachment_points,
     outline,
-    outlined,
+    outline_bodies,
     reach,
 )
 from hapticlink.visualization.mechanism.picture import Picture
@@ -57,7 +57,12 @@ def draw(
     frame = picture.at_rest(q)
     if end is not None:
         at_end = {"end": picture.drawn({"q": end})["poses"]}
-        paint(axes, outlined(linkage, "end", "#8c8c8c", "the linkage at the end"), at_end, zorder=2)
+        paint(
+            axes,
+            outline_bodies(linkage, "end", "#8c8c8c", "the linkage at the end"),
+            at_end,
+            zorder=2,
+        )
     paint(axes, picture.marks, frame)
     _names(axes, linkage, frame)
     limits = _limits(axes)
@@ -203,7 +208,9 @@ def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
     if len(linkage.body) > MAX_NAMED_BODIES:
         return
     corners = {
-        body.name: outline([*_world(frame, body.name, [*attached(linkage, body.name)] or [ORIGIN])])
+        body.name: outline(
+            [*_world(frame, body.name, [*attachment_points(linkage, body.name)] or [ORIGIN])]
+        )
         for body in linkage.body
     }
     every = np.vstack([*corners.values()])

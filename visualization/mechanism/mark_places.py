@@ -51,7 +51,7 @@ def shape(mark: Mark, frame: Frame) -> Points:
     corners = np.array(SHAPES[mark.kind])
     if mark.angle is None:
         return corners
-    return _turned(reach(frame, mark.at[-1].path), corners, mark.angle)
+    return _turn(reach(frame, mark.at[-1].path), corners, mark.angle)
 
 
 def arrow(mark: Mark, frame: Frame) -> Points | None:
@@ -61,7 +61,7 @@ def arrow(mark: Mark, frame: Frame) -> Points | None:
     return None if length < MIN_ARROW else force * mark.size * min(1.0, MAX_ARROW / length)
 
 
-def _turned(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
+def _turn(pose: Sequence[float], at: Any, by: float = 0.0) -> Points:
     """Points, (2,) or (k, 2), of the frame of a pose, turned into the world's directions."""
     angle = by + _angle(pose)
     c, s = np.cos(angle), np.sin(angle)
@@ -74,7 +74,7 @@ def _angle(pose: Sequence[float]) -> float:
 
 def _rail(mark: Mark, at: Points, frame: Frame) -> Points:
     pose = reach(frame, mark.at[-1].path)
-    along = _turned(pose, (mark.size * MM, 0.0), mark.angle or 0.0)
+    along = _turn(pose, (mark.size * MM, 0.0), mark.angle or 0.0)
     along = -along if np.dot(at[1] - at[0], along) < 0 else along
     return at + np.array([-along, along])
 

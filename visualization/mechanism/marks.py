@@ -117,8 +117,8 @@ def marks(
         *_slides(linkage),
         *_springs(linkage),
         *(m for i, b in enumerate(linkage.body) for m in _body(linkage, b, BODIES[i % 6])),
-        *outlined(linkage, "ghost", "#333333aa", "graphics copy"),
-        *outlined(linkage, "ghost", KINDS["folded"][0], when="folded"),
+        *outline_bodies(linkage, "ghost", "#333333aa", "graphics copy"),
+        *outline_bodies(linkage, "ghost", KINDS["folded"][0], when="folded"),
         *_joints(linkage),
         *_points(linkage),
         *(mark for user in users for mark in _handle(user)),
@@ -126,7 +126,7 @@ def marks(
     ]
 
 
-def outlined(
+def outline_bodies(
     linkage: Linkage, key: str, stroke: str, label: str = "", when: str = ""
 ) -> Iterator[Mark]:
     """The bodies as thin lines, at the poses at `key` of a frame."""
@@ -138,7 +138,7 @@ def outlined(
         yield Mark("ghost", kind, at, stroke, width=1.0, dash=(3.7, 1.6), label=said, when=when)
 
 
-def attached(linkage: Linkage, body: str) -> Iterator[Point]:
+def attachment_points(linkage: Linkage, body: str) -> Iterator[Point]:
     """The points at which a body has its joints, closures and operational points."""
     for joint in linkage.joint:
         if joint.child == body:
@@ -193,7 +193,7 @@ def state(kind: str, user: str) -> str:
 
 
 def _outline(linkage: Linkage, body: Body) -> Points:
-    return outline([*attached(linkage, body.name)] or [body.center or ORIGIN])
+    return outline([*attachment_points(linkage, body.name)] or [body.center or ORIGIN])
 
 
 def _corners(linkage: Linkage, body: Body, key: str = "poses") -> tuple[Place, ...]:

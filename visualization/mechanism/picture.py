@@ -70,7 +70,7 @@ class Picture:
             for gives, q in (("poses", "q"), ("ghost", "ghost"))
         ]
         if linkage.loop:
-            self.parts.append(_cut(linkage, names, poses))
+            self.parts.append(_cut_joint_forces(linkage, names, poses))
         ok, margin, gap = (ca.SX.sym(name) for name in ("branch_ok", "margin", "gap"))
         space, force = linkage.space, ca.SX.sym("F_env", linkage.space.size)
         touching = ca.logic_and(gap < 0, ca.norm_1(force) > 0)
@@ -85,7 +85,7 @@ class Picture:
             self.parts.append(
                 Part(user, "arms", ("handle",), device.space.pose.shape, link_function(device))
             )
-            self.parts.append(_saturated(user, device))
+            self.parts.append(_is_saturated(user, device))
 
     def drawn(self, frame: dict[str, Any]) -> dict[str, Any]:
         """The frame with `poses`, `ghost` by body's name, forces in the `cut` joints, `states`, and
@@ -125,7 +125,7 @@ def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in values.items() if k not in RAW}
 
 
-def _cut(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:
+def _cut_joint_forces(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:
     """The force (N) in each joint that is cut, (2, k). It has two multipliers, a slot one; that of
     what slides is along the normal, and a moment has no arrow."""
     rows = sum(loop.kind.rows for loop in linkage.loop)
@@ -168,7 +168,7 @@ def _state(user: str, kind: str, needs: Mapping[str, ca.SX], holds: ca.SX) -> Pa
     return Part(user, kind, (*needs,), sizes, function, is_state=True)
 
 
-def _saturated(user: str, device: Device) -> Part:
+def _is_saturated(user: str, device: Device) -> Part:
     """Whether a motor gives its largest torque."""
     force, pose = (ca.SX.sym(name, device.space.size) for name in ("F_motor", "measured"))
     torques = torque_function(device)(force, pose)

@@ -46,7 +46,7 @@ FITTED = ("obstacle", "body", "handle")
 Array = NDArray[np.float64]
 
 
-def write(runs: Sequence[Recorded], names: Sequence[str], path: Path) -> None:
+def write_animation(runs: Sequence[Recorded], names: Sequence[str], path: Path) -> None:
     """Writes a GIF, WebP or animated PNG, by the ending of the path's name, which begins anew after
     its end. The same runs give the same bytes."""
     end = max(float(run.times[-1]) for run in runs)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.analysis.findings.tracking import further_users, of_any_shape, of_block, table_of
-from hapticlink.analysis.findings.user_port import tolerated, user_port
+from hapticlink.analysis.findings.user_port import tolerated_in_run, user_port
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
@@ -62,7 +62,7 @@ class Recorded:
                 raise InputFault(f"{folder}: {signal} {message}")
             if not len(table["time"]):
                 raise InputFault(f"{folder}: the run ended before its first row")
-        self.signals, self.missing = _shown(results)
+        self.signals, self.missing = _choose_signals(results)
         tables = [t for s in self.signals.values() if (t := table_of(results, s))]
         fastest = max(tables, key=lambda table: len(table.rows))
         self.every = -(-len(fastest.rows) // MAX_FRAMES)
@@ -95,7 +95,7 @@ class Recorded:
 
     def frames(self) -> list[dict[str, Any]]:
         """The frames as the live page gets them, without their time and what is not finite."""
-        values, port, most = self.values(), user_port(self.results), tolerated(self.results)
+        values, port, most = self.values(), user_port(self.results), tolerated_in_run(self.results)
         energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
         made = []
         for i in range(len(self.times)):
@@ -117,7 +117,7 @@ class Recorded:
             "title": self.results.record.scene["title"],
             "ending": summary.ending(self.results),
             "marks": [mark._asdict() for mark in self.picture.marks],
-            "times": [_rounded(float(t)) for t in self.times],
+            "times": [_round(float(t)) for t in self.times],
             "every": self.every,
             "missing": self.missing,
             "left_out": self.left_out,
@@ -143,7 +143,7 @@ def newest(table: Table, times: Vector) -> NDArray[np.intp]:
     return np.maximum(np.searchsorted(table["time"], times + 1e-12, "right") - 1, 0)
 
 
-def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
+def _choose_signals(results: Results) -> tuple[dict[str, str], list[str]]:
     """The recorded signal of each name of a frame, and those that are not recorded although the
     scene has them. A signal that stands in for another one does so only where there is no other."""
     left_out = results.record.not_recorded
@@ -164,17 +164,17 @@ def _shown(results: Results) -> tuple[dict[str, str], list[str]]:
 
 def _changes(values: Sequence[Any]) -> dict[str, list[Any]]:
     """The values that differ from the one before, and at which places they are."""
-    at, kept = [0], [_rounded(values[0])]
+    at, kept = [0], [_round(values[0])]
     for i, value in enumerate(values):
         if value != values[at[-1]]:
             at.append(i)
-            kept.append(_rounded(value))
+            kept.append(_round(value))
     return {"at": at, "is": kept}
 
 
-def _rounded(value: Any) -> Any:
+def _round(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     if isinstance(value, dict):
-        return {k: _rounded(v) for k, v in value.items()}
-    return [_rounded(v) for v in value] if isinstance(value, list | tuple) else value
+        return {k: _round(v) for k, v in value.items()}
+    return [_round(v) for v in value] if isinstance(value, list | tuple) else value

@@ -38,7 +38,7 @@ def require_written(path: Path) -> None:
     folders.ensure(path.parent, "--export")
 
 
-def write(runs: Sequence[Recorded], path: Path) -> None:
+def write_replay(runs: Sequence[Recorded], path: Path) -> None:
     """Writes the replay of the runs as a page or, by the file's name, as an animation."""
     if path.suffix.lower() == ".html":
         with atomic_file(path) as unfinished:
@@ -47,4 +47,4 @@ def write(runs: Sequence[Recorded], path: Path) -> None:
     from hapticlink.visualization.replay import animation  # with Matplotlib, slow to load
 
     with atomic_file(path) as unfinished:
-        animation.write(runs, _names(runs), unfinished)
+        animation.write_animation(runs, _names(runs), unfinished)

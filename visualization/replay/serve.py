@@ -13,7 +13,7 @@ from hapticlink.visualization.browser_code.one_file import POLICY, headers
 
 
 @contextmanager
-def served(html: str, host: str, ports: Sequence[int], token: str) -> Iterator[int]:
+def serve_page(html: str, host: str, ports: Sequence[int], token: str) -> Iterator[int]:
     """Serves `html` at /<token>/ within the context, which gets the first of the ports that is
     free; 0 is any. Raises OSError where none is."""
     body, path = html.encode(), f"/{token}/"

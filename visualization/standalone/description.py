@@ -69,7 +69,7 @@ class PageDescription:
                 for key, indices in signals.items()
                 if key not in RAW
             ],
-            "parts": [*_laid_out(parts)],
+            "parts": [*_lay_out(parts)],
             "stored": program.simulation.signals.scalar(*MECHANISM_ENERGY.split(".")),
             "n_values": len(program.simulation.signals.values),
             "n_drawn": self.drawing.function.nnz_out(),
@@ -110,7 +110,7 @@ def _drawing(parts: Sequence[Part], places: Places) -> Drawing:
     return Drawing(ca.Function("picture", [raw], [drawn]), order)
 
 
-def _laid_out(parts: Sequence[Part]) -> Iterator[dict[str, Any]]:
+def _lay_out(parts: Sequence[Part]) -> Iterator[dict[str, Any]]:
     """Where the results of the parts are among the numbers that are drawn."""
     offset = 0
     for part in parts:

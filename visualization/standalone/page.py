@@ -30,7 +30,7 @@ POLICY = (
 MODULE = "page.wasm"
 
 
-def write(scene: Scene, name: str, path: Path) -> None:
+def write_page(scene: Scene, name: str, path: Path) -> None:
     """Write the page of a scene of `load_viewed_scene`. name: of the files that the page saves.
     Raises InputFault where the scene cannot become a program, with what stands in the way."""
     folders.ensure(path.parent, "--standalone")
@@ -41,13 +41,13 @@ def write(scene: Scene, name: str, path: Path) -> None:
 
 def html(scene: Scene, name: str) -> str:
     """The page. The same scene gives the same bytes."""
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         with resolve_scene(scene, changing=True) as program:
             blocks = components(program)
             variables = ports(program, blocks)
             description = PageDescription(program, variables, name)
             files = write_page_sources(program, blocks, variables, description.drawing)
-        module = _compiled(files, room)
+        module = _compile_page(files, room)
     verdict = predict_stability(scene, {}, description.parameters)
     description.data["map"] = {"type": "map"} | verdict
     contents = {
@@ -56,11 +56,11 @@ def html(scene: Scene, name: str) -> str:
         "sound": one_file.bundle("sound_worklet.js").encode(),
         "program": module,
     }
-    texts = {name: one_file.packed(content) for name, content in contents.items()}
+    texts = {name: one_file.pack_text(content) for name, content in contents.items()}
     return one_file.page("index.html", texts, POLICY)
 
 
-def _compiled(files: Mapping[str, str], room: Path) -> bytes:
+def _compile_page(files: Mapping[str, str], room: Path) -> bytes:
     """The module of C files, from the cache where it is there, which keeps archives."""
     try:
         compiler = [compiler_version(), *WEBASSEMBLY_FLAGS]
@@ -69,14 +69,14 @@ def _compiled(files: Mapping[str, str], room: Path) -> bytes:
         def make(folder: Path) -> Path:
             path = folder / "page.fmu"
             with path.open("xb") as file:
-                reproducible_zip.write({MODULE: compile_page(files, folder)}, file)
+                reproducible_zip.write_zip({MODULE: compile_page(files, folder)}, file)
             return path
 
-        path = cache.cached(material, make, room, interrupt.check)
+        path = cache.get_or_build(material, make, room, interrupt.raise_if_interrupted)
         with zipfile.ZipFile(path) as archived:
             return archived.read(MODULE)
     except CompilerError as error:
-        interrupt.check()
+        interrupt.raise_if_interrupted()
         raise Fault(str(error)) from error
     except FmuError as error:
         raise InputFault(str(error)) from error

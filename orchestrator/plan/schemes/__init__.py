@@ -28,8 +28,8 @@ class Scheme:
 SCHEMES: Registry[Scheme] = scene_tables.SCHEMES
 SCHEMES.misfit = lambda part: no_instance(part, Scheme)
 SCHEMES |= {
-    "gauss-seidel": Scheme(gauss_seidel.block, gauss_seidel.ordered),
+    "gauss-seidel": Scheme(gauss_seidel.block, gauss_seidel.order_fmus),
     "jacobi": Scheme(jacobi.block),
-    "gauss-seidel-plants": Scheme(gauss_seidel_plants.block, gauss_seidel_plants.ordered),
-    "iterated": Scheme(iterated.block, iterated.ordered),
+    "gauss-seidel-plants": Scheme(gauss_seidel_plants.block, gauss_seidel_plants.order_fmus),
+    "iterated": Scheme(iterated.block, iterated.order_fmus),
 }

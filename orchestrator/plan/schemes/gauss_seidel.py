@@ -37,7 +37,7 @@ def before_plants(system: System, event: Event) -> list[Operation]:
     return operations
 
 
-def ordered(system: System) -> list[list[Fmu]]:
+def order_fmus(system: System) -> list[list[Fmu]]:
     return [[u for u in system.fmus if u.sampled]]
 
 

@@ -28,5 +28,5 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     return tuple(operations)
 
 
-def ordered(system: System) -> list[list[Fmu]]:
-    return [*gauss_seidel.ordered(system), [u for u in system.fmus if not u.sampled]]
+def order_fmus(system: System) -> list[list[Fmu]]:
+    return [*gauss_seidel.order_fmus(system), [u for u in system.fmus if not u.sampled]]

@@ -51,11 +51,11 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     return tuple(operations)
 
 
-def ordered(system: System) -> list[list[Fmu]]:
+def order_fmus(system: System) -> list[list[Fmu]]:
     plants = [u for u in system.fmus if not u.sampled]
     clocks = dict.fromkeys(u.clock for u in plants)
     of_a_rate = ([u for u in plants if u.clock == clock] for clock in clocks)
-    return [*gauss_seidel.ordered(system), *of_a_rate]
+    return [*gauss_seidel.order_fmus(system), *of_a_rate]
 
 
 def groups(system: System, event: Event) -> list[list[Fmu]]:

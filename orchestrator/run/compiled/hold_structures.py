@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.errors import Fault, shortened
+from hapticlink.orchestrator.base.errors import Fault, shorten
 from hapticlink.orchestrator.holds.table import IN_PYTHON, ROWS, HoldRow
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
@@ -22,7 +22,7 @@ from hapticlink.orchestrator.run.hold_parts import (
 )
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene_tables import SetSpring
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 
 FEW = 16
 """Samples that there is room for at first."""
@@ -114,7 +114,7 @@ class CompiledHold:
         self.premises: Vector | None = None
         self.own: Any = None
         if parts.latency:
-            link = Link(parts.latency, parts.base)
+            link = SampleLink(parts.latency, parts.base)
             low, spread, unit = link.whole_numbers()
             self.link = structures.Link(low=low, spread=spread, unit=unit, loss=link.latency.loss)
             fill_generator(self.link.generator, link.latency.seed)
@@ -193,7 +193,7 @@ class CompiledHold:
         ):
             raise Fault(
                 f"hold {self.parts.name!r} of {self._connection}: its value is "
-                f"{shortened(' '.join(repr(value).split()))}, where {self._n} finite numbers in "
+                f"{shorten(' '.join(repr(value).split()))}, where {self._n} finite numbers in "
                 "a NumPy array are needed"
             )
         return value

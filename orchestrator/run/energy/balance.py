@@ -51,7 +51,7 @@ class Balance:
         return Diverged(MECHANISM, f"{what} {remedy}", time, repeatable=True)
 
 
-def generated_and_put_in(system: System, booked: Mapping[str, Energy]) -> tuple[float, float]:
+def sum_energies(system: System, booked: Mapping[str, Energy]) -> tuple[float, float]:
     """The energies (J) that sampling and holding have generated, and that hands and mechanism have
     put in. What a controller passes on was not put in by it."""
     source = {name: system.block(system.connection[name].source) for name in booked}
@@ -61,7 +61,7 @@ def generated_and_put_in(system: System, booked: Mapping[str, Energy]) -> tuple[
 
 def unstable(system: System, booked: Mapping[str, Energy]) -> str:
     """A message if sampling and holding have generated more energy than was put in, else ""."""
-    generated, put_in = generated_and_put_in(system, booked)
+    generated, put_in = sum_energies(system, booked)
     if generated <= put_in + LEAST:
         return ""
     generation = f"sampling and holding generated {generated:.3g} J, where "

@@ -182,12 +182,12 @@ def test_an_arm_that_is_shaken_by_few_counts_is_warned_of(
 
 
 def test_hdf5_and_csv_are_one_log(log: Log, tmp_path: Path) -> None:
-    from hapticlink.analysis.fit.log import read
+    from hapticlink.analysis.fit.log import read_log
 
     with h5py.File(tmp_path / "log.h5", "w") as file:
         file["time"] = np.arange(len(log.pose)) * log.period
         file["haptic_device.x"], file["hand.F"] = log.pose, log.hand
-    one, other = read(tmp_path / "log.h5"), read(csv(log, tmp_path / "log.csv"))
+    one, other = read_log(tmp_path / "log.h5"), read_log(csv(log, tmp_path / "log.csv"))
     assert np.array_equal(one.pose, other.pose)
     assert np.array_equal(one.hand, other.hand)
     assert one.motors is None
@@ -219,5 +219,5 @@ def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("name", ["x" * 5000, "no\0name", "/dev/zero", "missing.csv"])
 def test_a_log_is_a_file(name: str) -> None:
-    with pytest.raises(hl.InputFault, match="cannot be read as a log: it is no file"):
+    with pytest.raises(hl.InputFault, match="cannot be read as a log: not a regular file"):
         hl.fit(name)

@@ -13,7 +13,7 @@ import hapticlink as hl
 from hapticlink.analysis.maps import run_checks, wall_closed_form
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.scene.overrides import written
+from hapticlink.orchestrator.scene.overrides import write_options
 from tests.analysis.stability.own_hand import DAMPED as WALL
 
 M, D, T = 0.3, 5.0, 1 / 512
@@ -79,7 +79,9 @@ def test_runs_agree_with_the_map(wall: hl.Map) -> None:
 @pytest.mark.parametrize("foretold", [5.0, -5.0])
 def test_a_run_is_judged_alike_whatever_was_foretold(foretold: float) -> None:
     """A wall below its limit, whose slow decay two seconds would not show."""
-    scene = open_scene.load("virtual-wall", [*written(WALL), f"{STIFFNESS}=4900", f"{DAMPING}=0"])
+    scene = open_scene.load(
+        "virtual-wall", [*write_options(WALL), f"{STIFFNESS}=4900", f"{DAMPING}=0"]
+    )
     (radius,) = wall_limits.radius(M, D, T, 0, np.array([4900.0]), np.zeros(1))
     growth, verdict = run_checks.of_run(scene, foretold)
     assert growth == pytest.approx(np.log(radius) / T, rel=1e-3)

@@ -16,7 +16,7 @@ from hapticlink.analysis.stability.modes import (
     Linearisation,
     Mode,
     constant,
-    counted,
+    judged_modes,
     leading,
     modes,
     verdict,
@@ -45,7 +45,7 @@ class OwnHand:
 
     @property
     def first(self) -> Mode:
-        return counted([*self.neutral, *self.modes])[0]
+        return judged_modes([*self.neutral, *self.modes])[0]
 
     @property
     def radius(self) -> float:

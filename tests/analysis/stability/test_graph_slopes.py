@@ -45,7 +45,7 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
     scene, options, without = CASES[case]
     compared, worst, missing = 0, 0.0, set[bool]()
     apart, latest = dict[Any, int](), None
-    decide, in_graph = forward_sensitivity.decided, ForwardSensitivity._in_graph
+    decide, in_graph = forward_sensitivity.combine_slopes, ForwardSensitivity._in_graph
 
     def counted(exact: Matrix, slope: Matrix, error: Matrix) -> Any:
         J, E = decide(exact, slope, error)

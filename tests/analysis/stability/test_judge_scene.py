@@ -19,11 +19,15 @@ from hapticlink.analysis.stability.forward_sensitivity import ForwardSensitivity
 from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
-from hapticlink.analysis.stability.lifted_map import lifted_map, long_enough
+from hapticlink.analysis.stability.lifted_map import long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, improvements
 from hapticlink.analysis.stability.modes import DRIFT, kind, modes
-from hapticlink.analysis.stability.poses import evenly_spaced, settled, simulated
+from hapticlink.analysis.stability.poses import (
+    choose_evenly_spaced,
+    find_rest_poses,
+    simulate_scene,
+)
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
 from hapticlink.analysis.stability.verdict_record import Stability
@@ -76,7 +80,7 @@ def test_slopes_that_are_taken_over_stay_within_what_a_growth_rate_is_uncertain(
     manifolds change on the way to the equilibrium."""
     read = hl.scene("closed-loop", {"hold": "foh", "graphics.rate": 128})
     assert read.linkage is not None
-    poses = settled(read, read.linkage)[:1]
+    poses = find_rest_poses(read, read.linkage)[:1]
     taken_over, _ = in_poses(read, poses, HANDS, DRIFT)
     monkeypatch.setattr(forward_sensitivity, "SAME", 1e-13)
     monkeypatch.setattr(ForwardSensitivity, "_nodes", lambda *_: ())
@@ -93,7 +97,7 @@ def test_a_pose_is_that_of_a_scene_that_starts_there_by_the_fmus_of_the_scenes_o
     linkage = hl.scene(scene).linkage
     assert linkage is not None
     files = set()
-    for pose in evenly_spaced(simulated(scene, ("duration=0.5",)), linkage, 3):
+    for pose in choose_evenly_spaced(simulate_scene(scene, ("duration=0.5",)), linkage, 3):
         with resting(scene, pose.started | pose.held) as there:
             start, expected = there.map.start, leading(there.period({}))
         with resting(scene, pose.held, joints=pose.joints) as moved:
@@ -111,7 +115,7 @@ def test_a_hand_in_place_of_another_has_the_map_of_its_own_fmu(place: RestingSce
     options = {**SCENE, "hand": arm}
     with (
         linearisable("closed-loop-direct", options) as (read, system, _),
-        lifted_map(long_enough(read, system), read) as map_,
+        open_lifted_map(long_enough(read, system), read) as map_,
     ):
         loaded = modes(linearised(map_, map_.start), map_.period)[:LEADING]
     assert leading(in_arm) == pytest.approx([mode.z for mode in loaded], abs=1e-4)
@@ -200,7 +204,7 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     assert found.remedies[0].stable
     line = next(line for line in found.lines() if line.startswith("remedy: "))
     pasted = shlex.split(line.removeprefix("remedy: ").rpartition(": ")[0])[1::2]
-    again = hl.stability("virtual-wall", [*overrides.written(beyond), *pasted], poses=1)
+    again = hl.stability("virtual-wall", [*overrides.write_options(beyond), *pasted], poses=1)
     held = [c.growth for c in again.cases if not c.free and c.verdict != "marginal"]
     assert max(held) == pytest.approx(found.remedies[0].growth, rel=1e-9)
     marginal = {c.hand for c in again.cases if not c.free and c.verdict == "marginal"}
@@ -257,7 +261,7 @@ def test_rates_that_hardly_repeat_are_judged_with_frames_of_whole_periods() -> N
 def test_a_hand_beside_a_pose_leaves_it_where_it_pulls_away() -> None:
     """What is a divergence to the linearisation is judged by such a run."""
     scene = hl.scene("closed-loop")
-    (pose,) = evenly_spaced(simulated(scene, ("duration=0.1",)), scene.linkage, 1)
+    (pose,) = choose_evenly_spaced(simulate_scene(scene, ("duration=0.1",)), scene.linkage, 1)
     assert not pose.leaves(scene, HANDS["stiff arm, firm grip"])
     elsewhere = replace(pose, point=(pose.point[0] + 0.02, *pose.point[1:]))
     assert elsewhere.leaves(scene, HANDS["light touch"])
@@ -269,7 +273,7 @@ def test_softer_gains_stand_beside_another_remedy() -> None:
     are below the limit of the margin: that of 18 Hz, where frames of 28 and 29 haptic periods take
     turns, and not of frames that are all alike, with which 2.8 times the gains are stable."""
     scene = hl.scene("closed-loop-direct", ("graphics.rate=18",))
-    poses = evenly_spaced(simulated(scene, ("duration=0.1",)), scene.linkage, 1)
+    poses = choose_evenly_spaced(simulate_scene(scene, ("duration=0.1",)), scene.linkage, 1)
     hands = {"firm grip": HANDS["firm grip"]}
     (case,), _ = in_poses(scene, poses, hands, DRIFT)
     assert case.verdict == "unstable"

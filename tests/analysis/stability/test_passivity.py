@@ -11,7 +11,7 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.port_response import hand_port, mechanism_port
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from tests.analysis.stability.own_hand import DAMPED as WALL
 
 T = 1 / 512
@@ -67,7 +67,7 @@ def test_of_two_users_it_tells_what_is_left_as_at_the_equilibrium() -> None:
     """The cut of the first user's mechanism holds the second one's point, and what is sent of the
     forces there: the result names these outputs."""
     scene = open_scene.load("two-users", {"directions_from": "mechanism"})
-    with built(scene) as system:
+    with build_system(scene) as system:
         port = mechanism_port(system, hand_port(system))
     assert port is not None
     assert {"F_env", "left.x", "left.v", "left.F_env"} <= set(port.kept)

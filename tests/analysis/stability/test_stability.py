@@ -14,7 +14,7 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.forward_sensitivity import KINK
 from hapticlink.analysis.stability.hand_cases import SLIGHT
-from hapticlink.analysis.stability.modes import Linearisation, counted, modes, verdict
+from hapticlink.analysis.stability.modes import Linearisation, judged_modes, modes, verdict
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from tests.analysis.stability.own_hand import own_hand
 from tests.shared_fixtures import status
@@ -55,9 +55,9 @@ def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
 )
 def test_a_mode_that_may_grow_is_counted(A: list[list[float]], error: float, said: str) -> None:
     E = np.diag([error, 0.0])
-    first = counted(modes(Linearisation(np.zeros(2), np.zeros(2), np.eye(2), np.array(A), E), 1.0))[
-        0
-    ]
+    first = judged_modes(
+        modes(Linearisation(np.zeros(2), np.zeros(2), np.eye(2), np.array(A), E), 1.0)
+    )[0]
     assert verdict(abs(first.z), first.uncertainty) == said
 
 

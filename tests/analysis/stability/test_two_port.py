@@ -20,7 +20,7 @@ from hapticlink.analysis.stability.absolute_stability import (
     least,
 )
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import lifted_map
+from hapticlink.analysis.stability.lifted_map import open_lifted_map
 from hapticlink.analysis.stability.passivity import Passivity
 from hapticlink.analysis.stability.port_response import HandPort, MechanismPort
 from hapticlink.components.component import Block, Component, Variable
@@ -100,7 +100,7 @@ def judged(folder: Path, rate: int) -> Passivity:
     port = MechanismPort(
         "mechanism", ((("F", -1.0),),), (place("mechanism", "x"),), (place("mechanism", "v"),)
     )
-    with lifted_map(made) as map_:
+    with open_lifted_map(made) as map_:
         return passivity.of("two masses", equilibrium(map_, map_.start), hand, port, T)
 
 

@@ -31,15 +31,15 @@ Options = dict[str, Any]
 def test_closed_forms_give_the_reference_numbers() -> None:
     stable = [wall_limits.stable(M, D, T, periods) for periods in (0, 1, 2)]
     assert stable == pytest.approx([5147.9288, 1721.95, 1038.20], rel=1e-5)
-    largest = [wall_limits.undamped(1.0, 1.0, n / 10) for n in range(1, 10)]
+    largest = [wall_limits.limit_without_damping(1.0, 1.0, n / 10) for n in range(1, 10)]
     assert largest == pytest.approx(TABLE, abs=5e-5)
-    scaled = wall_limits.undamped(M, T, 0.8 * M / T) * T**2 / M
+    scaled = wall_limits.limit_without_damping(M, T, 0.8 * M / T) * T**2 / M
     assert scaled == pytest.approx(largest[7])
     assert wall_limits.passive(D, T) == pytest.approx(5120)
     assert wall_limits.passive(D, T, B=-1.0) == pytest.approx(4096)
-    assert wall_limits.undamped_measured(T, 5.0) == pytest.approx(5120)
+    assert wall_limits.limit_with_measured_velocity(T, 5.0) == pytest.approx(5120)
     assert wall_limits.damper(M, T) == pytest.approx(307.2)
-    assert wall_limits.quantised(D, T, 0.1, 0.18e-3) == pytest.approx(1111, abs=0.2)
+    assert wall_limits.limit_with_quantum(D, T, 0.1, 0.18e-3) == pytest.approx(1111, abs=0.2)
 
 
 def looped(m: float, b: float, T: float, periods: int, K: float, B: float) -> float:
@@ -102,7 +102,7 @@ def test_quantities_that_are_none_are_refused() -> None:
     with pytest.raises(ValueError, match=r"T = 0\.0: must be positive"):
         wall_limits.passive(5.0, 0.0)
     with pytest.raises(ValueError, match=r"delay = -1\.0: must not be negative"):
-        wall_limits.delayed(5.0, T, -1.0)
+        wall_limits.limit_with_delay(5.0, T, -1.0)
     with pytest.raises(ValueError, match="m = nan: must be positive"):
         wall_limits.stable(np.nan, 5.0, T)
     with pytest.raises(ValueError, match="b = 0"):
@@ -112,14 +112,16 @@ def test_quantities_that_are_none_are_refused() -> None:
 def test_small_gains_with_a_delay_come_to_the_rule_of_gil() -> None:
     """Where b T/m is small the exact limit and the rule agree."""
     exact = wall_limits.stable(M, 0.05, T, 2)
-    assert wall_limits.delayed(0.05, T, 2 * T) == pytest.approx(exact, rel=1e-3)
+    assert wall_limits.limit_with_delay(0.05, T, 2 * T) == pytest.approx(exact, rel=1e-3)
 
 
 CASES = [
     pytest.param(BILATERAL, STIFFNESS, wall_limits.stable(M, D, T), id="spring"),
     pytest.param(LATE, STIFFNESS, wall_limits.stable(M, D, T, 1), id="a sample late"),
     pytest.param(LATER, STIFFNESS, wall_limits.stable(M, D, T, 2), id="two samples late"),
-    pytest.param(MEASURED, STIFFNESS, wall_limits.undamped_measured(T, 5.0), id="velocity read"),
+    pytest.param(
+        MEASURED, STIFFNESS, wall_limits.limit_with_measured_velocity(T, 5.0), id="velocity read"
+    ),
     pytest.param(MEASURED | {STIFFNESS: 0.0}, DAMPING, wall_limits.damper(M, T), id="damper alone"),
 ]
 
@@ -179,7 +181,7 @@ def test_a_quantised_wall_chatters_beyond_its_limit() -> None:
     """The hand pushes with a force midway between those of two quanta: from rest, friction holds
     the handle up to K quantum = 2 f_c."""
     friction, quantum = 0.1, 0.18e-3
-    limit = wall_limits.quantised(D, T, friction, quantum)
+    limit = wall_limits.limit_with_quantum(D, T, friction, quantum)
 
     def speed(K: float) -> float:
         options = {

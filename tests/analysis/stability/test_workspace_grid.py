@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.stability.poses import simulated, visited
+from hapticlink.analysis.stability.poses import simulate_scene, visited_poses
 from hapticlink.analysis.stability.workspace_grid import grid_poses
 from hapticlink.components.device.workspace import margin
 
@@ -91,8 +91,8 @@ def test_a_grid_has_the_places_that_linkage_and_device_reach() -> None:
     """Links 1 and 2 of Table 6.1 reach 21 to 63 mm; with the elbow on the side on which it is in
     the run (law of cosines)."""
     scene = hl.scene("serial")
-    run = simulated(scene, {"duration": 1.0})
-    points, joints = visited(run)
+    run = simulate_scene(scene, {"duration": 1.0})
+    points, joints = visited_poses(run)
     assert (joints[:, 1] < 0.0).all()
     low, high = (end(points[:, :2], axis=0) for end in (np.min, np.max))
     low, high = low - 0.021, high + 0.021
@@ -122,7 +122,7 @@ def test_a_grid_has_the_places_that_linkage_and_device_reach() -> None:
 def test_where_the_point_moves_on_a_curve_the_poses_are_on_it() -> None:
     """The slider of a slider-crank: each cell with a part of its way has the nearest pose."""
     scene = hl.scene("slider-crank")
-    run = simulated(scene, {"duration": 1.0})
+    run = simulate_scene(scene, {"duration": 1.0})
     assert scene.linkage is not None
     poses = grid_poses(run, scene, scene.linkage, 4)
     assert len(poses) >= 2

@@ -37,7 +37,7 @@ def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
 
     def asked() -> str:
         cache.sources.cache_clear()
-        job._computed_with.cache_clear()
+        job._list_code.cache_clear()
         return job.key(scene)
 
     return asked
@@ -47,7 +47,7 @@ def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
 def _as_it_was() -> Iterator[None]:
     yield
     cache.sources.cache_clear()
-    job._computed_with.cache_clear()
+    job._list_code.cache_clear()
 
 
 @pytest.mark.parametrize(

@@ -233,7 +233,7 @@ def test_a_process_of_many_runs_makes_each_as_a_process_of_its_own(
     single = [rows(job) for job in made]
     assert single[0] != single[1]
     mapped, folders = [], []
-    with process_cache.unpacked_once():
+    with process_cache.keep_unpacked():
         for _ in range(3):
             assert [rows(job) for job in made] == single
             mapped.append(Path("/proc/self/maps").read_text().count(str(emptied_temporary_folder)))
@@ -539,7 +539,7 @@ def test_ctrl_c_ends_a_sweep_while_its_points_are_read() -> None:
                 os.kill(os.getpid(), signal.SIGINT)
             yield {"duration": str(k)}
 
-    with interrupt.held(), pytest.raises(Interrupted):
+    with interrupt.defer_signals(), pytest.raises(Interrupted):
         points_of.jobs("pendulum", [], points())
     assert len(read) <= 4
 

@@ -20,7 +20,7 @@ from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.control import Teleoperation, Topology
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.scene.overrides import written
+from hapticlink.orchestrator.scene.overrides import write_options
 
 T = 1 / 512
 LENGTH = 0.2
@@ -90,7 +90,7 @@ def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
     with counts so fine that they are not seen."""
     start = hl.run("closed-loop", {"duration": 0.01}, figures=False)
     pose = start.tables["haptics"]["virtual_mechanism.x"][0].tolist()
-    held = written(options | {"hand": spring(pose, (0.0, 0.0, 0.0), 1000.0)})
+    held = write_options(options | {"hand": spring(pose, (0.0, 0.0, 0.0), 1000.0)})
     with resting("closed-loop", held) as place:
         cut = response(place.period({}), hand_port(place.map.system))
     S = np.diag([1.0, 1.0, LENGTH])
@@ -108,10 +108,10 @@ def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
 
 def test_a_pressed_run_gives_the_felt_stiffness() -> None:
     """A hand without a spring presses along the constrained direction at 2 Hz: within 1 %."""
-    read = open_scene.load("closed-loop", written(ENCODERS))
+    read = open_scene.load("closed-loop", write_options(ENCODERS))
     assert read.linkage
     S = np.diag([1.0, 1.0, mean_link_length(read.linkage)])
-    felt = transparency.transparency("closed-loop", written(ENCODERS), count=1)[0]
+    felt = transparency.transparency("closed-loop", write_options(ENCODERS), count=1)[0]
     (constraint,) = felt.constrained
     hertz = float(HERTZ[np.argmin(np.abs(HERTZ - transparency.SLOW))])
     wrench = (0.05 * S @ constraint.along).tolist()
@@ -134,7 +134,7 @@ def test_costs_are_those_of_changed_scenes_and_their_limit_that_of_runs(
     """With the mechanism at 512 Hz no hold counts at rest. At 6.5 times the stiffnesses the handle
     comes to rest if the motors are a period late, and not if they are not, as the limits say."""
     monkeypatch.setattr(Judge, "margin", partialmethod(Judge.margin, fine=0.2))
-    costs = {c.change: c for c in transparency.costs("closed-loop", written(ENCODERS), print)}
+    costs = {c.change: c for c in transparency.costs("closed-loop", write_options(ENCODERS), print)}
     own, half = costs["as it is"], costs["half the haptic rate"]
     assert costs["hold foh"].cells() == own.cells() == costs["half the graphics rate"].cells()
     late = costs["motors a haptic period late"]

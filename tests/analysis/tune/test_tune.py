@@ -20,10 +20,10 @@ import hapticlink as hl
 from hapticlink.analysis.search.acceptance import Limits, energy_share, judged_numbers
 from hapticlink.analysis.search.search import COARSE, DOUBLINGS, largest_count, raise_laws
 from hapticlink.analysis.stability.hands import FIRM, spring
-from hapticlink.analysis.stability.poses import LIGHT, Pose, simulated
+from hapticlink.analysis.stability.poses import LIGHT, Pose, simulate_scene
 from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.scene.overrides import written
+from hapticlink.orchestrator.scene.overrides import write_options
 from tests.analysis.stability.own_hand import linearised
 
 RECORDED = Path(__file__).parents[3] / "results" / "tune"
@@ -229,7 +229,7 @@ def test_a_wild_run_is_no_measure_of_the_gains_that_are_found(
     monkeypatch.setattr("hapticlink.analysis.tune.tune_gains.NEAR", {})
     monkeypatch.setattr("hapticlink.analysis.search.search.COARSE", 0.7)
     tuned = hl.tune(scene)
-    own, found = (judged_numbers(simulated(scene, gains)) for gains in ({}, tuned.gains))
+    own, found = (judged_numbers(simulate_scene(scene, gains)) for gains in ({}, tuned.gains))
     assert energy_share(own) > 2.0
     assert energy_share(found) <= 1.0
     device = open_scene.load(scene).device
@@ -286,7 +286,11 @@ def pressed(name: str, pose: Pose, n: NDArray[np.float64], hertz: float, swing: 
         "amplitude": (swing * n / np.abs(n).max()).tolist(),
         "frequency": [hertz] * 3,
     }
-    options = [*written(pose.started | pose.held | {"hand": push}), "duration=4.0", *NO_ENCODER]
+    options = [
+        *write_options(pose.started | pose.held | {"hand": push}),
+        "duration=4.0",
+        *NO_ENCODER,
+    ]
     run = hl.run(RECORDED / name / "tuned.toml", options, figures=False)
     assert run.fault is None
     window = run.haptics["time"] > 3.0 + 1e-9
@@ -320,7 +324,7 @@ def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
         off = (pose.point[0] + 1e-4, *pose.point[1:])
         options = [
             *gains(found, found["margins"]["tuned"] * share),
-            *written(pose.started | pose.held | {"hand": spring(off, pose.press, FIRM)}),
+            *write_options(pose.started | pose.held | {"hand": spring(off, pose.press, FIRM)}),
             "duration=1.5",
             *NO_ENCODER,
         ]
@@ -349,7 +353,7 @@ def test_a_contact_that_is_slid_off_is_pressed_lightly() -> None:
     assert size == pytest.approx(LIGHT)
     for force, least, most in ((LIGHT, 0.0, 2e-4), (4.7, 4e-3, np.inf)):
         pressed = replace(pose, press=tuple(F * force / size for F in pose.press))
-        options = [*written(pressed.started | pressed.held), "duration=4.0", *NO_ENCODER]
+        options = [*write_options(pressed.started | pressed.held), "duration=4.0", *NO_ENCODER]
         run = hl.run(RECORDED / "obstacles" / "tuned.toml", options, figures=False)
         assert run.fault is None
         assert run["virtual_mechanism.F_env"][-1].any()
@@ -403,7 +407,7 @@ def poses(found: dict[str, Any]) -> list[Pose]:
 def gains(found: dict[str, Any], factor: float) -> tuple[str, ...]:
     """The options of all tuned gains with stiffness by a factor, damping by its root."""
     powers = {"stiffness": factor, "damping": factor**0.5}
-    return written(
+    return write_options(
         {
             key: (np.array(value) * powers[key.rpartition(".")[2]]).tolist()
             for key, value in found["gains"].items()

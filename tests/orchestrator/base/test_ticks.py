@@ -12,13 +12,13 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.ticks import (
     Clock,
     Timeline,
-    aligned,
+    align_to_ticks,
     common_base,
     exact,
-    listed,
     periodic,
+    round_up_to_ticks,
     variable,
-    written,
+    write_exact,
 )
 
 rates = st.fractions(min_value=Fraction(1, 10), max_value=5000, max_denominator=1001)
@@ -39,7 +39,7 @@ def test_a_rate_is_the_rational_that_was_written():
      (Fraction(30000, 1001), "30000/1001")],
 )  # fmt: skip
 def test_a_rate_that_is_printed_sets_the_same_rate(rate: Fraction, text: str) -> None:
-    assert written(rate) == text
+    assert write_exact(rate) == text
     read = open_scene.load("closed-loop", ["haptics.rate=2048", f"graphics.rate={text}"])
     assert read.graphics
     assert exact(read.graphics.rate) == rate
@@ -62,7 +62,7 @@ def test_seconds_round_the_exact_time_once(rate, tick):
 @given(rates, st.fractions(Fraction(1, 50), 1, max_denominator=997), st.integers(1, 300))
 def test_aligned_frames_end_on_the_first_tick_at_or_after(fast, ratio, end):
     base, slow = 1 / fast, fast * ratio
-    frames = aligned(1 / slow, base, end)
+    frames = align_to_ticks(1 / slow, base, end)
     for i, tick in enumerate(frames):
         assert tick * base >= i / slow > (tick - 1) * base
     assert frames[-1] > end
@@ -84,7 +84,7 @@ CLOSE = [Fraction(1, 30), Fraction(1, 30) + Fraction(1, 9999)]
 
 
 def test_listed_times_go_to_ticks():
-    assert listed([Fraction(0), Fraction(1, 30), Fraction(1, 10)], BASE) == (0, 18, 52)
+    assert round_up_to_ticks([Fraction(0), Fraction(1, 30), Fraction(1, 10)], BASE) == (0, 18, 52)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_listed_times_go_to_ticks():
             lambda: variable(Fraction(10), Fraction(60), 0, BASE, 512 * 10**9),
             "at most 1000000 are: take a",
         ),
-        (lambda: listed(CLOSE, BASE), "falls on tick 18"),
+        (lambda: round_up_to_ticks(CLOSE, BASE), "falls on tick 18"),
         (lambda: periodic(Fraction(1, 30), BASE, 10), "not a whole number of ticks"),
     ],
 )
@@ -115,8 +115,8 @@ def test_steps_that_are_made_when_asked_for_tell_their_bounds(fast, ratio, phase
     base, period = 1 / fast, 1 / (fast * ratio)
     first = max(phase * period, base)
     fine = common_base([period, first])
-    assert aligned(period, base, end, first).repeats == (period / base).numerator
-    for frames in (aligned(period, base, end, first), periodic(period, fine, end, first)):
+    assert align_to_ticks(period, base, end, first).repeats == (period / base).numerator
+    for frames in (align_to_ticks(period, base, end, first), periodic(period, fine, end, first)):
         steps = [b - a for a, b in pairwise(tuple(frames))]
         clock = Clock("graphics", frames)
         assert len(frames) == len(steps) + 1

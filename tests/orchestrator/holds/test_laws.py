@@ -15,7 +15,7 @@ from scipy.interpolate import KroghInterpolator
 from hapticlink.orchestrator.holds.table import TABLE
 from hapticlink.orchestrator.run.compiled.hold_structures import array
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 from tests.orchestrator.holds.bench import Bench, generated
 
 BASE = Fraction(3, 7680)
@@ -249,7 +249,7 @@ def test_samples_that_are_late_and_lost(name, seed):
         )
         for bench, way in zip(benches, (latency, None), strict=True)
     )  # fmt: skip
-    way, tick, stamp = Link(latency, BASE), 0, 0
+    way, tick, stamp = SampleLink(latency, BASE), 0, 0
     for k in range(60):
         sample = generator.normal(size=N)
         for bench in benches:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 from tests.orchestrator.holds.bench import Bench, generated, vector
 
 Vector = NDArray[np.float64]
@@ -156,7 +156,7 @@ class Line:
         self.x, self.v, self.force, self.held, self._arrived = np.split(bench.values, 5)
         readers = {"displacement": bench.reader([0]), "velocity": bench.reader([1])}
         self.hold = bench.hold(self.name, **readers)
-        self.link, self._sent = Link(self.latency, Fraction(1)), False
+        self.link, self._sent = SampleLink(self.latency, Fraction(1)), False
         self.truth, self.told = (bench.meter([source], [3], bench.reader([0])) for source in (2, 4))
 
     def _arrive(self, stamp: int, sample: Vector, arrival: int) -> None:

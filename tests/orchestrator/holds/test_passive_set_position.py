@@ -17,7 +17,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.hold_parts import describe_holds, describe_spring
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from tests.little_fmus import slave
 from tests.orchestrator.foreign_scenes import fmu_table, ran, run, wire_table
 from tests.orchestrator.holds.bench import Bench
@@ -176,7 +176,7 @@ def test_both_sides_share_what_either_puts_in(tmp_path, rate):
 def test_a_near_end_that_is_an_angle_is_known_as_one():
     """Its tank unwraps what it reads (tests of the tank have what becomes of it)."""
     options = ["hold=pspm", "kinds.haptic_device.x=angle"]
-    with built(open_scene.load("closed-loop-direct", options)) as system:
+    with build_system(open_scene.load("closed-loop-direct", options)) as system:
         signals = SignalVector(system)
         (of,) = {parts.spring for parts in describe_holds(signals).values() if parts.spring}
         spring = describe_spring(of, signals)

@@ -16,7 +16,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.network import served_part, server
 from hapticlink.orchestrator.network.messages import Answer, Request, answer_of
 from hapticlink.orchestrator.network.server import Server
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene
 
@@ -63,7 +63,7 @@ def serving(folder: Path, body: str) -> Iterator[Run]:
     """The first run of a server of an FMU."""
     python_fmu(folder, "Slow", body)
     read = open_scene.load(scene(folder, fmu_table("slow", "Slow")), ())
-    with built(read) as system:
+    with build_system(read) as system:
         fmu = system.fmu["slow"]
         identity = served_part.identity(read, fmu)
         of = Server({"slow": (fmu, identity)}, read.faults, lambda text: None)

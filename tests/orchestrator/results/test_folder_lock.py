@@ -41,7 +41,7 @@ def test_a_thread_of_this_process_is_refused_too(tmp_path):
         except InputFault as fault:
             outcomes.append(str(fault))
 
-    with folder_lock.held(tmp_path / "out"):
+    with folder_lock.lock_folder(tmp_path / "out"):
         thread = threading.Thread(target=run)
         thread.start()
         thread.join()
@@ -64,7 +64,7 @@ def test_a_killed_run_leaves_no_lock(tmp_path):
     )
     killed = subprocess.run([sys.executable, "-c", "\n".join(lines)], check=False)
     assert killed.returncode == -9
-    with folder_lock.held(tmp_path):
+    with folder_lock.lock_folder(tmp_path):
         assert not [*tmp_path.iterdir()]
 
 

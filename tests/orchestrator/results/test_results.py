@@ -10,7 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator.results.read_results import read_table
-from hapticlink.orchestrator.results.write_files import FileRecorder, text, write, write_over
+from hapticlink.orchestrator.results.write_files import (
+    FileRecorder,
+    text,
+    write_atomically,
+    write_over,
+)
 
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> FileRecorder:
@@ -85,7 +90,7 @@ def test_arrays_of_records_have_their_own_names(tmp_path):
 def test_the_end_of_a_run_is_written_over_what_is_there(tmp_path):
     """The first that fits, on no more bytes than there were; where none fits, all stays."""
     path = tmp_path / "run.json"
-    write(path, text({"end": "running"}) + b" " * 100)
+    write_atomically(path, text({"end": "running"}) + b" " * 100)
     size = path.stat().st_size
     for contents, found in (
         ([{"end": "x" * 200}, {"end": "fault"}], "fault"),

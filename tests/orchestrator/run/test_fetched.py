@@ -53,7 +53,7 @@ def test_recorded_columns_are_those_of_the_whole_table(whole, tmp_path, signals,
         assert signals != "all" or len(table) == len(kept)
     assert (not columns(tmp_path)) == (signals == "none")
     assert {k: found.run[k] for k in TOLD} == {k: whole[0].run[k] for k in TOLD}
-    assert bool([*summary.unrecorded(found.run["not_recorded"])]) == (signals != "all")
+    assert bool([*summary.describe_unrecorded(found.run["not_recorded"])]) == (signals != "all")
     said = " ".join(summary.lines(found.results))
     assert ("one row in 7" in said) == (every > 1)
 

@@ -155,15 +155,15 @@ def test_signals_are_held_once_and_given_back(tmp_path):
     gone = lambda: done.append("removed")  # noqa: E731
     interrupt.add(gone)
     interrupt.remove(gone)
-    with interrupt.held(), interrupt.held():
-        interrupt.check()
+    with interrupt.defer_signals(), interrupt.defer_signals():
+        interrupt.raise_if_interrupted()
         signal.raise_signal(signal.SIGTERM)
         with pytest.raises(Interrupted, match=r"interrupted at t = 0.5 s"):
-            interrupt.check(0.5)
+            interrupt.raise_if_interrupted(0.5)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
     assert done == ["kept"]
-    interrupt.check()
+    interrupt.raise_if_interrupted()
     interrupt._actions.clear()
 
 
@@ -202,7 +202,7 @@ import signal
 from pathlib import Path
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt
-with interrupt.held(interrupt.end_process):
+with interrupt.defer_signals(interrupt.end_process):
     with atomic_file(Path({str(tmp_path)!r}) / "whole.txt") as unfinished:
         unfinished.write_text("half")
         assert unfinished.exists()

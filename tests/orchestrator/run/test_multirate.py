@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.equilibrium import equilibrium
-from hapticlink.analysis.stability.lifted_map import lifted_map
+from hapticlink.analysis.stability.lifted_map import open_lifted_map
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.varying_rate import edges_of
 from hapticlink.components.component import Block, Component, Variable
@@ -146,7 +146,7 @@ def system(
 
 def radius(made: System) -> float:
     """The spectral radius of the lifted map, over a hyperperiod."""
-    with lifted_map(made) as map_:
+    with open_lifted_map(made) as map_:
         found = modes(equilibrium(map_, map_.start).linear, map_.period)
     return max(abs(mode.z) for mode in found if not mode.neutral)
 

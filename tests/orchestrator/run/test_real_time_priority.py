@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="sched(7) is of 
 def test_the_thread_has_the_priority_and_its_threads_do_not():
     before = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getaffinity(0)
     beside: list[int] = []
-    with real_time_priority.raised() as got:
+    with real_time_priority.raise_priority() as got:
         own = os.sched_getscheduler(0)
         thread = threading.Thread(target=lambda: beside.append(os.sched_getscheduler(0)))
         thread.start()
@@ -31,7 +31,7 @@ def test_a_missing_right_is_a_reason_and_no_error(monkeypatch):
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refused)
-    with real_time_priority.raised() as got:
+    with real_time_priority.raise_priority() as got:
         pass
     assert got["scheduler"] == "normal: no right to SCHED_FIFO (ulimit -r 20)"
 
@@ -41,7 +41,7 @@ def test_a_higher_priority_stays(monkeypatch):
     monkeypatch.setattr(os, "sched_getparam", lambda _: os.sched_param(50))
     set_to: list[object] = []
     monkeypatch.setattr(os, "sched_setscheduler", lambda *given: set_to.append(given))
-    with real_time_priority.raised() as got:
+    with real_time_priority.raise_priority() as got:
         assert got["scheduler"] == "priority 50, as it was before"
     assert set_to == []
 
@@ -61,7 +61,7 @@ def test_the_first_isolated_core_is_taken_if_it_can_be_had(isolated):
         (f"{core}-7", {core}, f"{core}, isolated"),
     ):
         isolated(f"{cores}\n")
-        with real_time_priority.raised() as got:
+        with real_time_priority.raise_priority() as got:
             assert os.sched_getaffinity(0) == own
         assert got["core"].startswith(told)
         assert os.sched_getaffinity(0) == before

@@ -44,7 +44,7 @@ def records(hint: Any) -> Iterator[Any]:
 
 def bare(hint: Any) -> Iterator[Any]:
     """The numbers within a type that say neither unit nor range."""
-    for kind, quantity in types_of_keys.measured(hint):
+    for kind, quantity in types_of_keys.find_quantities(hint):
         if kind in (float, int) and not quantity:
             yield kind
         elif typing.get_origin(kind) in (tuple, Mapping):
@@ -80,7 +80,7 @@ class Number(NamedTuple):
 
 def numbers(hint: Any, value: Any, path: tuple[str | int, ...]) -> Iterator[Number]:
     """Every number that a key may hold: of its value's type, or of any where it has none."""
-    for kind, quantity in types_of_keys.measured(hint):
+    for kind, quantity in types_of_keys.find_quantities(hint):
         origin, arguments = typing.get_origin(kind), typing.get_args(kind)
         if kind in (float, int) and quantity and not isinstance(value, tuple):
             yield Number(path, (), value, quantity, kind is int and not isinstance(quantity, Exact))
@@ -114,12 +114,12 @@ def entries(kind: Any, value: Any, path: tuple[str | int, ...]) -> Iterator[Numb
             yield Number(path, (i, *number.place), value, number.quantity, number.whole)
 
 
-SCENES = tuple(find_scene.shipped())
+SCENES = tuple(find_scene.list_shipped())
 
 
 def tables(name: str) -> dict[str, Any]:
     """What a shipped scene and those that it extends write."""
-    return extends.document(find_scene.find(name)[1], name, None)[0]
+    return extends.document(find_scene.find_scene(name)[1], name, None)[0]
 
 
 @cache

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.scene import overrides
-from hapticlink.orchestrator.scene.find_scene import shipped
+from hapticlink.orchestrator.scene.find_scene import list_shipped
 from tests.shared_fixtures import BAR
 
 SCALARS = (
@@ -28,7 +28,7 @@ VALUES = st.recursive(
 
 @given(VALUES)
 def test_a_value_comes_back_from_its_text(value):
-    (option,) = overrides.written({"a.b": value})
+    (option,) = overrides.write_options({"a.b": value})
     assert overrides.parse(option) == (("a", "b"), value)
 
 
@@ -38,7 +38,7 @@ def test_words_numbers_and_arrays_are_written_as_on_the_command_line():
         "hand.wrench": np.array([0.1, 0, 2]), "controller.damping": (1, np.float64(2), 3.5),
         "phases": {"hand": Path("a")},
     }  # fmt: skip
-    assert overrides.written(given) == (
+    assert overrides.write_options(given) == (
         "hold=foh", "graphics.rate=10", "controller.topology=false", 'title="1"',
         "hand.wrench=[0.1, 0.0, 2.0]", "controller.damping=[1, 2.0, 3.5]",
         'phases={ "hand" = "a" }',
@@ -88,7 +88,7 @@ def test_faults_of_a_scene_object_name_option_and_line(tmp_path):
         assert str(one.place(("duration",), "long")) == "--set duration=1.0: duration: long"
 
 
-@pytest.mark.parametrize("name", sorted(shipped()))
+@pytest.mark.parametrize("name", sorted(list_shipped()))
 def test_a_scene_is_read_again_from_its_records(name):
     read = open_scene.load(name)
     made = replace(read, title="made in Python")

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.commands.options import Changes
+from hapticlink.commands.options import SceneOptions
 from hapticlink.components.ports import Power
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.scene import overrides
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from tests.little_fmus import entries, slave
 from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import status
@@ -49,7 +49,7 @@ def test_native_fmus_of_fmi3_in_the_place_of_all_blocks_change_no_byte(tmp_path,
     assert files.keys() == own_run.run["fmus"].keys()
     swaps = [f'fmu.+={{replaces="{name}", path="{file}"}}' for name, file in files.items()]
     swapped = hl.run(
-        "closed-loop", [*overrides.written(SHORT), *swaps], out=tmp_path, figures=False
+        "closed-loop", [*overrides.write_options(SHORT), *swaps], out=tmp_path, figures=False
     )
     assert swapped.run["energies"] == own_run.run["energies"]
     assert tables_of(own_run.folder) == tables_of(tmp_path)
@@ -119,7 +119,9 @@ def test_ports_are_held_as_those_of_the_block_and_carry_its_power(tmp_path):
     )
     files = {"virtual_environment": copy, "haptic_device": device}
     swaps = [f'fmu.+={{replaces="{name}", path="{file}"}}' for name, file in files.items()]
-    with built(open_scene.load("closed-loop", ["controller.topology=false", *swaps])) as system:
+    with build_system(
+        open_scene.load("closed-loop", ["controller.topology=false", *swaps])
+    ) as system:
         about = {name: system.fmu[name].description for name in files}
         assert system.ends_when is None  # this device has no workspace_margin
     assert about["virtual_environment"].kinds == {"Lambda_inv": "semidefinite"}  # P_c has 4 entries
@@ -197,11 +199,11 @@ def test_what_replaces_no_block_is_refused(tmp_path):
         ([{**one, "replaces": "hand_left"}], "no block 'hand_left'"),
         ([one, one], "'controller' is taken"),
     ):
-        options = [text for table in tables for text in overrides.written({"fmu.+": table})]
+        options = [text for table in tables for text in overrides.write_options({"fmu.+": table})]
         with pytest.raises(SceneFault, match=message):
             hl.scene("closed-loop", options)
     with pytest.raises(SceneFault) as raised:  # as it was typed
-        hl.scene("closed-loop", Changes(swap=["controler=/missing.fmu"]).options)
+        hl.scene("closed-loop", SceneOptions(swap=["controler=/missing.fmu"]).options)
     said = "--swap controler=/missing.fmu: fmu[0]"
     assert f"{said}.path: there is no file" in str(raised.value)
     assert f"{said}.replaces: no block 'controler'" in str(raised.value)

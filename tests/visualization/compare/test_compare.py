@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.results.folders import named
+from hapticlink.orchestrator.results.folders import load_by_name
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.recorded_scene import scene_file
 from hapticlink.visualization.compare import numbers, overlay, page, settings
@@ -138,7 +138,7 @@ def test_bad_input(
 
 
 def test_the_page_answers_in_the_order_in_which_one_asks(root: Path) -> None:
-    runs = named([root / "slow", root / "fast"])
+    runs = load_by_name([root / "slow", root / "fast"])
     html = page.page(runs)
     assert html == page.page(runs)
     assert re.findall("<h2>(.*?)</h2>", html) == [
@@ -202,7 +202,7 @@ def test_a_run_json_that_was_changed_is_bad_input(
     place[keys[-1]] = value
     (tmp_path / "run.json").write_text(json.dumps(run))
     with pytest.raises(hl.InputFault, match=r"run\.json: .*: run the scene again"):
-        named([tmp_path])
+        load_by_name([tmp_path])
 
 
 @pytest.mark.parametrize(
@@ -224,7 +224,7 @@ def test_a_table_that_was_changed_is_bad_input(
     table = Path(shutil.copytree(root / "fast", tmp_path / "run")) / "haptics.csv"
     table.write_text(table.read_text().replace(old, new, 1))
     with pytest.raises(hl.InputFault, match=re.escape(said)):
-        named([tmp_path / "run"])
+        load_by_name([tmp_path / "run"])
 
 
 @pytest.mark.filterwarnings("error")
@@ -233,7 +233,7 @@ def test_a_run_without_a_finite_value_has_a_page(root: Path, tmp_path: Path) -> 
     lines = (run / "haptics.csv").read_text().splitlines()
     lines[1:] = [f"{line.partition(',')[0]}{',nan' * line.count(',')}" for line in lines[1:]]
     (run / "haptics.csv").write_text("\n".join(lines) + "\n")
-    assert 'alt="mechanism"' not in page.page(named([run]))
+    assert 'alt="mechanism"' not in page.page(load_by_name([run]))
 
 
 @pytest.mark.usefixtures("without_figures")
@@ -250,14 +250,14 @@ def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -
     folder = shutil.copytree(root / "fast", tmp_path / "run")
     table = folder / "haptics.csv"
     table.write_text(table.read_text().partition("\n")[0] + "\n")
-    assert "Performance" in page.page(named([folder]))
+    assert "Performance" in page.page(load_by_name([folder]))
 
 
 def test_a_run_without_a_linkage_and_one_that_failed_have_a_page(tmp_path: Path) -> None:
     hl.run("virtual-wall", {"duration": 0.1}, out=tmp_path / "wall", figures=False)
     push = {"hand.wrench": [1e6, 0.0, 0.0], "stop_when": ""}
     failed = hl.run("closed-loop", push, out=tmp_path / "failed", figures=False)
-    html = page.page(named([tmp_path / "wall", tmp_path / "failed"]))
+    html = page.page(load_by_name([tmp_path / "wall", tmp_path / "failed"]))
     assert failed.fault
     assert f'<td class="bad">{failed.fault.splitlines()[0]}' in html
 

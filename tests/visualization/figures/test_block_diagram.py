@@ -3,13 +3,13 @@
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.system.build_system import built
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.visualization.figures import block_diagram
 
 
 @pytest.mark.parametrize("scene", ["pendulum", "closed-loop", "two-hands"])
 def test_every_connection_is_in_the_cell_of_its_source_and_target(scene: str) -> None:
-    with built(hl.scene(scene)) as system:
+    with build_system(hl.scene(scene)) as system:
         (axes,) = block_diagram.figure(system, scene).axes
     boxes = {t.get_text().split("\n")[0]: t.get_position() for t in axes.texts}
     places = {boxes[fmu.name]: fmu.name for fmu in system.fmus}

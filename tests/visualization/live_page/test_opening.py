@@ -32,7 +32,7 @@ def test_the_mechanism_is_seen_and_the_blocks_are_told_before_they_are_built(
 ) -> None:
     with ExitStack() as stack:
         browser = stack.enter_context(chromium())
-        with lock.held(lock_of_last_block, lambda: None):
+        with lock.hold_lock(lock_of_last_block, lambda: None):
             served = Served(tmp_path, scene="closed-loop")
             stack.callback(served.__exit__)
             page = Page(browser, served.url, shown="view.stage.frame && view.building")

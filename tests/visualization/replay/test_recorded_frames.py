@@ -17,7 +17,7 @@ import hapticlink as hl
 from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.visualization.replay import animation, recorded_frames, replay_page
 from hapticlink.visualization.replay.recorded_frames import Recorded
-from hapticlink.visualization.replay.serve import served
+from hapticlink.visualization.replay.serve import serve_page
 
 LINK = 0.042
 """Length (m) of link 1 of Table 6.1, which turns about the origin."""
@@ -146,7 +146,7 @@ def test_an_animation_moves_begins_anew_and_has_the_same_bytes_each_time(
     monkeypatch.setattr(animation, "MAX_FRAMES", 4)
     made = [tmp_path / f"{i}{ending}" for i in (1, 2)]
     for path in made:
-        replay_page.write([Recorded(str(folder))], path)
+        replay_page.write_replay([Recorded(str(folder))], path)
     assert made[0].read_bytes() == made[1].read_bytes()
     with Image.open(made[0]) as film:
         assert film.n_frames == 4  # type: ignore[attr-defined]
@@ -157,7 +157,7 @@ def test_an_animation_moves_begins_anew_and_has_the_same_bytes_each_time(
 
 
 def test_the_page_is_served_to_who_knows_its_path_alone() -> None:
-    with served("<p>here</p>", "127.0.0.1", (0,), "secret") as port:
+    with serve_page("<p>here</p>", "127.0.0.1", (0,), "secret") as port:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/secret/") as answer:
             assert answer.read() == b"<p>here</p>"
             assert "default-src 'none'" in answer.headers["Content-Security-Policy"]

@@ -41,7 +41,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 @pytest.fixture(scope="module")
 def file(runs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "replay.html"
-    replay_page.write([Recorded(str(folder)) for folder in runs], path)
+    replay_page.write_replay([Recorded(str(folder)) for folder in runs], path)
     return path
 
 
