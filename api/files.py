@@ -86,7 +86,7 @@ def build(
         raise InputFault(f"{read.title}: nothing to build: its FMUs are given as files")
     folder = folders.ensure(out)
     starts = _starts(read)
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         platforms = {2: PLATFORMS, 3: PLATFORMS_3}[fmi] if all_platforms else ()
         files = fmu_files(read, planned, timeline(read, planned), room, platforms, starts, fmi)
         for name, path in files.items():
@@ -108,7 +108,7 @@ def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path)
     with built(read, _starts(read)) as system:
         for line in uneven(system.timeline):
             logging.getLogger(__name__).warning(line)
-        return write.write(read, start_parameters.settled(system), Path(out))
+        return write.write_ssp(read, start_parameters.settled(system), Path(out))
 
 
 def _pictures(scene: Scene) -> dict[str, bytes]:
@@ -117,7 +117,7 @@ def _pictures(scene: Scene) -> dict[str, bytes]:
     from hapticlink.visualization.figure_axes import png  # loads Matplotlib
     from hapticlink.visualization.figures import block_diagram, run_figures
 
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         run = simulate(scene, room, in_memory=True, csv=False)
         pictures = {BLOCKS: png(block_diagram.figure(run.system, scene.title), DPI)}
         drawn = run_figures.drawings(run.results)

@@ -102,7 +102,7 @@ def run_paced(
 
 
 def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
-    with temporary_folders.room() as folder:
+    with temporary_folders.temporary_folder() as folder:
         ended = simulated(folder, csv=False)
         if not tables:
             return Run(None, ended.run, {})

@@ -120,7 +120,7 @@ def sweep(
         return make(made, folder, processes, scheduler, lambda done: tell(done, len(made)))
 
     if out is None:
-        with temporary_folders.room() as room:
+        with temporary_folders.temporary_folder() as room:
             try:
                 return Sweep(into(room), keys, None)
             except Unfinished as left:

@@ -168,7 +168,7 @@ def figure(folder: Path, found: dict[tuple[str, int, str], tuple[float, Ran]]) -
 
 def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
     """Writes error.png to `out`."""
-    with temporary_folders.room() as folder:
+    with temporary_folders.temporary_folder() as folder:
         found = copies(quick, progress, Path(folder))
         touched = touching(quick, progress, Path(folder))
     figure(out, found)

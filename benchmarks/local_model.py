@@ -74,7 +74,7 @@ def gaps(rates: tuple[int, ...], progress: Progress) -> Gaps:
     the mechanism with its own matrices at each tick of 1 s, and the largest gap of the loop (m)."""
     cases = [(i, r) for i in ("semi-implicit-euler", "rk4") for r in rates]
     found = {}
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         own, _ = tip(room / "own", "duration=1.0")
         for k, (integrator, rate) in enumerate(cases):
             progress(f"local model: {integrator} at {rate} Hz", k, len(cases))

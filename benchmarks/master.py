@@ -98,7 +98,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     cases, rounds = (QUICK, 1) if quick else (CASES, ROUNDS)
     rows = Rows(folder / ROWS[0], COLUMNS, 5)
     whole = Rows(folder / ROWS[1], TICK_COLUMNS, 3)
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         for i, case in enumerate(cases):
             ring = Path(room, "-".join(map(str, case)))
             for master in (m for _ in range(rounds) for m in MASTERS):

@@ -57,7 +57,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     """Writes network.png to `folder`."""
     options = ["packaging=native", f"duration={QUICK if quick else SECONDS}"]
     rows = []
-    with temporary_folders.room() as room, ExitStack() as stack:
+    with temporary_folders.temporary_folder() as room, ExitStack() as stack:
         key, at = room / "key", _free()
         sets = [word for option in options for word in ("--set", option)]
         arguments = ["serve", SCENE, "--listen", at, "--key", str(key), *sets]

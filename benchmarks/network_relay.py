@@ -77,4 +77,4 @@ def relay(
 if __name__ == "__main__":
     listen, to, key, *numbers = sys.argv[1:]
     delay, jitter, loss, seed, cut = map(float, numbers)
-    relay(listen, to, key_file.read(Path(key)), delay, jitter, loss, int(seed), cut)
+    relay(listen, to, key_file.read_key(Path(key)), delay, jitter, loss, int(seed), cut)

@@ -32,7 +32,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
 
 def _measured(scene: str, options: tuple[str, ...], rounds: int) -> Iterator[tuple[object, ...]]:
     times: dict[str, list[float]] = {form: [] for form in FORMS}
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         path = room / f"{scene.replace('-', '_')}.fmu"
 
         def build() -> None:

@@ -66,7 +66,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     seconds = QUICK if quick else SECONDS
     empty, load = EmptyLoop(seconds), load_average()
     options = ["packaging=native", f"duration={seconds}", f"haptics.rate={RATE}"]
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         results = simulate(
             SCENE,
             room,

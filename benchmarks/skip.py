@@ -122,7 +122,7 @@ def measure(out: Path, scenes: Sequence[str], rounds: int, progress: Progress) -
     """The rows of runs and of comparisons, of which those on disk are not made again."""
     rows, same = Rows(out / "runs.csv", COLUMNS, keys=3), Rows(out / "same.csv", SAME, keys=1)
     total = len(scenes) * (rounds + 1)
-    with process_cache.unpacked_once(), temporary_folders.room() as room:
+    with process_cache.unpacked_once(), temporary_folders.temporary_folder() as room:
         for k, scene in enumerate(scenes):
             progress(f"{scene}: the same results", k, total)
             if (scene,) not in same:

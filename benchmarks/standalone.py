@@ -76,7 +76,7 @@ def _measured(
 ) -> tuple[int, float, float, float, float]:
     """Size (bytes), processor time to make (s), and times real time of run, node and Chromium."""
     shown = viewed(scene, (*options, "packaging=native"), DURATION)
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         file = room / "page.html"
         make = made_anew(lambda: page.write(shown, scene, file), room / "cache")
         text = file.read_text(encoding="utf-8")

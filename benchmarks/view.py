@@ -85,7 +85,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     scene = viewed(SCENE, [f"haptics.rate={RATE}"])
     progress(f"{SCENE}, dragged", 0, seconds)
     arguments = "127.0.0.1", "0", "bench", "", ""  # no second run
-    with temporary_folders.room() as room, Link(SERVER, *arguments) as link:
+    with temporary_folders.temporary_folder() as room, Link(SERVER, *arguments) as link:
         url = f"http://127.0.0.1:{link.first()['port']}/bench/"
         log = Path(room, "log.json")
         with log.open("w") as out:

@@ -144,7 +144,7 @@ def _status(arguments: Sequence[str] | None) -> int:
         say(f"hapticlink: {error}", file=sys.stderr)
         return 1
     except Exception as error:
-        if message := plugins.blamed(error):
+        if message := plugins.blame_plugin(error):
             say(f"hapticlink: {message}", file=sys.stderr)
             return InputFault.exit_status
         if isinstance(error, ModuleNotFoundError) and error.name != "hapticlink":
@@ -154,7 +154,7 @@ def _status(arguments: Sequence[str] | None) -> int:
             return 1
         from hapticlink.commands import internal_error  # slow to load
 
-        say(f"hapticlink: {internal_error.reported(error)}", file=sys.stderr)
+        say(f"hapticlink: {internal_error.report_error(error)}", file=sys.stderr)
         return 1
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands import progress
-from hapticlink.commands.options import PRINTED, UNCHANGED, Changes, Output, Scene, title
+from hapticlink.commands.options import PRINTED, UNCHANGED, Output, Scene, SceneOptions, title
 from hapticlink.commands.sweep import Jobs
 
 Draws = Annotated[int, Parameter(help="Hands and rates around the scene's own.")]
@@ -17,7 +17,7 @@ def advise(
     scene: Scene,
     /,
     *,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     draws: Draws = 8,
     seed: Seed = 0,
     jobs: Jobs = None,

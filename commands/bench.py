@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from hapticlink.commands import checkout
 from hapticlink.commands.options import Out
-from hapticlink.commands.progress import bar, timed
+from hapticlink.commands.progress import bar, time_command
 from hapticlink.orchestrator.base import interrupt
 
 Benchmark = Literal[
@@ -73,7 +73,7 @@ def bench(
     page = (out or page.parent) / page.name
     page.parent.mkdir(parents=True, exist_ok=True)
     command = f"hapticlink bench {what}{' --quick' * quick}"
-    with timed(command), bar(what) as show:
+    with time_command(command), bar(what) as show:
 
         def report(text: str, done: int, total: int) -> None:
             interrupt.check()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from hapticlink.analysis.findings.start_values import coordinates, mechanism_outputs
-from hapticlink.commands.options import UNCHANGED, Changes, Out, Scene, default_folder
+from hapticlink.commands.options import UNCHANGED, Out, Scene, SceneOptions, default_folder
 from hapticlink.orchestrator.base.terminal_output import say
 from hapticlink.orchestrator.system.system import System
 
@@ -29,7 +29,7 @@ def info(
     scene: Scene | None = None,
     /,
     *,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     draw: Draw = False,
     out: Out = None,
 ) -> int:

@@ -1,5 +1,5 @@
 """An exception that nobody has foreseen: a mistake in hapticlink, reported in a line; the traceback
-goes to a file for whoever mends it. Those of a plugin are reported by `plugins.blamed`."""
+goes to a file for whoever mends it. Those of a plugin are reported by `plugins.blame_plugin`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PREFIX = "an error of hapticlink itself"
 """By which it differs from a fault of what it was given."""
 
 
-def reported(error: Exception) -> str:
+def report_error(error: Exception) -> str:
     """What to tell the user; the report lies in the temporary folder."""
     what = "".join(traceback.format_exception_only(error)).strip()
     message = f"{PREFIX}, not of what it was given: {what[:300]}"

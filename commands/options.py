@@ -56,7 +56,7 @@ Json = Annotated[
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Changes:
+class SceneOptions:
     """The changes of a scene that a command is given."""
 
     set: Set = None
@@ -78,7 +78,7 @@ class Changes:
         return default_folder(root, scene, given)
 
 
-UNCHANGED = Changes()
+UNCHANGED = SceneOptions()
 
 
 @Parameter(name="*")

@@ -15,7 +15,7 @@ SHORT = 2.0
 
 
 @contextmanager
-def counted(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
+def count_runs(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None]]:
     """Gives a function to be called with the numbers of finished and of all runs."""
     with bar(title, hidden) as show:
         yield lambda done, of: show(done, of, f"{done} of {of} runs") if show else None
@@ -50,7 +50,9 @@ def progress(
 
 
 @contextmanager
-def timed(command: str, guess: str = "not known yet", hidden: bool = False) -> Iterator[None]:
+def time_command(
+    command: str, guess: str = "not known yet", hidden: bool = False
+) -> Iterator[None]:
     """Prints before a long command how many minutes it took at most on this machine, or `guess`,
     and records how many it takes. Raises Fault where it is interrupted."""
     with measured(command) as took:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from hapticlink.commands import checkout
 from hapticlink.commands.options import Out
-from hapticlink.commands.progress import timed
+from hapticlink.commands.progress import time_command
 
 
 def reproduce(*, out: Out = None) -> int:
@@ -16,7 +16,7 @@ def reproduce(*, out: Out = None) -> int:
     def tell(what: str) -> None:
         print(what, file=sys.stderr)
 
-    with timed("hapticlink reproduce"):
+    with time_command("hapticlink reproduce"):
         page = make(out or Path("results/report"), tell)
     print(page)
     return 0

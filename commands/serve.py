@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import UNCHANGED, Changes, Scene
+from hapticlink.commands.options import UNCHANGED, Scene, SceneOptions
 from hapticlink.orchestrator.base.terminal_output import say
 from hapticlink.orchestrator.network import key_file
 
@@ -20,7 +20,7 @@ def serve(
     scene: Scene,
     /,
     *,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     part: Annotated[
         str, Parameter(help="What to serve: an FMU, or all FMUs at a rate, such as graphics.")
     ] = "graphics",
@@ -45,7 +45,7 @@ def serve(
         say(f"{key}: a new key, which the other computer needs: copy it by a safe way")
     from hapticlink.orchestrator.network.server import Server  # which needs an extra's libraries
 
-    secret, read = key_file.read(key), hl.scene(scene, changes.options)
+    secret, read = key_file.read_key(key), hl.scene(scene, changes.options)
     with built(read) as system:
         names = served_part.fmus_of(system, part)
         served = {n: (system.fmu[n], served_part.identity(read, system.fmu[n])) for n in names}

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import PRINTED, UNCHANGED, Changes, Output, Scene, title
-from hapticlink.commands.progress import counted, steps, timed, waiting
+from hapticlink.commands.options import PRINTED, UNCHANGED, Output, Scene, SceneOptions, title
+from hapticlink.commands.progress import count_runs, steps, time_command, waiting
 from hapticlink.commands.sweep import Jobs, Vary
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def stability(
     scene: Scene,
     /,
     *,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     poses: Poses = 3,
     grid: Grid = 0,
     drift: Drift = (1.0, 0.2),
@@ -79,7 +79,7 @@ def stability(
     if vary:
         folder = output.out or changes.folder("maps", scene)
         command = f"hapticlink stability {scene} --vary {' --vary '.join(vary)}"
-        with timed(command, hidden=quiet), counted(scene, hidden=quiet) as count:
+        with time_command(command, hidden=quiet), count_runs(scene, hidden=quiet) as count:
             points = hl.stability_map(
                 scene, vary, given, out=folder, check=check, seed=seed, jobs=jobs, progress=count
             )

@@ -13,13 +13,13 @@ def study(*, out: Out = None, jobs: Jobs = None) -> int:
     """Study which hold, with which gains, at which graphics rate; write tables, figures and a page
     to OUT (default results/mismatch). Runs are kept in sweeps/mismatch, so that an interrupted
     study can be continued."""
-    from hapticlink.commands.progress import counted, timed
+    from hapticlink.commands.progress import count_runs, time_command
 
     make = checkout.function("study", "studies.mismatch:study")
     expected = checkout.function("study", "studies.mismatch:expected")
     processes = jobs or os.cpu_count() or 1
     guess = f"about {expected(processes):.0f} minutes with {processes} processes"
-    with timed("hapticlink study", guess), counted("study") as tell:
+    with time_command("hapticlink study", guess), count_runs("study") as tell:
         page = make(
             out or Path("results/mismatch"), Path("sweeps/mismatch"), processes,
             lambda stage, done, of: tell(done, of),

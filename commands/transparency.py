@@ -4,7 +4,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from hapticlink.commands.options import PRINTED, UNCHANGED, Changes, Output, Scene, title
+from hapticlink.commands.options import PRINTED, UNCHANGED, Output, Scene, SceneOptions, title
 from hapticlink.commands.progress import waiting
 from hapticlink.orchestrator.base.terminal_output import say
 
@@ -18,7 +18,7 @@ def transparency(
     scene: Scene,
     /,
     *,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     poses: Poses = 2,
     costs: Costs = False,
     output: Output = PRINTED,

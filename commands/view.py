@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter, validators
 
 from hapticlink.commands import completion
-from hapticlink.commands.options import UNCHANGED, Changes, Out, default_folder
+from hapticlink.commands.options import UNCHANGED, Out, SceneOptions, default_folder
 from hapticlink.commands.progress import waiting
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
@@ -69,7 +69,7 @@ def view(
     /,
     *,
     out: Out = None,
-    changes: Changes = UNCHANGED,
+    changes: SceneOptions = UNCHANGED,
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
@@ -126,7 +126,7 @@ def view(
     return 0
 
 
-def _written(name: str, changes: Changes, path: Path) -> int:
+def _written(name: str, changes: SceneOptions, path: Path) -> int:
     """Write the page of a scene that needs no server."""
     from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
     from hapticlink.visualization.standalone import page

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base import interpreter_state, interrupt
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.describe_run import setup
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
-from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, placed
+from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, place_remote_fmus
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock
 from hapticlink.orchestrator.results.read_results import Results, Table, described
@@ -133,7 +133,7 @@ def simulate(
         if not in_memory:
             stack.enter_context(folder_lock.held(folder))
         every = stack.enter_context(built(read))
-        system = placed(with_fetched(every), read, remote)
+        system = place_remote_fmus(with_fetched(every), read, remote)
         plan = Plan(system)
         plan.check()
         build_time = perf_counter() - begin

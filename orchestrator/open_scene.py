@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.errors import Finding, SceneFault
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
-from hapticlink.orchestrator.scene.find_scene import find
+from hapticlink.orchestrator.scene.find_scene import find_scene
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.read_and_check import from_source
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
@@ -48,7 +48,7 @@ def _find(scene: str) -> Source:
         from hapticlink.orchestrator.ssp import read as ssp
 
         return Source(scene, ssp.tables(FilePath(scene)), {})
-    name, text, folder = find(scene)
+    name, text, folder = find_scene(scene)
     return Source(name, *document(text, name, folder))
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
+from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.base.ticks import Frames, exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
@@ -123,9 +123,7 @@ class LiveRun:
         except (TypeError, ValueError):
             values = np.empty(0)
         if len(values) != len(scalars) or not np.isfinite(values).all():
-            raise InputFault(
-                f"{name} = {shortened(repr(value))}: give {len(scalars)} finite numbers"
-            )
+            raise InputFault(f"{name} = {shorten(repr(value))}: give {len(scalars)} finite numbers")
         self._simulation.instances[fmu].before_step(lambda time: set_from(values))
 
     def hold(self, name: str, hold: str | None = None, delay: float | None = None) -> None:

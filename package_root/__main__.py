@@ -12,7 +12,7 @@ def main() -> None:
     # Matrices of a hundred rows: threads of BLAS wait for each other, several times as long as one
     # computes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    process.search_cycles_seldom()
+    process.raise_gc_threshold()
     with interrupt.held(interrupt.end_process, after=signal.SIG_IGN):
         from hapticlink.commands import main as command
 
@@ -20,7 +20,7 @@ def main() -> None:
             command()
         except SystemExit as ended:
             process.leave_threads(int(ended.code or 0))
-            process.search_none_of_these()
+            process.freeze_gc()
             raise
 
 

@@ -66,7 +66,7 @@ def build_program(
     way; Fault if the compiler fails.
     """
     identifier = _identifier(name)
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         try:
             compiler_version()
             every = PLATFORMS if fmi == 2 else PLATFORMS_3

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 from hapticlink.fmus.errors import CompilerError
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS, global_names
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.archive import open_archive, read_xml
 from hapticlink.orchestrator.fmi.description import Description
 
 _EXPORTS = ("__declspec(dllexport)", '__attribute__ ((visibility ("default")))')
@@ -102,7 +102,7 @@ def read(description: Description) -> Foreign:
     compiled into a program."""
     if description.fmi != "2":
         raise InputFault(f"it is of FMI {description.fmi}.0; only those of FMI 2.0 are compiled in")
-    with opened(description.path, "FMU") as archive:
+    with open_archive(description.path, "FMU") as archive:
         tree = ElementTree.fromstring(read_xml(archive, "modelDescription.xml"))
         listed = [f.get("name", "") for f in tree.iterfind("./CoSimulation/SourceFiles/File")]
         if not listed:

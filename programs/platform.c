@@ -13,7 +13,7 @@ int signal_came(void) { return 1; }
 
 void note_arithmetic(void) {}
 
-void keep_arithmetic(Place *p) { (void)p; }
+void keep_arithmetic(StepState *p) { (void)p; }
 
 void hapticlink_guard(int on) { (void)on; }
 

@@ -350,7 +350,7 @@ static int judge(Model *m, Fmu *f) {
 static int took_its_last_step(Model *m, int64_t fmu, fmi2Status status) {
     const Member *member = members + fmu_members[fmu];
     fmi2Component c = m->members[fmu_members[fmu]];
-    Place *p = m->now.scene.loop.fmus[fmu].place;
+    StepState *p = m->now.scene.loop.fmus[fmu].place;
     fmi2Boolean ends = fmi2False;
     double end;
     if (status != fmi2Discard || member->boolean_status(c, fmi2Terminated, &ends) || !ends) {

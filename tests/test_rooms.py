@@ -54,29 +54,18 @@ CAPABILITIES = {
 
 KNOWN_TWICE = {
     "Block",
-    "Bounds",
-    "Changes",
-    "Clock",
     "Coordinate",
     "Cost",
     "Description",
     "Events",
     "Frames",
-    "Line",
-    "Link",
     "Observer",
-    "Pace",
-    "Part",
     "Passive",
     "Passivity",
-    "Place",
-    "Reach",
-    "Record",
     "Scale",
     "Session",
     "Set",
     "Spring",
-    "Worker",
 }
 """Classes that still share their name with another."""
 

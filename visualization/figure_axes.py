@@ -17,7 +17,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.summary import stopped_by
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import shortened
+from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.read_results import Results
 
@@ -99,7 +99,7 @@ def _events(axes: Axes, results: Results) -> None:
     end = last_time(results) if events else 0.0
     for time, text in events:
         if time <= end:
-            texts.setdefault(time, []).append(shortened(text, 60))
+            texts.setdefault(time, []).append(shorten(text, 60))
     for time, said in texts.items():
         axes.axvline(time, color="0.4", linestyle=":", linewidth=1)
         axes.annotate(

@@ -38,7 +38,7 @@ from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import TABLES, Results
 from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
 from hapticlink.orchestrator.results.windows import last
-from hapticlink.orchestrator.scene.start_pose import outside
+from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 from hapticlink.orchestrator.system.system import Replacement
 
 
@@ -392,7 +392,8 @@ def _start(run: Results) -> Iterator[str]:
         and len(device["time"])
         and device[WORKSPACE_MARGIN][0] < 0
     ):
-        yield f"warning: {outside(device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0])}"
+        start, margin = device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0]
+        yield f"warning: {describe_start_outside(start, margin)}"
     pulls = of_block(results, HAND_WRENCH, 3)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
         pull = float(np.hypot(*pulls[HAND_WRENCH][0, :2])) if len(pulls["time"]) else 0.0

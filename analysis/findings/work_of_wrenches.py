@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH, HANDLE_POSE, POINT_POSE
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 from hapticlink.orchestrator.results.run_record import Energy, RunRecord
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 
 
 class Arrivals:
@@ -45,7 +45,7 @@ def _drawn(record: RunRecord, connection: str, samples: int) -> Vector | None:
     if not latency or not counted or record.coupling == "jacobi":
         return None
     base = Fraction(record.base.split()[0])
-    link = Link(latency, base)
+    link = SampleLink(latency, base)
     ticks = np.array([link.draw() for _ in range(counted.sent)])
     # The sample of t = 0 is known at once; that of a sampled block is sent again beside it.
     again = counted.sent - (samples - 1)

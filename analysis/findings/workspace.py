@@ -9,7 +9,7 @@ import numpy as np
 
 from hapticlink.components.device.workspace import Range, margin, workspace
 from hapticlink.components.specs.device import Device
-from hapticlink.orchestrator.scene.start_pose import outside
+from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 
 Pose = Sequence[float]
 """x m, y m, theta rad."""
@@ -26,7 +26,7 @@ def lines(device: Device, start: Pose) -> Iterator[str]:
     yield f"theta: {'any' if turns == [_TURN] else ', '.join(map(_range, turns)) + ' rad'}"
     distance = float(margin(device, np.array([start]))[0])
     if distance < 0:
-        yield f"warning: {outside(start, distance)}"
+        yield f"warning: {describe_start_outside(start, distance)}"
     else:
         yield f"the handle starts at {placed(start)}, {distance:.3g} m from the nearest stop"
 

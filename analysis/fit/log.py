@@ -51,7 +51,7 @@ def read(path: Path | str) -> Log:
     if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
         path = path / "haptics.csv"
     elif not text_files.exists(path):
-        raise InputFault(f"{path}: cannot be read as a log: it is no file")
+        raise InputFault(f"{path}: cannot be read as a log: not a regular file")
     run = path.parent / "run.json"
     of_run = path.name == "haptics.csv" and run.is_file()
     table = _hdf5(path) if path.suffix in (".h5", ".hdf5") else read_table(path)

@@ -110,7 +110,7 @@ def growth(speed: Vector, seconds: float) -> float:
 def _speeds(scene: Scene) -> tuple[Vector, int]:
     """The largest of the mechanism's velocities at each sample of a run of LONGEST, up to its end,
     and how many samples a whole one has."""
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         experiment = simulate(open_scene.load(scene, [f"duration={LONGEST:g}"]), room)
         results = experiment.results
         signal = next(s for s in MOVING if table_of(results, s) is not None)

@@ -41,7 +41,7 @@ from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
@@ -124,7 +124,7 @@ def equilibrium_stability(
 
 def _require_bounds(bounds: Bounds) -> None:
     if not isinstance(bounds, Bounds):
-        raise InputFault(f"bounds = {shortened(repr(bounds))}: give Bounds(hertz, growth)")
+        raise InputFault(f"bounds = {shorten(repr(bounds))}: give Bounds(hertz, growth)")
     if not (bounds.hertz >= 0.0 and bounds.growth >= 0.0):
         raise InputFault(
             f"drift up to {bounds.hertz:g} Hz and {bounds.growth:g} 1/s: give 0 or more"

@@ -110,7 +110,7 @@ class Pose:
 
 def simulated(scene: str | Path | Scene, options: Options = ()) -> Results:
     """A run of the scene. Raises InputFault where it has no row."""
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         experiment = simulate(scene, room, options, csv=False)
         if not experiment.outcome.published:
             raise InputFault(f"the scene's own run fails: {experiment.outcome.fault}")

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.holds import Hold
 from hapticlink.orchestrator.holds.energy_tank import NearEnd
 from hapticlink.orchestrator.holds.holds_of_samples import History
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 from hapticlink.orchestrator.system.system import Fmu, System
 
 Take = Callable[[Vector], Vector]
@@ -243,7 +243,7 @@ def _copied(value: Any, take: Take) -> Any:
             return type(value)(_copied(v, take) for v in value)
         case deque():
             return deque((_copied(v, take) for v in value), value.maxlen)
-        case Hold() | History() | Link():
+        case Hold() | History() | SampleLink():
             other = type(value).__new__(type(value))
             vars(other).update(_copied(vars(value), take))
             return other
@@ -265,5 +265,5 @@ def _floats(value: Any, path: str | None = None) -> Iterator[tuple[str, Vector]]
         case list() | tuple() | deque():
             for i, v in enumerate(value, 1):
                 yield from _floats(v, None if path is None else f"{path}[{i}]")
-        case Hold() | History() | Link():
+        case Hold() | History() | SampleLink():
             yield from _floats(vars(value), path)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.scene.overrides import text
 from hapticlink.orchestrator.scene.toml_keys import flat, loads
 
@@ -92,7 +92,7 @@ def parse(option: str) -> Axis:
     key = key.strip()
     if not equals or not key:
         raise InputFault(f"--vary {option}: write key=values, e.g. --vary graphics.rate=10..60..10")
-    listed = [value for item in _items(values) for value in _values(item, shortened(option))]
+    listed = [value for item in _items(values) for value in _values(item, shorten(option))]
     if not listed:
         raise InputFault(f"--vary {option}: no value; give some, e.g. {key}=1,2,3")
     return Axis(key, tuple(dict.fromkeys(listed)))
@@ -113,7 +113,7 @@ def grid(axes: Sequence[Axis]) -> list[Point]:
 def listed(path: Path) -> list[Point]:
     """The runs of a file: a CSV with one column per key (an empty cell keeps the scene's value), or
     a TOML file of [[run]] tables. Raises InputFault if it cannot be read or has no run."""
-    text = text_files.read(path, "a list of runs", MAX_LIST_BYTES, "utf-8-sig")
+    text = text_files.read_text(path, "a list of runs", MAX_LIST_BYTES, "utf-8-sig")
     try:
         points = list(_toml(path, text) if path.suffix == ".toml" else _csv(path, text))
     except csv.Error as error:

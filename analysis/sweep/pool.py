@@ -79,11 +79,11 @@ class _Worker(SpawnProcess):
             sys.modules["__main__"] = main
 
     def run(self) -> None:
-        process.search_cycles_seldom()
-        process.search_none_of_these()  # what is loaded by now
+        process.raise_gc_threshold()
+        process.freeze_gc()  # what is loaded by now
         with process_cache.unpacked_once():
             super().run()
-        process.search_none_of_these()
+        process.freeze_gc()
         process.leave_threads(0)
 
 

@@ -57,7 +57,7 @@ def work(job: Job, folder: Path | None = None, measure: Measure = measure) -> Ro
 def _room(job: Job, folder: Path | None) -> Iterator[Path]:
     """Where the results of a job are, if they are in files: a folder that is created by them."""
     if folder is None:
-        with temporary_folders.room() as room:
+        with temporary_folders.temporary_folder() as room:
             yield room
         return
     room = folder / job.key

@@ -13,7 +13,7 @@ from hapticlink.analysis.sweep.row import FAILED, METRIC, Row
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.terminal_output import aligned
+from hapticlink.orchestrator.base.terminal_output import align_columns
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.write_files import write_json
 
@@ -68,7 +68,7 @@ def lines(rows: Sequence[Row], keys: Sequence[str]) -> Iterator[str]:
         cells = [cells[i] for i in ends]
         cells.insert(MOST // 2, ["..."] * len(cells[0]))
     cells.insert(0, [*keys, *shown.values()])
-    yield from (f"  {line}" for line in aligned(cells))
+    yield from (f"  {line}" for line in align_columns(cells))
 
 
 def _cell(name: str, value: Any) -> str:

@@ -36,7 +36,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
-from hapticlink.orchestrator.base.terminal_output import aligned
+from hapticlink.orchestrator.base.terminal_output import align_columns
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
@@ -297,7 +297,7 @@ def cost_lines(found: Sequence[Cost]) -> Iterator[str]:
     for cost in found:
         rows.setdefault(cost.cells(), []).append(cost.change)
     table = [HEADS, *((", ".join(names), *cells) for cells, names in rows.items())]
-    yield from aligned(table)
+    yield from align_columns(table)
 
 
 def _stiffness(felt: Transparency) -> str:

@@ -59,7 +59,7 @@ def measure(
     """Run what `path` lacks. All points of a round come before the next round, so that a busy
     machine slows all of them alike; a refused point is not asked again."""
     rows = Rows(path, COLUMNS, keys=len(SETTINGS) + 1)
-    with process_cache.unpacked_once(), temporary_folders.room() as room:
+    with process_cache.unpacked_once(), temporary_folders.temporary_folder() as room:
         for number in range(rounds):
             for k, point in enumerate(points):
                 progress(str(point), number * len(points) + k, rounds * len(points))

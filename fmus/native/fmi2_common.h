@@ -13,7 +13,7 @@ static void say(const Model *m, fmi2Status status, const char *text) {
 }
 
 static fmi2Status fail(const Model *m, fmi2Status status, const char *format, ...) {
-    if (!m) return fmi2Error; /* without an instance there is nobody to tell */
+    if (!m) return fmi2Error; /* no instance, so no logger */
     char plain[1024], text[2 * sizeof plain], *to_text = text;
     va_list arguments;
     va_start(arguments, format);

@@ -12,7 +12,7 @@ SHOWN, COUNTED = 20, 1000
 """Findings of a scene that are shown, and that are looked for."""
 
 
-def shortened(text: str, most: int = 100) -> str:
+def shorten(text: str, most: int = 100) -> str:
     """What somebody wrote, as much of it as makes it known again."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
@@ -49,9 +49,9 @@ class Finding:
     def __str__(self) -> str:
         line = f"line {self.line}" if self.line else ""
         place = ", ".join(part for part in (self.file, line) if part)
-        place = shortened(self.option) if self.option else place
-        message = shortened(self.message, 1000)
-        return ": ".join(part for part in (place, shortened(self.key), message) if part)
+        place = shorten(self.option) if self.option else place
+        message = shorten(self.message, 1000)
+        return ": ".join(part for part in (place, shorten(self.key), message) if part)
 
 
 class SceneFault(InputFault):

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 
 from hapticlink.components import registry
-from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 
 GROUP = "hapticlink.plugins"
 PACKAGE = f"{Path(registry.__file__).parent.parent}{os.sep}"
@@ -51,7 +51,7 @@ def loaded() -> dict[str, dict[str, str | None]]:
     }
 
 
-def blamed(error: BaseException) -> str | None:
+def blame_plugin(error: BaseException) -> str | None:
     """What to tell of an error that a plugin has raised, with its last line in the traceback; None
     for an error in which no plugin takes part."""
     modules = registry.origins()
@@ -66,7 +66,7 @@ def blamed(error: BaseException) -> str | None:
 def _load(module: str, what: str) -> None:
     if not all(part.isidentifier() for part in module.split(".")):
         hint = ": give its name, without .py" if module.endswith(".py") else ""
-        raise InputFault(f"{shortened(what)}: this is no name of a module{hint}")
+        raise InputFault(f"{shorten(what)}: this is no name of a module{hint}")
     try:
         with _goes_on():
             importlib.import_module(module)

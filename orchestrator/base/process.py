@@ -27,13 +27,13 @@ def open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def search_cycles_seldom() -> None:
+def raise_gc_threshold() -> None:
     """Modules and figures are many objects that stay: searching them for cycles takes 5 % of a run,
-    and as much again three times as the process ends, without `search_none_of_these`."""
+    and as much again three times as the process ends, without `freeze_gc`."""
     gc.set_threshold(200_000)
 
 
-def search_none_of_these() -> None:
+def freeze_gc() -> None:
     """The objects that there are now are left out of every search for cycles."""
     gc.freeze()
 

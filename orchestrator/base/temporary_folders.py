@@ -23,22 +23,22 @@ def _prefix() -> str:
     return f"hapticlink-{zlib.crc32(machine.encode()):08x}-"
 
 
-def new() -> str:
+def make_folder() -> str:
     """Creates a temporary folder `hapticlink-<machine>-<process>-<random>`, which the caller has to
     remove."""
     return tempfile.mkdtemp(prefix=f"{_prefix()}{os.getpid()}-")
 
 
 @contextmanager
-def room() -> Iterator[Path]:
+def temporary_folder() -> Iterator[Path]:
     """A temporary folder that exists within the context."""
-    with room_if_needed() as path:
+    with folder_if_needed() as path:
         path.mkdir(mode=0o700)
         yield path
 
 
 @contextmanager
-def room_if_needed() -> Iterator[Path]:
+def folder_if_needed() -> Iterator[Path]:
     """The path of a temporary folder, which whoever needs it creates within the context."""
     path = Path(tempfile.gettempdir(), f"{_prefix()}{os.getpid()}-{os.urandom(8).hex()}")
     try:

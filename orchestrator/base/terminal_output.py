@@ -24,7 +24,7 @@ def say(*texts: object, sep: str = " ", file: TextIO | None = None) -> None:
     print(printable(sep.join(map(str, texts))), file=file)
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def align_columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """The lines of a table; all rows have as many texts as the first."""
     cells = [[wrap(text, WIDEST) or [""] for text in row] for row in rows]
     columns = zip(*cells, strict=True)

@@ -19,12 +19,12 @@ def exists(path: str | Path) -> bool:
     return os.path.isfile(path)  # Path.is_file raises for one that is too long
 
 
-def read(path: Path, what: str, most: int, encoding: str = "utf-8") -> str:
+def read_text(path: Path, what: str, most: int, encoding: str = "utf-8") -> str:
     """The text of a file that is `what` ("a scene"), of at most `most` bytes. Raises InputFault: a
     device or a pipe may have no end."""
     why = f"{path}: cannot be read as {what}"
     if not exists(path):
-        raise InputFault(f"{why}: it is no file")
+        raise InputFault(f"{why}: not a regular file")
     try:
         with path.open("rb") as file:
             content = file.read(most + 1)
@@ -38,8 +38,9 @@ def read(path: Path, what: str, most: int, encoding: str = "utf-8") -> str:
 
 
 def read_json(path: Path, what: str = "run.json") -> Any:
-    """The content of `path`. Raises InputFault for what is no file, too large, or no JSON."""
-    text = read(path, what, LARGEST_JSON)
+    """The content of `path`. Raises InputFault for what is not a regular file, too large, or no
+    JSON."""
+    text = read_text(path, what, LARGEST_JSON)
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:  # the latter of 100,000 brackets

@@ -27,7 +27,7 @@ from xml.etree.ElementTree import Element
 
 from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.orchestrator.base.errors import unknown
-from hapticlink.orchestrator.fmi.units import Unit, misfit
+from hapticlink.orchestrator.fmi.units import Unit, why_unsuitable
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 TIMINGS = ("continuous", "sampled")
@@ -60,7 +60,9 @@ def with_units(tree: Element, scalars: Sequence[Scalar]) -> tuple[Scalar, ...]:
     return tuple(replace(s, unit=units[s.port][s.entry]) if s.port in units else s for s in scalars)
 
 
-def read(tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]) -> dict[str, Any]:
+def read_annotation(
+    tree: Element, scalars: Iterable[Scalar], units: Mapping[str, Unit]
+) -> dict[str, Any]:
     """What the annotation of an FMU says, as fields of `Description`. Raises ValueError if it is
     malformed, or does not fit the variables and their units."""
     if (declared := block(tree)) is None:
@@ -101,7 +103,7 @@ class _Ports:
         entries = self._entries(given["name"], "output")
         kind: Any = _one_of(given["kind"], "kind", get_args(Kind))
         names = [s.unit for s in entries]
-        if why := misfit(kind, [self._units.get(n, Unit(n)) if n else None for n in names]):
+        if why := why_unsuitable(kind, [self._units.get(n, Unit(n)) if n else None for n in names]):
             raise ValueError(f"{given['name']} {why}")
         return kind
 

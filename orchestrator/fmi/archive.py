@@ -23,13 +23,15 @@ MAX_ENTRIES = 10_000
 
 
 @contextmanager
-def opened(path: Path, kind: str, content: BinaryIO | None = None) -> Iterator[zipfile.ZipFile]:
+def open_archive(
+    path: Path, kind: str, content: BinaryIO | None = None
+) -> Iterator[zipfile.ZipFile]:
     """The archive at `path`, a `kind` ("FMU"), or the `content` of that place in another one.
     Raises InputFault where it is missing, damaged, larger than MAX_BYTES or MAX_ENTRIES, or holds
     an entry that would land outside the folder that it is unpacked to."""
     try:
         if path.exists() and not path.is_file():  # a pipe, which may never be written to
-            raise InputFault(f"{path}: it is no file; give the path of an {kind}")
+            raise InputFault(f"{path}: not a regular file; give the path of an {kind}")
         with zipfile.ZipFile(content or path) as archive:
             archive.filename = str(path)
             entries = archive.infolist()

@@ -26,7 +26,7 @@ from hapticlink.orchestrator.fmi import messages, process_cache, python_librarie
 from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.fmi.load_library import loaded
+from hapticlink.orchestrator.fmi.load_library import load_slave
 from hapticlink.orchestrator.fmi.saved_state import Saved
 from hapticlink.orchestrator.fmi.setter import Setter, Setting
 from hapticlink.orchestrator.fmi.status import (
@@ -45,7 +45,7 @@ from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 
 class InProcess(Instance):
     """An FMU of FMI 2.0 whose library is loaded into this process. `slave` (of FMPy, None where it
-    is not loaded), `gets` and `fewer` are for the compiled loop."""
+    is not loaded), `gets` and `gets_between_rows` are for the compiled loop."""
 
     _library: Callable[..., Any] = fmi2.FMU2Slave
 
@@ -61,7 +61,7 @@ class InProcess(Instance):
         self.holds_python = False
         self.texts = any(s.type in WRITTEN for s in self.description.scalars)
         self.in_c = not self.texts
-        self._key = messages.opened()
+        self._key = messages.open_log()
 
     def _load(self) -> None:
         try:
@@ -75,11 +75,11 @@ class InProcess(Instance):
                 reason = "its instantiation failed; its guid may not be that of its binary"
             raise self._fault(f"could not be loaded: {reason}", 0.0) from error
         outputs = self.description.outputs
-        self.gets = self.fewer = self._transfers("Get", outputs, self.outputs)
-        if self.seldom:
-            often = [s for s in outputs if s.name not in self.seldom]
+        self.gets = self.gets_between_rows = self._transfers("Get", outputs, self.outputs)
+        if self.recorded_only:
+            often = [s for s in outputs if s.name not in self.recorded_only]
             places = [*map(outputs.index, often)]
-            self.fewer = self._transfers("Get", often, self.outputs, {}, places)
+            self.gets_between_rows = self._transfers("Get", often, self.outputs, {}, places)
         do_step = self._stepper()
 
         def advance(time: float, size: float) -> int:
@@ -96,14 +96,14 @@ class InProcess(Instance):
 
     def _instantiate(self) -> Any:
         about = self.description
-        slave = loaded(
+        slave = load_slave(
             self._library, about.fmi, about.guid, about.identifier, self._folder, self.name
         )
         module = python_libraries.prepare(slave.dll, self._folder)
         self.holds_python = bool(module)
         slave.instantiate(loggingOn=True, **self._logging())
         if module and about.block is None:
-            tell = partial(messages.keep, self._key, ERROR)
+            tell = partial(messages.keep_message, self._key, ERROR)
             python_libraries.tell_exceptions(module, self.name, tell)
         return slave
 
@@ -214,7 +214,7 @@ class InProcess(Instance):
     @property
     def asked(self) -> list[Transfer]:
         """The calls that `read` makes."""
-        return self.gets if self.due.value else self.fewer
+        return self.gets if self.row_due.value else self.gets_between_rows
 
     def read(self) -> None:
         self._carry_out(self.asked, "gets")
@@ -311,7 +311,7 @@ class InProcess(Instance):
         self._status = FATAL
 
     def _logged(self) -> list[str]:
-        return messages.newest(self._key)
+        return messages.newest_messages(self._key)
 
     def close(self) -> FmuFault | None:
         """After fmi2Fatal the FMU is not called again."""
@@ -329,7 +329,7 @@ class InProcess(Instance):
                     slave.freeInstance()
             return fault
         finally:
-            messages.closed(self._key)
+            messages.close_log(self._key)
             self._keep_arithmetic()
             if self.place.altered:
                 warning = "%s changed how this process rounds numbers, in %d calls; it is restored"

@@ -14,7 +14,7 @@ triggered: by the FMU those that are outputs, by a connection those that are inp
 
 
 @dataclass(frozen=True)
-class Clock:
+class FmiClock:
     """A Clock. Of a periodic one, interval and shift (s); the interval is None where its FMU tells
     it in initialisation mode only."""
 
@@ -32,18 +32,18 @@ class Clock:
         periods = floor((Fraction(time) - self.shift) / self.interval) + 1
         return float(self.shift + max(periods, 0) * self.interval)
 
-    def timed(self, interval: float, shift: float) -> Clock:
+    def timed(self, interval: float, shift: float) -> FmiClock:
         """The clock with an interval and a shift (s), which stand for the shortest decimals."""
         return replace(self, interval=Fraction(repr(interval)), shift=Fraction(repr(shift)))
 
 
-def read(tree: Element) -> Iterator[Clock]:
+def read_clocks(tree: Element) -> Iterator[FmiClock]:
     """The clocks of a modelDescription.xml. Raises ValueError for one whose interval is no positive
     time, or that may tell another one at any event (tunable, without intervalDecimal)."""
     for variable in tree.iterfind("./ModelVariables/Clock"):
         about = variable.attrib
         name, kind = about.get("name", ""), about.get("intervalVariability", "")
-        own = Clock(name, int(about["valueReference"]), about.get("causality", "local"), kind)
+        own = FmiClock(name, int(about["valueReference"]), about.get("causality", "local"), kind)
         if kind in PERIODIC:
             shift = _time(about, "shift") or Fraction(0)
             own = replace(own, interval=_time(about, "interval"), shift=shift)

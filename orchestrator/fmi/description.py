@@ -18,7 +18,7 @@ from fmpy import platform, platform_tuple, read_model_description, sharedLibrary
 from hapticlink.components.ports import Kind, Power, Spring
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import annotation, clocks
-from hapticlink.orchestrator.fmi.archive import opened, read_xml, require_whole
+from hapticlink.orchestrator.fmi.archive import open_archive, read_xml, require_whole
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import (
     TYPES,
@@ -70,7 +70,7 @@ class Description:
     """The states that its serialised FMU state ends with; None where that is not declared."""
     declares_timing: bool = False
     """Whether the FMU itself declares its timing."""
-    clocks: tuple[clocks.Clock, ...] = ()
+    clocks: tuple[clocks.FmiClock, ...] = ()
     block: str | None = None
     """The block of this project that it was built from; None for FMUs of others."""
 
@@ -124,7 +124,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
     """The FMU, its arrays of the sizes that structural parameters have with the values of `sizes`
     (FMI 3.0 section 2.4.7.5.1). Raises InputFault where the file is no co-simulation FMU of FMI 2.0
     or 3.0 that can run here."""
-    with opened(path, "FMU") as archive:
+    with open_archive(path, "FMU") as archive:
         content = read_xml(archive, "modelDescription.xml")
         tree = ElementTree.fromstring(content)
         version = _version(path, tree)
@@ -133,13 +133,13 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         try:
             model = read_model_description(_only_xml(content), validate=False)
             variables = _variables(tree, model, version, resized=bool(sizes))
-            ticking = tuple(clocks.read(tree))
+            ticking = tuple(clocks.read_clocks(tree))
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
         _require_binary(archive, model.coSimulation.modelIdentifier, version)
         require_whole(archive)
     try:
-        declared = annotation.read(tree, variables["scalars"], variables["units"])
+        declared = annotation.read_annotation(tree, variables["scalars"], variables["units"])
     except ValueError as error:
         raise InputFault(f"{path}: its hapticlink annotation cannot be used: {error}") from error
     capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]

@@ -29,7 +29,7 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd
 from hapticlink.orchestrator.fmi.capabilities import varies_step
-from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, Clock
+from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, FmiClock
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.status import SHARE, succeeded
@@ -126,7 +126,7 @@ class InProcessWithEvents(InProcess3):
         """One that sets them in the mode in which it is called."""
         return super().connect(scalars, places)
 
-    def _told(self, clock: Clock) -> Clock:
+    def _told(self, clock: FmiClock) -> FmiClock:
         """A periodic clock with the interval that the FMU tells in initialisation mode."""
         if clock.kind not in PERIODIC or clock.interval is not None:
             return clock
@@ -137,7 +137,7 @@ class InProcessWithEvents(InProcess3):
             raise self._fault(f"clock {clock.name} has an interval of {interval:g} s", 0.0)
         return clock.timed(interval, shift.value)
 
-    def _interval(self, clock: Clock) -> tuple[float, int]:
+    def _interval(self, clock: FmiClock) -> tuple[float, int]:
         """The interval (s) that the FMU tells of a clock, and its qualifier."""
         interval, qualifier = ctypes.c_double(), ctypes.c_int()
         results = ctypes.byref(interval), ctypes.byref(qualifier)
@@ -201,7 +201,7 @@ class InProcessWithEvents(InProcess3):
         due = (c for c in self._clocks if self._instant(c, time - near) <= time + near)
         return frozenset(c.reference for c in due)
 
-    def _instant(self, clock: Clock, least: float) -> float:
+    def _instant(self, clock: FmiClock, least: float) -> float:
         """The first instant after `least` (s) at which a clock is due; infinity of one that is
         triggered, or has not told it."""
         if clock.kind in PERIODIC:

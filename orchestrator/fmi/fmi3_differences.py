@@ -13,7 +13,7 @@ import numpy as np
 from fmpy import fmi3
 
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
-from hapticlink.orchestrator.fmi.messages import keep
+from hapticlink.orchestrator.fmi.messages import keep_message
 from hapticlink.orchestrator.fmi.setter import Setting
 from hapticlink.orchestrator.fmi.start_values import wide
 from hapticlink.orchestrator.fmi.status import succeeded
@@ -28,7 +28,7 @@ class InProcess3(InProcess):
 
     def _logging(self) -> dict[str, Any]:
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:
-            keep(self._key, status, message)
+            keep_message(self._key, status, message)
 
         return {"logMessage": log}
 

@@ -25,7 +25,7 @@ GROWTH = 1e12
 _CALLS = ("get", "rollback", "save", "set", "step")
 
 
-class Place(ctypes.Structure):
+class StepState(ctypes.Structure):
     """Where an instance stands, in memory that the compiled loop shares.
 
     time: where the instance stands. begin, size, end: of its newest step. step_time: spent in
@@ -55,7 +55,7 @@ class Place(ctypes.Structure):
             setattr(self, name + "s", 0)
 
 
-class Bounds:
+class OutputBounds:
     """Bounds on the magnitude of `outputs`, a view that is read at each check: a run that exceeds
     one has diverged, though its numbers are still finite. Before `start` an output only has to be
     finite."""
@@ -89,8 +89,8 @@ class Instance(ABC):
 
     outputs: the view that `get` fills. held: number of outputs held at their last value by
     `faults.nan`. good: the last finite outputs, None unless these are held. place: where the
-    instance stands. seldom: the outputs, by name, that are only read where `due`, the table's next
-    row is written.
+    instance stands. recorded_only: the outputs, by name, that are only read where the table's next
+    row is written (`row_due`).
     """
 
     in_c: bool = True
@@ -108,12 +108,12 @@ class Instance(ABC):
         self.name, self.description, self.outputs = name, description, outputs
         self.starts, self.policy, self.held = starts, policy or Faults(), 0
         self.good: Vector | None = None
-        self.place = Place()
+        self.place = StepState()
         self._waiting: list[tuple[float, Callable[[float], object]]] = []
-        self.seldom: frozenset[str] = frozenset()
-        self.due = ctypes.c_int64(1)
+        self.recorded_only: frozenset[str] = frozenset()
+        self.row_due = ctypes.c_int64(1)
         self._counted = False
-        self.bounds = Bounds(description, outputs)
+        self.bounds = OutputBounds(description, outputs)
         self._folder = folder
 
     def __enter__(self) -> Instance:

@@ -59,7 +59,7 @@ class Isolated(Instance):
         self._saved_time: dict[int, float] = {}
 
     def _load(self) -> None:
-        self._folder = temporary_folders.new()
+        self._folder = temporary_folders.make_folder()
         self._process = Process("hapticlink.orchestrator.fmi.worker")
         self._process.interruptible = True
         what = (self.name, self.description, self.starts, self.policy)

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.fmi.description import PLATFORMS
 from hapticlink.orchestrator.fmi.status import require_success
 
 
-def loaded(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: str) -> Any:
+def load_slave(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: str) -> Any:
     """An instance of FMPy's class `kind` for the FMU of that guid and model identifier, unpacked in
     `folder`; `name` is that of the instance. Raises OSError where the library cannot be loaded, and
     AttributeError where it lacks a function of FMI."""
@@ -26,7 +26,9 @@ def loaded(kind: Any, fmi: str, guid: str, identifier: str, folder: str, name: s
     slave.component = slave.callbacks = None
     slave._functions = {}
     library = Path(folder, "binaries", PLATFORMS[fmi], f"{identifier}{sharedLibraryExtension}")
-    slave.dll = ctypes.CDLL(str(python_libraries.shared(Path(folder), library) or library))
+    slave.dll = ctypes.CDLL(
+        str(python_libraries.find_shared_library(Path(folder), library) or library)
+    )
     for function, declared in _declared(kind).items():
         slave._functions[function] = called = getattr(slave.dll, function)
         called.argnames, called.argtypes, called.restype = declared

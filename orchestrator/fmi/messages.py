@@ -14,14 +14,14 @@ _messages: dict[int, deque[str]] = {}
 _keys = count(1)
 
 
-def opened() -> int:
+def open_log() -> int:
     """A key for a new instance; its messages are kept from now on."""
     key = next(_keys)
     _messages[key] = deque(maxlen=MAX_MESSAGES)
     return key
 
 
-def keep(key: int, status: int, message: bytes) -> None:
+def keep_message(key: int, status: int, message: bytes) -> None:
     """Keep a message of instance `key`, to be shown if a call fails."""
     own = _messages.get(key)
     if own is not None and status != 0:
@@ -29,11 +29,11 @@ def keep(key: int, status: int, message: bytes) -> None:
         own.append(text.strip()[:MAX_LENGTH])
 
 
-def newest(key: int) -> list[str]:
+def newest_messages(key: int) -> list[str]:
     return [*_messages.get(key, ())]
 
 
-def closed(key: int) -> None:
+def close_log(key: int) -> None:
     _messages.pop(key, None)
 
 
@@ -45,7 +45,7 @@ def callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
 
 
 def _log(key: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
-    keep(key or 0, status, message)
+    keep_message(key or 0, status, message)
 
 
 _CALLBACKS = fmi2.fmi2CallbackFunctions()

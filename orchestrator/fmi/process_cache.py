@@ -31,7 +31,7 @@ _lock = Lock()
 _stay = False
 
 
-def described(path: Path) -> Description:
+def describe_once(path: Path) -> Description:
     """The description of an FMU, read once as long as the file does not change. Raises InputFault
     as `describe` does."""
     try:
@@ -84,7 +84,7 @@ def unpack(description: Description, folder: str) -> str:
 
 
 def _extracted(path: Path, folder: str, own: bool) -> str:
-    folder = folder or temporary_folders.new()
+    folder = folder or temporary_folders.make_folder()
     try:
         extract(path, folder, _is_needed if own else None)
     except BaseException:

@@ -106,7 +106,7 @@ def _telling(method: Callable[..., Any], module: str, own_files: Path) -> Callab
     return telling
 
 
-def shared(folder: Path, library: Path) -> Path | None:
+def find_shared_library(folder: Path, library: Path) -> Path | None:
     """The path from which to load the `library` of a Python FMU that is unpacked in `folder`: the
     same one for all libraries of the same bytes. None for other FMUs, and for a library that other
     files lie beside, which it may need."""
@@ -139,6 +139,6 @@ def _libraries(root: Path | None) -> Path:
             fmu_cache.private(folder)
             if os.access(folder, os.W_OK | os.X_OK):
                 return folder
-    folder = Path(temporary_folders.new())
+    folder = Path(temporary_folders.make_folder())
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder

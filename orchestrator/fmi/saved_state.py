@@ -6,7 +6,7 @@ import ctypes
 from typing import Any
 
 from hapticlink.orchestrator.fmi import python_libraries
-from hapticlink.orchestrator.fmi.instance import Place
+from hapticlink.orchestrator.fmi.instance import StepState
 
 
 class Saved:
@@ -14,7 +14,7 @@ class Saved:
     them, and forgets which inputs the FMU has. overwrites: pythonfmu forgets a state that is saved
     over (FMI 2.0.5 section 2.1.8 has it reused), so that it is freed before."""
 
-    def __init__(self, slave: Any, fmi: str, place: Place) -> None:
+    def __init__(self, slave: Any, fmi: str, place: StepState) -> None:
         self._place = place
         state = "state" if fmi == "2" else "State"
         self._instance, self.state = ctypes.c_void_p(slave.component), ctypes.c_void_p()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.fmi.instance import Place
+from hapticlink.orchestrator.fmi.instance import StepState
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.units import SAME, Linear
 
@@ -32,7 +32,7 @@ class Setter:
         conversions: Sequence[Linear],
         setting: Setting,
         carry_out: Callable[[Sequence[Transfer]], None],
-        place: Place,
+        place: StepState,
         key: int,
     ) -> None:
         self.place, self.key, self._before = place, key, b""

@@ -85,7 +85,7 @@ def turn(unit: Unit | None) -> float | None:
     return math.tau / unit.factor if unit.base == _ANGLE else None
 
 
-def misfit(kind: str, units: Sequence[Unit | None]) -> str | None:
+def why_unsuitable(kind: str, units: Sequence[Unit | None]) -> str | None:
     """The reason why entries with these units cannot be of a kind, None if they can."""
     n = len(units)
     if kind in MATRICES and math.isqrt(n) ** 2 != n:

@@ -113,7 +113,7 @@ def numbers(
         or (kind == "Clock" and variable.intervalVariability != "triggered")
     ):
         return
-    check(variable)
+    check_variable(variable)
     names = _names(variable)
     starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
     if len(starts) == 1:
@@ -181,7 +181,7 @@ def _nominal(variable: Any) -> float:
     return abs(float(given or 1.0)) or 1.0
 
 
-def check(variable: Any) -> None:
+def check_variable(variable: Any) -> None:
     """Raises ValueError for a name with control characters, which the schemas of FMI 2.0 and 3.0
     exclude too, and for a value reference that is no unsigned number of 32 bits, which a call would
     cut to another variable's."""
@@ -203,7 +203,7 @@ def require_unique(names: Iterable[str]) -> None:
 
 
 def text(v: Any) -> Scalar:
-    check(v)
+    check_variable(v)
     about = v.causality or "local", None, v.variability
     return Scalar(v.name, v.valueReference, v.type, *about, initial=v.initial)
 

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
-class Worker:
+class HostedFmu:
     """One instance and the ways to set its inputs."""
 
     DIRECT = (
@@ -98,7 +98,7 @@ def fault_fields(fault: FmuFault) -> tuple[Any, ...]:
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer requests until `close`, or until the stream ends."""
-    worker = Worker()
+    worker = HostedFmu()
     call = ""
     while call != "close":
         try:

@@ -55,7 +55,7 @@ def create(path: Path) -> bool:
     return True
 
 
-def read(path: Path) -> Key:
+def read_key(path: Path) -> Key:
     """The key in a file. Raises InputFault where there is none."""
     require_libraries()
     import zmq.auth

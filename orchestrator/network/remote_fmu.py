@@ -45,7 +45,7 @@ class Remote(Isolated):
         self._channel: Channel | None = None
 
     def _load(self) -> None:
-        key = key_file.read(self._at.key)
+        key = key_file.read_key(self._at.key)
         # Here, since every run imports this file, and few have the extra.
         from hapticlink.orchestrator.network.channel import Channel
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base.errors import InputFault, unknown
-from hapticlink.orchestrator.network.key_file import DEFAULT, read
+from hapticlink.orchestrator.network.key_file import DEFAULT, read_key
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import Fmu, ServedAt, System
 
@@ -44,7 +44,7 @@ class Servers:
 NOWHERE = Servers({})
 
 
-def placed(system: System, scene: Scene, remote: Servers) -> System:
+def place_remote_fmus(system: System, scene: Scene, remote: Servers) -> System:
     """The system with the FMUs of each part of `remote` at its server."""
     served = {
         name: ServedAt(require_address(address), remote.key, identity(scene, system.fmu[name]))
@@ -52,7 +52,7 @@ def placed(system: System, scene: Scene, remote: Servers) -> System:
         for name in fmus_of(system, part)
     }
     if served:
-        read(remote.key)  # raises what is missing before anything runs
+        read_key(remote.key)  # raises what is missing before anything runs
     fmus = tuple(replace(fmu, served=served.get(fmu.name)) for fmu in system.fmus)
     return replace(system, fmus=fmus)
 

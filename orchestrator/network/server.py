@@ -21,7 +21,7 @@ from zmq.auth.thread import ThreadAuthenticator
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault, InputFault
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.worker import Worker, fault_fields
+from hapticlink.orchestrator.fmi.worker import HostedFmu, fault_fields
 from hapticlink.orchestrator.network.channel import ALIVE, SECURE
 from hapticlink.orchestrator.network.key_file import Key
 from hapticlink.orchestrator.network.messages import Answer, Malformed, Request, request_of
@@ -48,7 +48,7 @@ PHASES = {
 NEXT = {"enter_initialization": "initializing", "exit_initialization": "running"}
 
 
-class Session(Worker):
+class ServedFmu(HostedFmu):
     """An FMU that a run has loaded: what the run may call, and the answer to its newest call."""
 
     def __init__(self, request: Request, fmu: Fmu, policy: Faults) -> None:
@@ -110,7 +110,7 @@ class Server:
         say: Callable[[str], object],
     ) -> None:
         self._fmus, self._policy, self._say = fmus, policy, say
-        self._sessions: dict[str, Session] = {}
+        self._sessions: dict[str, ServedFmu] = {}
         self.refused: Counter[str] = Counter()
         """Messages that were not carried out, by reason."""
 
@@ -167,11 +167,11 @@ class Server:
         times = request.number, request.sent, received, monotonic_ns()
         return Answer(*times, kind, content).packed()
 
-    def _session(self, request: Request) -> Session | None:
+    def _session(self, request: Request) -> ServedFmu | None:
         every = self._sessions.values()
         return next((s for s in every if s.identifier == request.session), None)
 
-    def _result(self, request: Request, session: Session | None) -> Any:
+    def _result(self, request: Request, session: ServedFmu | None) -> Any:
         if request.call == "hello" and session is None:
             return self._loaded(request)
         if session is None:
@@ -200,7 +200,7 @@ class Server:
             del self._sessions[name]
             with suppress(FmuFault):
                 before.close()
-        self._sessions[name] = Session(request, fmu, self._policy)
+        self._sessions[name] = ServedFmu(request, fmu, self._policy)
         self._say(f"{name}: a run has begun")
 
     def _refuse(self, why: str) -> None:

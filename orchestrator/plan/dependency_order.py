@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.system.ports import beside
+from hapticlink.orchestrator.system.ports import companion_outputs
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
@@ -48,7 +48,7 @@ def _read(system: System, fmu: Fmu) -> Iterator[Scalar]:
     """The used outputs: those of connections, and those that holds read beside them."""
     for c in system.out_of(fmu.name):
         yield from c.outputs
-        yield from beside(c, system.fmu)
+        yield from companion_outputs(c, system.fmu)
 
 
 def plants(system: System, fmus: Iterable[Fmu]) -> Iterator[list[Fmu]]:

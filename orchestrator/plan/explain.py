@@ -85,7 +85,7 @@ def _fetched(system: System) -> Iterator[str]:
     for u in system.fmus:
         names = [s.name for s in u.description.outputs]
         many = len([n for n in names if written is None or f"{u.name}.{n}" in written])
-        some = f", {len(u.seldom)} of them for rows alone" if u.seldom else ""
+        some = f", {len(u.recorded_only)} of them for rows alone" if u.recorded_only else ""
         yield f"  {u.name}: {len(names)} outputs fetched{some}, {many} recorded{rows}"
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
-from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
@@ -51,7 +51,7 @@ class Plan:
             coupling = self.system.coupling.scheme
             block = SCHEMES[coupling].block(self.system, kind)
             if not isinstance(block, tuple) or not all(isinstance(op, Operation) for op in block):
-                what = shortened(repr(block))
+                what = shorten(repr(block))
                 raise InputFault(f"coupling = {coupling!r}: {what} is no tuple of operations")
             self._blocks[kind] = block
         return self._blocks[kind]

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.plan.operations import (
     Set,
 )
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 
 
 class Use(NamedTuple):
@@ -38,7 +38,7 @@ def uses(
     got, pushed = dict.fromkeys(system.fmu, 0), dict.fromkeys(source, 0)
     held = dict.fromkeys(source, 0)
     late = ((c.name, c.latency) for c in traced if c.hold)
-    links = {name: Link(latency, system.timeline.base) for name, latency in late if latency}
+    links = {name: SampleLink(latency, system.timeline.base) for name, latency in late if latency}
     blocks: dict[Event, list[Operation]] = {}
 
     def concerned(operation: Operation) -> bool:

@@ -282,7 +282,7 @@ def csv_parts(path: Path, most: int | None = None) -> Iterator[tuple[tuple[str, 
 def _require_file(path: Path) -> None:
     """Raises InputFault for a device, a pipe or a folder, which may have no end."""
     if path.exists() and not path.is_file():
-        raise InputFault(f"{path}: it is no file: run the scene again")
+        raise InputFault(f"{path}: not a regular file: run the scene again")
 
 
 def _malformed(path: Path) -> str:

@@ -59,7 +59,7 @@ def of_run(folder: Path | str) -> Iterator[Results]:
     elif not csvs:
         yield opened(folder)
     else:
-        with temporary_folders.room() as room:
+        with temporary_folders.temporary_folder() as room:
             for path in csvs:
                 copy_as_rows(path, room / f"{path.stem}{binary_rows.SUFFIX}")
             yield Streamed(room, run, FolderTables(room, run["rates"], run["files"]))

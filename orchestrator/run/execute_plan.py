@@ -72,7 +72,7 @@ class Outcome:
             case KeyboardInterrupt():  # a second signal does not wait for the end of the event
                 self.reason, self.fault = "interrupted", Interrupted(results.last)
             case _:
-                if (message := plugins.blamed(error)) is None:
+                if (message := plugins.blame_plugin(error)) is None:
                     raise error
                 self.reason, self.fault = "fault", Fault(message)
 

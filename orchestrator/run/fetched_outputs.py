@@ -39,11 +39,13 @@ def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
         {s.port for s in every if f"{fmu.name}.{s.name}" in names} for names in (often, rows)
     )
     outputs = [s for s in every if s.port in read | written]
-    seldom = frozenset(s.name for s in outputs if separate and s.port not in read)
-    outputs.sort(key=lambda s: s.name in seldom)
+    recorded_only = frozenset(s.name for s in outputs if separate and s.port not in read)
+    outputs.sort(key=lambda s: s.name in recorded_only)
     others = [s for s in fmu.description.scalars if s.causality != "output"]
     return replace(
-        fmu, description=replace(fmu.description, scalars=(*others, *outputs)), seldom=seldom
+        fmu,
+        description=replace(fmu.description, scalars=(*others, *outputs)),
+        recorded_only=recorded_only,
     )
 
 

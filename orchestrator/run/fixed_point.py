@@ -16,7 +16,7 @@ from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.solvers import SOLVERS, Matrix, Newton, Solution, Vector
 from hapticlink.orchestrator.scene.scene_tables import Iteration
-from hapticlink.orchestrator.system.ports import beside
+from hapticlink.orchestrator.system.ports import companion_outputs
 from hapticlink.orchestrator.system.system import Connection, System
 
 
@@ -159,5 +159,5 @@ def _constant(c: Connection, system: System) -> bool:
 def _read(c: Connection, system: System, signals: SignalVector) -> list[int]:
     """Indices of the signals that the input of `c` depends on: the source's outputs, and those
     that its hold reads beside them."""
-    further = (signals.scalar(c.source, s.name) for s in beside(c, system.fmu))
+    further = (signals.scalar(c.source, s.name) for s in companion_outputs(c, system.fmu))
     return [*signals.sources(c), *further]

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.solvers import Matrix, Newton, Vector
-from hapticlink.orchestrator.scene.start_pose import outside
+from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 
 SWEEPS = 50
 TOLERANCE = 1e-12
@@ -144,6 +144,6 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
             start = dict(zip(names, instance.outputs.tolist(), strict=True))
             if (margin := start["workspace_margin"]) < 0:
                 pose = [start[f"x_true[{i}]"] for i in (1, 2, 3)]
-                raise FmuFault(fmu, outside(pose, margin), 0.0, repeatable=True)
+                raise FmuFault(fmu, describe_start_outside(pose, margin), 0.0, repeatable=True)
     for instance in instances.values():
         instance.require_finite()

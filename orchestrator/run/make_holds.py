@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hapticlink.orchestrator.base.errors import Fault, shortened
+from hapticlink.orchestrator.base.errors import Fault, shorten
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.energy_tank import EnergyTank, NearEnd
@@ -17,8 +17,8 @@ from hapticlink.orchestrator.holds.holds_on_manifolds import Projector, Semidefi
 from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene_tables import SetSpring
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
-from hapticlink.orchestrator.system.ports import beside, kind, turns
+from hapticlink.orchestrator.system.latency_and_loss import Late, SampleLink
+from hapticlink.orchestrator.system.ports import companion_outputs, kind, turns
 from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -56,8 +56,8 @@ def make_hold(
     elif turned := _turns(connection, system):
         hold = Unwrapped(make, list(turned), list(turned.values()))
     if connection.latency:
-        hold = Late(hold, Link(connection.latency, system.timeline.base))
-    if further := beside(connection, system.fmu):
+        hold = Late(hold, SampleLink(connection.latency, system.timeline.base))
+    if further := companion_outputs(connection, system.fmu):
         places = [signals.scalar(connection.source, s.name) for s in further]
         hold = WithFurther(hold, Reader(signals, places))
     return hold
@@ -72,7 +72,7 @@ def _turns(connection: Connection, system: System) -> dict[int, float]:
     assert connection.hold is not None
     if HOLDS[connection.hold].needs != "integral":
         return {}
-    of = replace(connection, outputs=beside(connection, system.fmu))
+    of = replace(connection, outputs=companion_outputs(connection, system.fmu))
     held = (
         c.kind
         for c in system.out_of(connection.source)
@@ -131,7 +131,7 @@ class CheckedHold(Hold):
         ):
             raise Fault(
                 f"hold {self._name!r} of {self._connection}: its value is "
-                f"{shortened(' '.join(repr(value).split()))}, where {self._size} finite numbers in "
+                f"{shorten(' '.join(repr(value).split()))}, where {self._size} finite numbers in "
                 "a NumPy array are needed"
             )
         return value

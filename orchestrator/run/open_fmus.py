@@ -56,7 +56,7 @@ class LoadedFmus:
             outputs = self.signals.values[self.signals.fmu(fmu.name)]
             opening = partial(Remote, fmu.served) if fmu.served else kind
             instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
-            instance.seldom = fmu.seldom
+            instance.recorded_only = fmu.recorded_only
             self.instances[fmu.name] = stack.enter_context(instance)
 
     def setter(

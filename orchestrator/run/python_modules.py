@@ -20,7 +20,7 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import process_cache
-from hapticlink.orchestrator.fmi.archive import opened
+from hapticlink.orchestrator.fmi.archive import open_archive
 from hapticlink.orchestrator.system.system import Fmu
 
 Modules = dict[str, dict[str, int]]
@@ -44,7 +44,7 @@ def bundled(path: Path) -> Modules:
 
 @lru_cache(process_cache.MAX_UNPACKED)
 def _bundled(at: process_cache.File) -> Modules:
-    with opened(at[0], "FMU") as archive:
+    with open_archive(at[0], "FMU") as archive:
         crcs = {e.filename: e.CRC for e in archive.infolist()}
     modules: Modules = {}
     for file, crc in crcs.items() if "resources/slavemodule.txt" in crcs else ():

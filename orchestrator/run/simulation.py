@@ -94,7 +94,7 @@ class Simulation(LoadedFmus):
             self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:
-                    self.instances[fmu.name].due = recorder.due
+                    self.instances[fmu.name].row_due = recorder.due
         for side in self.sides:
             self.arrivals[side] = self._beside(f"{side}_{SAMPLES}", COLUMNS)
         for name in self.remote if self.pace else ():

@@ -7,7 +7,7 @@ from numbers import Real
 from typing import Any, get_args
 
 from hapticlink.components.specs.quantities import Quantity
-from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 
 
 def require(name: str, value: object, kind: Any) -> float:
@@ -33,4 +33,4 @@ def require_name(what: str, value: object) -> str:
     """`value` as a name. Raises InputFault where it is no text."""
     if isinstance(value, str):
         return value
-    raise InputFault(f"{what} = {shortened(repr(value))}: give its name")
+    raise InputFault(f"{what} = {shorten(repr(value))}: give its name")

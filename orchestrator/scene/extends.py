@@ -7,20 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault, shortened, unknown
+from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault, shorten, unknown
 from hapticlink.orchestrator.scene import families, toml_keys
-from hapticlink.orchestrator.scene.find_scene import find
-from hapticlink.orchestrator.scene.rates import traced
+from hapticlink.orchestrator.scene.find_scene import find_scene
+from hapticlink.orchestrator.scene.rates import find_traces
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import (
     Path,
     Place,
     flatten,
+    flatten_path,
     key_lines,
     loads,
     parts,
     place_of,
-    whole,
 )
 
 MAX_EXTENDED = 20
@@ -56,11 +56,11 @@ def document(
     except ValueError as error:
         raise SceneFault(name, [Finding("", f"not TOML: {error}", file=file)]) from error
     flatten(data)
-    places = {whole(path): (file, line) for path, line in key_lines(text).items()}
+    places = {flatten_path(path): (file, line) for path, line in key_lines(text).items()}
     for fmu in tables_of(data, "fmu"):
         if folder and isinstance(fmu.get("path"), str):
             fmu["path"] = str(folder / fmu["path"])
-    for _, table in traced(data) if folder else ():
+    for _, table in find_traces(data) if folder else ():
         table["rate"] = {"trace": str(folder / table["rate"]["trace"])}
     base, dropped = data.pop("extends", None), data.pop("drop", [])
 
@@ -75,7 +75,7 @@ def document(
     if not isinstance(base, str):
         raise refuse(f"{base!r}: write a scene's name or path")
     try:
-        _, base_text, where = find(base, folder)
+        _, base_text, where = find_scene(base, folder)
     except InputFault as fault:
         raise refuse(f"{fault}; a path is relative to this file") from None
     if len(above) >= MAX_EXTENDED:
@@ -85,9 +85,9 @@ def document(
     if so_far[-1] in above:
         raise refuse(f"runs in a circle: {' -> '.join(so_far)}")
     below, below_places = document(base_text, base, where, so_far, base)
-    below = _dropped(below, dropped, lambda message: refuse(message, "drop"))
+    below = _drop_keys(below, dropped, lambda message: refuse(message, "drop"))
     replaced: set[Path] = set()
-    merged = _merged(below, data, replaced)
+    merged = _merge(below, data, replaced)
     inherited = {
         path: place
         for path, place in below_places.items()
@@ -97,16 +97,18 @@ def document(
     return merged, inherited | places
 
 
-def _dropped(base: dict[str, Any], keys: Any, refuse: Callable[[str], Exception]) -> dict[str, Any]:
+def _drop_keys(
+    base: dict[str, Any], keys: Any, refuse: Callable[[str], Exception]
+) -> dict[str, Any]:
     """The tables of `base` without the dotted `keys`. Raises `refuse` with the reason where `keys`
     is no list of them, or names one that the base does not have."""
     if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
-        raise refuse(f"{shortened(repr(keys))}: write a list of dotted keys")
+        raise refuse(f"{shorten(repr(keys))}: write a list of dotted keys")
     for key in keys:
         try:
             names = parts(key)
         except ValueError:
-            raise refuse(f"{shortened(key)!r} is no dotted key") from None
+            raise refuse(f"{shorten(key)!r} is no dotted key") from None
         base = _without(base, names, refuse)
     return base
 
@@ -120,7 +122,7 @@ def _without(
     if not rest:
         return {key: value for key, value in table.items() if key != first}
     if not isinstance(table[first], Mapping):
-        raise refuse(f"{shortened(first)} is no table in the base scene: drop it as a whole")
+        raise refuse(f"{shorten(first)} is no table in the base scene: drop it as a whole")
     return {**table, first: _without(table[first], tuple(rest), refuse)}
 
 
@@ -131,10 +133,10 @@ def with_family(data: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(linkage, dict) or "family" not in linkage:
         return data
     others = {k: v for k, v in linkage.items() if k not in families.ARGUMENTS}
-    return {**data, "linkage": _merged(families.members(linkage), others, set())}
+    return {**data, "linkage": _merge(families.members(linkage), others, set())}
 
 
-def _merged(
+def _merge(
     base: dict[str, Any], top: Mapping[str, Any], replaced: set[Path], above: Path = ()
 ) -> dict[str, Any]:
     """`top` over `base`: tables merge key by key; other values of `top`, and tables of another
@@ -143,7 +145,7 @@ def _merged(
     for key, value in top.items():
         below = base.get(key)
         if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
-            value = _merged(below, value, replaced, (*above, key))
+            value = _merge(below, value, replaced, (*above, key))
         else:
             replaced.add((*above, key))
         merged[key] = value

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.errors import InputFault, near, shortened
+from hapticlink.orchestrator.base.errors import InputFault, near, shorten
 from hapticlink.orchestrator.scene.toml_keys import LARGEST
 
 
@@ -19,15 +19,13 @@ def shipped() -> dict[str, Any]:
     return dict(sorted(files.items()))
 
 
-def find(scene: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
+def find_scene(scene: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
     """Name, text and folder of a scene: a path relative to `folder`, or the name of a shipped one,
     which has no folder. Raises InputFault where there is none, or where it cannot be read as
     text."""
     path, known = (folder or FilePath()) / scene, shipped()
     if text_files.exists(path):
-        return path.stem, text_files.read(path, "a scene", LARGEST), path.parent
+        return path.stem, text_files.read_text(path, "a scene", LARGEST), path.parent
     if scene in known:
         return scene, known[scene].read_text(encoding="utf-8"), None
-    raise InputFault(
-        f"{shortened(scene)}: neither a file nor a shipped scene; {near(scene, known)}"
-    )
+    raise InputFault(f"{shorten(scene)}: neither a file nor a shipped scene; {near(scene, known)}")

@@ -31,7 +31,7 @@ def vector(path: Path, data: Any) -> str:
     return " or ".join(dict.fromkeys(words(k) + _beside(unit(k)) for k in arrays))
 
 
-def expected(path: Path, data: Any) -> str:
+def describe_expected(path: Path, data: Any) -> str:
     """What the value at `path` may be, in words."""
     kinds = [pair for kind in annotations_at(path, data) for pair in measured(kind)]
     return _in_words(kinds, lambda kind, q: _beside(q.unit if q else unit(kind)))

@@ -9,8 +9,15 @@ from itertools import zip_longest
 from pathlib import PurePath
 from typing import Any
 
-from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
-from hapticlink.orchestrator.scene.toml_keys import ASSIGNMENT, DEEPEST, Path, loads, parts, whole
+from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
+from hapticlink.orchestrator.scene.toml_keys import (
+    ASSIGNMENT,
+    DEEPEST,
+    Path,
+    flatten_path,
+    loads,
+    parts,
+)
 
 Options = Mapping[str, Any] | Sequence[str]
 """Dotted keys with their Python values, or `key=value` as on the command line."""
@@ -66,7 +73,7 @@ def parse(option: str) -> tuple[tuple[str, ...], Any]:
     as `holds.virtual_environment.P_c=lead`. Raises InputFault where there is no `=` or no key.
     """
     names, equals, text = _key(option)
-    shown = f"--set {shortened(option)}"
+    shown = f"--set {shorten(option)}"
     if not equals or not all(names):
         raise InputFault(f"{shown}: write key=value, e.g. --set graphics.rate=10")
     if len(names) > DEEPEST:
@@ -108,7 +115,7 @@ def apply(data: dict[str, Any], option: str) -> Path:
     Raises InputFault where there is no such entry, or where a part of the key is no table.
     """
     names, value = parse(option)
-    names = whole(names)
+    names = flatten_path(names)
     node: Any = data
     path: Path = ()
     new: Path | None = None
@@ -117,8 +124,8 @@ def apply(data: dict[str, Any], option: str) -> Path:
         if isinstance(node, list):
             place = _entry(node, name, option)
         elif not isinstance(node, dict):
-            what = f"{'.'.join(map(str, path))} is {shortened(repr(node))}, not a table"
-            raise InputFault(f"--set {shortened(option)}: {what}")
+            what = f"{'.'.join(map(str, path))} is {shorten(repr(node))}, not a table"
+            raise InputFault(f"--set {shorten(option)}: {what}")
         path = (*path, place)
         if following is None:
             node[place] = value
@@ -141,4 +148,4 @@ def _entry(entries: list[Any], name: str, option: str) -> int:
     known = [str(entry) for entry in own]
     if name in known:
         return known.index(name)
-    raise InputFault(f"--set {shortened(option)}: {unknown('entry', name, known)}")
+    raise InputFault(f"--set {shorten(option)}: {unknown('entry', name, known)}")

@@ -75,10 +75,10 @@ class Trace:
     frames ended."""
 
 
-def frame_times(path: FilePath) -> list[float]:
+def read_frame_times(path: FilePath) -> list[float]:
     """The ends of the frames (s), counted from the first stamp. Raises InputFault, with the line,
     for a file that is no trace."""
-    lines = text_files.read(path, "a trace of frames", LARGEST).splitlines()
+    lines = text_files.read_text(path, "a trace of frames", LARGEST).splitlines()
     stamps: list[Decimal] = []
     for number, line in enumerate(lines, start=1):
         field = line.partition("#")[0].split(",")[0].strip()
@@ -101,7 +101,7 @@ def frame_times(path: FilePath) -> list[float]:
     return [float(stamp - stamps[0]) for stamp in stamps[1:]]
 
 
-def traced(data: Mapping[str, Any]) -> list[tuple[tuple[str | int, ...], dict[str, Any]]]:
+def find_traces(data: Mapping[str, Any]) -> list[tuple[tuple[str | int, ...], dict[str, Any]]]:
     """The [graphics] and [[fmu]] tables with `rate = { trace = FILE }`, and their paths."""
     fmus = data.get("fmu")
     tables: list[tuple[tuple[str | int, ...], Any]] = [(("graphics",), data.get("graphics"))]

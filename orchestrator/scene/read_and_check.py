@@ -14,14 +14,18 @@ from pydantic_core import to_json
 from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
 from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
 from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
-from hapticlink.orchestrator.scene.rates import frame_times, traced
-from hapticlink.orchestrator.scene.refused_keys_and_values import beyond, problems, unsound
+from hapticlink.orchestrator.scene.rates import find_traces, read_frame_times
+from hapticlink.orchestrator.scene.refused_keys_and_values import (
+    explain_errors,
+    find_further_problems,
+    find_unrepresentable,
+)
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
-from hapticlink.orchestrator.scene.toml_keys import Problem, flat, flatten, reported
+from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem, flat, flatten
 
 
-def read(
+def read_scene(
     text: str, options: Sequence[str] = (), name: str = "scene", folder: FilePath | None = None
 ) -> Scene:
     """The scene that `text` writes, changed by `options`; relative paths start at `folder`.
@@ -49,26 +53,26 @@ def from_source(source: Source) -> Scene:
         if findings := [origin.finding(*problem) for problem in problems]:
             raise SceneFault(source.name, findings)
 
-    refuse(islice(unsound(data), COUNTED))
+    refuse(islice(find_unrepresentable(data), COUNTED))
     flatten(data)
     wrong: list[Problem] = []
-    for path, recorded in traced(data):
-        with reported(wrong, (*path, "rate")):
+    for path, recorded in find_traces(data):
+        with collect_problem(wrong, (*path, "rate")):
             file = recorded.pop("rate")["trace"]
-            recorded["rate"] = frame_times(FilePath(file))
+            recorded["rate"] = read_frame_times(FilePath(file))
     for fmu in tables_of(data, "fmu"):
         for key in ("start", "derivatives"):
             if isinstance(fmu.get(key), dict):
                 fmu[key] = dict(flat(fmu[key]))
-    parts, errors, unread = registry_tables.read(data)
+    parts, errors, unread = registry_tables.read_registry_tables(data)
     wrong += unread
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
         scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
     except pydantic.ValidationError as error:
         errors += error.errors(include_url=False)
-    if wrong := wrong + problems(errors, data):
-        refuse([*wrong, *beyond(wrong, data)[: COUNTED - len(wrong)]])
-    refuse(checks.check(scene))
-    scene = registry_tables.put(scene, parts)
+    if wrong := wrong + explain_errors(errors, data):
+        refuse([*wrong, *find_further_problems(wrong, data)[: COUNTED - len(wrong)]])
+    refuse(checks.check_scene(scene))
+    scene = registry_tables.put_registry_tables(scene, parts)
     return WrittenScene(**vars(scene), read_from=source, origin=origin, written=scene)

@@ -12,13 +12,13 @@ from typing import Any
 import pydantic
 from pydantic_core import to_json
 
-from hapticlink.orchestrator.base.errors import COUNTED, near, shortened, unknown
+from hapticlink.orchestrator.base.errors import COUNTED, near, shorten, unknown
 from hapticlink.orchestrator.scene import checks, key_descriptions, types_of_keys
 from hapticlink.orchestrator.scene.scene import adapter
 from hapticlink.orchestrator.scene.toml_keys import DEEPEST, Path, Problem, value
 
 
-def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
+def explain_errors(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
     """pydantic's errors as (path in the file, message), with one for all branches of a union; up to
     COUNTED of them."""
     by_path: dict[Path, list[Any]] = {}
@@ -33,7 +33,8 @@ def problems(errors: Sequence[Any], data: Any) -> list[tuple[Path, str]]:
             continue  # branches of a union that do not apply; the one that does has deeper errors
         limited = [e for e in group if e["type"] in _RANGE]
         messages = {_message(e, where, data) for e in limited or group}
-        expected = f"{_shown(group[0]['input'])} should be {key_descriptions.expected(where, data)}"
+        wanted = key_descriptions.describe_expected(where, data)
+        expected = f"{_shown(group[0]['input'])} should be {wanted}"
         messages_by_path.append((where, messages.pop() if len(messages) == 1 else expected))
     return messages_by_path
 
@@ -64,7 +65,7 @@ def _path(error: Any, data: Any) -> Path | None:
     return (*path, "type") if error["type"] == "union_tag_invalid" else path
 
 
-def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str]]:
+def find_further_problems(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str]]:
     """Semantic errors that remain when the schema errors `known` are removed from `data`.
 
     Faulty values are dropped, or replaced by a placeholder where one is required. Returns nothing
@@ -90,7 +91,7 @@ def beyond(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str
             node[path[-1]] = filled
     try:
         document = to_json(whole, inf_nan_mode="constants")
-        faults = checks.check(adapter().validate_json(document))
+        faults = checks.check_scene(adapter().validate_json(document))
     except pydantic.ValidationError:
         return []
     return [problem for problem in faults if problem[0] not in reported]
@@ -132,7 +133,7 @@ def _message(error: Any, path: Path, data: Any) -> str:
         finite = "" if shown.lstrip("-") not in ("inf", "nan") else "finite "
         return f"{shown} is out of range: give a {finite}{key_descriptions.number(path, data)}"
     if kind == "no_number":
-        return f"{shown} should be {key_descriptions.expected(path, data)}"
+        return f"{shown} should be {key_descriptions.describe_expected(path, data)}"
     if kind in ("tuple_type", "too_long") and (wanted := key_descriptions.vector(path, data)):
         return f"{shown} should be {wanted}"
     message = error["msg"].removeprefix("Input should be ").replace("an object", "a table")
@@ -140,7 +141,7 @@ def _message(error: Any, path: Path, data: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    return shortened(repr(value))
+    return shorten(repr(value))
 
 
 _GONE: dict[Path, str] = {
@@ -175,7 +176,7 @@ def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     return f"unknown key; {near(key, sorted(known))}"
 
 
-def unsound(value: Any, path: Path = ()) -> Iterator[Problem]:
+def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
     """What no scene can hold, and where: tables without end, whole numbers that no type of FMI
     can, dates, text that cannot be written to a file."""
     if len(path) > DEEPEST:
@@ -184,10 +185,10 @@ def unsound(value: Any, path: Path = ()) -> Iterator[Problem]:
         for key, inside in value.items():
             if not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
-            yield from unsound(inside, (*path, key))
+            yield from find_unrepresentable(inside, (*path, key))
     elif isinstance(value, list):
         for i, inside in enumerate(value):
-            yield from unsound(inside, (*path, i))
+            yield from find_unrepresentable(inside, (*path, i))
     elif isinstance(value, str):
         if not _is_unicode(value):
             yield path, f"{value[:100]!a} is no Unicode text: write it in UTF-8"

@@ -13,7 +13,7 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.components.blocks import BLOCKS
-from hapticlink.orchestrator.base.errors import InputFault, shortened
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem, value
 
@@ -63,7 +63,7 @@ def _default(argument: inspect.Parameter) -> dict[str, Any]:
     return {} if given is argument.empty else {"default_factory": lambda: given}
 
 
-def read(data: Any) -> tuple[dict[Path, Any], list[Any], list[Problem]]:
+def read_registry_tables(data: Any) -> tuple[dict[Path, Any], list[Any], list[Problem]]:
     """The records of such tables in a scene's `data`, by path, read as strictly as the scene's own;
     pydantic's errors in them, and the problems found besides."""
     records: dict[Path, Any] = {}
@@ -114,12 +114,12 @@ def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
         reader.rebuild(raise_errors=True)
         return reader
     except (pydantic.errors.PydanticUserError, NameError) as error:
-        why = shortened(str(error).partition("\n")[0])
+        why = shorten(str(error).partition("\n")[0])
         message = f"{record.__module__}: the annotations of {record.__name__} cannot be read: {why}"
         raise InputFault(message) from error
 
 
-def put(scene: Scene, records: Mapping[Path, Any]) -> Scene:
+def put_registry_tables(scene: Scene, records: Mapping[Path, Any]) -> Scene:
     """The scene with such tables replaced by the records that `read` returned."""
 
     def settings(i: int) -> dict[str, Any]:

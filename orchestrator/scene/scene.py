@@ -39,7 +39,7 @@ from hapticlink.orchestrator.scene.scene_tables import (
     Iteration,
     Latency,
     PowerPort,
-    Record,
+    RecordTable,
     SetSpring,
     TimedEvent,
     Wire,
@@ -174,7 +174,7 @@ class Scene:
     """Connections to and from them."""
     at: tuple[TimedEvent, ...] = ()
     """What happens at given times: [scenarios](scenarios.md)."""
-    record: Record = field(default_factory=Record)
+    record: RecordTable = field(default_factory=RecordTable)
     """What is written, and how often."""
     faults: Faults = field(default_factory=Faults)
     """How a run reacts to an FMU that fails: [faults](faults.md)."""

@@ -93,7 +93,7 @@ class Wire:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class RecordTable:
     """What a run writes. Outputs that nobody reads either are not fetched from their FMUs:
     [what is recorded](fmus.md#what-is-fetched-and-recorded)."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
-def outside(pose: Sequence[float], margin: float) -> str:
+def describe_start_outside(pose: Sequence[float], margin: float) -> str:
     """The message for a start pose (m, m, rad) outside the device's workspace, by -`margin` (m)."""
     numbers = ", ".join(f"{value:.4g}" for value in pose)
     return (

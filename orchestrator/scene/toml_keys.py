@@ -138,7 +138,7 @@ def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
 
 
 @contextmanager
-def reported(problems: list[Problem], path: Path) -> Iterator[None]:
+def collect_problem(problems: list[Problem], path: Path) -> Iterator[None]:
     """A ValueError or InputFault ends the context, and becomes a problem at `path`."""
     try:
         yield
@@ -172,7 +172,7 @@ def flatten(data: dict[str, Any]) -> None:
             data[table] = dict(flat(data[table], LATENCY if table == "delays" else frozenset()))
 
 
-def whole(names: tuple[Any, ...]) -> tuple[Any, ...]:
+def flatten_path(names: tuple[Any, ...]) -> tuple[Any, ...]:
     """The path of a dotted key in the tables as `flatten` leaves them: the name of a connection is
     one part."""
     if names[0] not in NAMED or len(names) < 3 or "." in names[1]:

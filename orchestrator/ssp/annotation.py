@@ -12,8 +12,8 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
-from hapticlink.orchestrator.scene.rates import traced
-from hapticlink.orchestrator.scene.refused_keys_and_values import unsound
+from hapticlink.orchestrator.scene.rates import find_traces
+from hapticlink.orchestrator.scene.refused_keys_and_values import find_unrepresentable
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 from hapticlink.orchestrator.ssp.names import (
@@ -28,7 +28,7 @@ from hapticlink.orchestrator.ssp.names import (
 OF_AN_FMU = ("rate", "timing", "isolate", "derivatives")
 
 
-def read(path: FilePath, root: Element) -> dict[str, Any]:
+def read_run_annotation(path: FilePath, root: Element) -> dict[str, Any]:
     """The annotation's tables, by the keys of a scene but `fmu` by names; empty where there is
     none. Raises InputFault for what `write` never writes."""
     for annotation in root.iterfind(f"{{{SSD}}}Annotations/{{{SSC}}}Annotation"):
@@ -47,7 +47,7 @@ def read(path: FilePath, root: Element) -> dict[str, Any]:
 
 def _problems(tables: Any) -> Iterator[Problem]:
     """What is wrong, the first of which is reported: later ones may presume it."""
-    yield from unsound(tables)
+    yield from find_unrepresentable(tables)
     own = {f.name for f in fields(Scene)} - NOT_IN_ANNOTATION
     yield from _table(tables, (), own | {"graphics", "fmu", "connection"})
     yield from _table(tables.get("graphics", {}), ("graphics",), OF_GRAPHICS)
@@ -57,7 +57,7 @@ def _problems(tables: Any) -> Iterator[Problem]:
         yield from _table(fmu, ("fmu", name), OF_AN_FMU)
     if not isinstance(tables.get("connection", []), list):
         yield ("connection",), "should be a list"
-    for where, _ in traced({"graphics": tables.get("graphics"), "fmu": [*fmus.values()]}):
+    for where, _ in find_traces({"graphics": tables.get("graphics"), "fmu": [*fmus.values()]}):
         yield (*where, "rate"), "a trace is a file outside the SSP: name it with --set yourself"
 
 

@@ -20,7 +20,15 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.ssp.tree import Connector, Line, Node, Part, Place, dotted, indices
+from hapticlink.orchestrator.ssp.tree import (
+    Connector,
+    Node,
+    Place,
+    SsdConnection,
+    SsdElement,
+    indices,
+    join_place,
+)
 
 TAKES = ("input", "parameter", "structuralParameter")
 Row = tuple[Node, Node, dict[str, Any]]
@@ -28,7 +36,7 @@ Row = tuple[Node, Node, dict[str, Any]]
 
 
 @dataclass(frozen=True)
-class Reach:
+class ReachedVariable:
     """A variable of an FMU that a connector of a system feeds: it gets `linear` of the connector's
     value in `unit`."""
 
@@ -50,10 +58,10 @@ class Wires:
     """
 
     path: Path
-    root: Part
+    root: SsdElement
     described: Mapping[Place, Description]
     rows: list[Row] = field(default_factory=list)
-    reach: dict[Node, list[Reach]] = field(default_factory=dict)
+    reach: dict[Node, list[ReachedVariable]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._systems = {p.place: p for p in self.root if p.source is None}
@@ -67,23 +75,23 @@ class Wires:
         for place, d in self.described.items():
             for s in sorted(d.scalars, key=lambda s: s.indices):
                 self._arrays.setdefault((place, s.port), []).append(s.name.removeprefix(s.port))
-        fed: dict[Node, tuple[Node, Line]] = {}
+        fed: dict[Node, tuple[Node, SsdConnection]] = {}
         for source, sink, line in (*self._written(), *self._through_dictionaries()):
             if sink in fed:
-                names = f"{dotted(*fed[sink][0])} and by {dotted(*source)}"
-                raise InputFault(f"{self.path}: {dotted(*sink)} is fed by {names}; keep one")
+                names = f"{join_place(*fed[sink][0])} and by {join_place(*source)}"
+                raise InputFault(f"{self.path}: {join_place(*sink)} is fed by {names}; keep one")
             fed[sink] = source, line
         for sink in fed:
             if sink[0] in self.described:
                 self._follow(sink, fed)
 
-    def _written(self) -> Iterator[tuple[Node, Node, Line]]:
+    def _written(self) -> Iterator[tuple[Node, Node, SsdConnection]]:
         """Source and sink of the connections of all systems."""
         for system in self._systems.values():
             for line in (entry for whole in system.lines for entry in self._entries(whole)):
                 yield *self._directed(system, line), line
 
-    def _through_dictionaries(self) -> Iterator[tuple[Node, Node, Line]]:
+    def _through_dictionaries(self) -> Iterator[tuple[Node, Node, SsdConnection]]:
         """From the inputs of references to a signal dictionary to the outputs of the same name."""
         written: dict[tuple[Place | None, str], list[Node]] = {}
         read: list[tuple[Place | None, str, Node]] = []
@@ -96,15 +104,15 @@ class Wires:
                     read.append((part.dictionary, name, node))
         for dictionary, name, reader in read:
             for writer in written.get((dictionary, name), ()):
-                for line in self._entries(Line((writer, reader), SAME, True)):
+                for line in self._entries(SsdConnection((writer, reader), SAME, True)):
                     yield *line.ends, line
 
-    def _entries(self, line: Line) -> Iterator[Line]:
+    def _entries(self, line: SsdConnection) -> Iterator[SsdConnection]:
         """The connection itself, or those of the entries of its arrays."""
         first, second = (self._indices(*end) for end in line.ends)
         first, second = first or second or [""], second or first or [""]
         if len(first) != len(second):
-            names = " and ".join(dotted(*end) for end in line.ends)
+            names = " and ".join(join_place(*end) for end in line.ends)
             sizes = f"have {len(first)} and {len(second)} entries"
             raise InputFault(f"{self.path}: {names} are connected, and {sizes}; connect equal ones")
         (a, p), (b, q) = line.ends
@@ -126,12 +134,12 @@ class Wires:
         place, name = node
         return self._connectors.get(node) or self._connectors.get((place, entry_of(name)[0]))
 
-    def _directed(self, system: Part, line: Line) -> tuple[Node, Node]:
+    def _directed(self, system: SsdElement, line: SsdConnection) -> tuple[Node, Node]:
         """The ends of a connection as (source, target), seen from inside `system`."""
         first, second = (self._is_source(end, system.place) for end in line.ends)
         if first == second:
             what = "outputs" if first else "inputs"
-            names = " and ".join(dotted(*end) for end in line.ends)
+            names = " and ".join(join_place(*end) for end in line.ends)
             raise InputFault(f"{self.path}: {names} are connected, and both are {what}")
         return line.ends if first else (line.ends[1], line.ends[0])
 
@@ -143,16 +151,16 @@ class Wires:
             # Seen from inside, a system's own input is a source.
             return (connector.kind in TAKES) == (place == inside)
         why = "does not exist, or is a clock that is not triggered"
-        raise InputFault(f"{self.path}: a connection names {dotted(*node)}, which {why}")
+        raise InputFault(f"{self.path}: a connection names {join_place(*node)}, which {why}")
 
-    def _follow(self, sink: Node, fed: Mapping[Node, tuple[Node, Line]]) -> None:
+    def _follow(self, sink: Node, fed: Mapping[Node, tuple[Node, SsdConnection]]) -> None:
         """Adds the chain that ends at an FMU's input to `rows` and `reach`."""
         nodes: list[Node] = [sink]
-        lines: list[Line] = []
+        lines: list[SsdConnection] = []
         while nodes[0] in fed:
             source, line = fed[nodes[0]]
             if source in nodes:
-                names = " -> ".join(dotted(*n) for n in (source, *nodes))
+                names = " -> ".join(join_place(*n) for n in (source, *nodes))
                 raise InputFault(
                     f"{self.path}: connections run in a circle without an FMU: {names}"
                 )
@@ -164,7 +172,7 @@ class Wires:
         steps = [self._step(relative, *step) for step in around]
         for i, node in enumerate(nodes):
             if node[0] in self._systems:
-                sink_reach = Reach(*sink, units[i], _all(steps[i:]), relative)
+                sink_reach = ReachedVariable(*sink, units[i], _all(steps[i:]), relative)
                 self.reach.setdefault(node, []).append(sink_reach)
         if nodes[0][0] in self.described:
             own = len(lines) == 1 and all(self._unit_is_of_fmu(n) for n in nodes)
@@ -175,14 +183,14 @@ class Wires:
             self.rows.append((nodes[0], sink, how))
 
     def _step(
-        self, relative: bool, line: Line, a: Node, b: Node, u: Unit | None, v: Unit | None
+        self, relative: bool, line: SsdConnection, a: Node, b: Node, u: Unit | None, v: Unit | None
     ) -> Linear:
         if not line.convert:
             return line.linear
         try:
             return line.linear.after(conversion(u, v, relative))
         except ValueError as error:
-            names = f"{dotted(*a)} and {dotted(*b)}"
+            names = f"{join_place(*a)} and {join_place(*b)}"
             raise InputFault(
                 f"{self.path}: the units of {names} do not fit: {error}; connect quantities of one "
                 "dimension, or set suppressUnitConversion"

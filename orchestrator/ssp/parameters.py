@@ -18,15 +18,15 @@ from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.base.terminal_output import printable
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
 from hapticlink.orchestrator.fmi.variables import entry_of
-from hapticlink.orchestrator.ssp.connections import Reach, Wires
+from hapticlink.orchestrator.ssp.connections import ReachedVariable, Wires
 from hapticlink.orchestrator.ssp.names import SSC, SSD, SSM, SSV
 from hapticlink.orchestrator.ssp.tree import (
-    Part,
     Place,
+    SsdElement,
     content,
     converts,
-    dotted,
     indices,
+    join_place,
     linear_of,
     table_of,
     units,
@@ -83,12 +83,12 @@ class Parameters:
                     value = self._converted(part, given, target)
                     starts[target.component][target.variable] = value
                 if not targets:
-                    self.unused.append(dotted(part.place, given.name))
+                    self.unused.append(join_place(part.place, given.name))
         return starts
 
-    def _given(self, part: Part) -> Iterator[Given]:
+    def _given(self, part: SsdElement) -> Iterator[Given]:
         for file, binding in part.bindings:
-            where = f"parameters of {dotted(part.place)}"
+            where = f"parameters of {join_place(part.place)}"
             set_ = content(file, binding, where, SSV, "ParameterSet")
             given = [
                 *self._values({**file.units, **units(set_, SSV)}, set_, binding.get("prefix", ""))
@@ -115,7 +115,9 @@ class Parameters:
                 what = f"{len(given)} values for {len(entries)} entries, {error}"
                 raise InputFault(f"{self.wires.path}: parameter {name}: {what}") from None
 
-    def _mapped(self, mapping: Element, values: Iterable[Given], part: Part) -> Iterator[Given]:
+    def _mapped(
+        self, mapping: Element, values: Iterable[Given], part: SsdElement
+    ) -> Iterator[Given]:
         """The values of the set under the names that they are mapped to, those of an array entry by
         entry."""
         given: dict[str, list[Given]] = {}
@@ -126,13 +128,13 @@ class Parameters:
         for entry in mapping.iterfind(f"{{{SSM}}}MappingEntry"):
             source, target = entry.get("source", ""), entry.get("target", "")
             if target in targets:
-                name = dotted(part.place, target)
+                name = join_place(part.place, target)
                 raise InputFault(
                     f"{self.wires.path}: two parameters are mapped to {name}; keep one"
                 )
             targets.add(target)
             if source not in given:
-                self.unused.append(dotted(part.place, source or f"source of {target}"))
+                self.unused.append(join_place(part.place, source or f"source of {target}"))
                 continue
             linear, convert = linear_of(entry), converts(entry)
             for value in given[source]:
@@ -152,18 +154,21 @@ class Parameters:
             raise InputFault(f"{self.wires.path}: parameter {given.name}: {what}")
         return {as_kind(a): as_kind(b) for a, b in targets.items()}.get(given.value, given.value)
 
-    def _targets(self, part: Part, name: str) -> Iterator[Reach]:
+    def _targets(self, part: SsdElement, name: str) -> Iterator[ReachedVariable]:
         """The variables that `name` refers to in `part`."""
         node = part.place, name
         if variable := self.wires.variables.get(node):
-            yield Reach(part.place, name, self.wires.unit(node), SAME, variable.relative)
+            yield ReachedVariable(part.place, name, self.wires.unit(node), SAME, variable.relative)
         yield from self.wires.reach.get(node, ())
         for inner in part.parts:
             if name.startswith(f"{inner.place[-1]}."):
                 yield from self._targets(inner, name.removeprefix(f"{inner.place[-1]}."))
 
-    def _converted(self, part: Part, given: Given, target: Reach) -> Value:
-        value, where = given.value, f"{self.wires.path}: parameter {dotted(part.place, given.name)}"
+    def _converted(self, part: SsdElement, given: Given, target: ReachedVariable) -> Value:
+        value, where = (
+            given.value,
+            f"{self.wires.path}: parameter {join_place(part.place, given.name)}",
+        )
         try:
             first = SAME
             if given.convert:

@@ -24,14 +24,14 @@ from hapticlink.fmus import cache
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
-from hapticlink.orchestrator.fmi.archive import opened
+from hapticlink.orchestrator.fmi.archive import open_archive
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.fmi.variables import entry_of
 from hapticlink.orchestrator.ssp import annotation
 from hapticlink.orchestrator.ssp.connections import Row, Wires
 from hapticlink.orchestrator.ssp.names import SSD
 from hapticlink.orchestrator.ssp.parameters import Parameters
-from hapticlink.orchestrator.ssp.tree import File, Part, Place, Tree, dotted
+from hapticlink.orchestrator.ssp.tree import File, Place, SsdElement, Tree, join_place
 
 
 def tables(path: Path) -> dict[str, Any]:
@@ -40,7 +40,7 @@ def tables(path: Path) -> dict[str, Any]:
     with structure(path) as (root, system, described):
         wires = Wires(path, system, described)
         starts = Parameters(wires).starts()
-    rest, named = annotation.read(path, root), names(described)
+    rest, named = annotation.read_run_annotation(path, root), names(described)
     tables: dict[str, Any] = {
         "title": root.get("description") or root.get("name") or path.stem,
         **rest,
@@ -48,7 +48,7 @@ def tables(path: Path) -> dict[str, Any]:
     about = rest.get("fmu", {})
     tables["fmu"] = [
         {"path": str(fmu.path), "start": starts[place], "name": named[place]}
-        | about.get(dotted(place), {})
+        | about.get(join_place(place), {})
         for place, fmu in described.items()
     ]
     tables["connection"] = [
@@ -60,21 +60,21 @@ def tables(path: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def structure(path: Path) -> Iterator[tuple[Element, Part, dict[Place, Description]]]:
+def structure(path: Path) -> Iterator[tuple[Element, SsdElement, dict[Place, Description]]]:
     """The content of SystemStructure.ssd, its root system with all files open, and the FMUs with
     arrays of the sizes that the parameters give them."""
-    with opened(path, "SSP") as archive, _room() as room, ExitStack() as archives:
+    with open_archive(path, "SSP") as archive, _room() as room, ExitStack() as archives:
         root, system = Tree(archives).root(File(path, archive))
         described = _described(system, room)
         # The ends of connections exist once arrays have their sizes.
         unconnected = Wires(path, system.everywhere(lines=()), described)
-        yield root, system, resized(described, Parameters(unconnected).values())
+        yield root, system, resize_arrays(described, Parameters(unconnected).values())
 
 
 @contextmanager
 def _room() -> Iterator[Path]:
     """Where FMUs land with the cache off, to the end of this process, which may run the scene."""
-    room = Path(temporary_folders.new())
+    room = Path(temporary_folders.make_folder())
     atexit.register(shutil.rmtree, room, ignore_errors=True)
     try:
         yield room
@@ -120,7 +120,7 @@ def names(places: Iterable[Place]) -> dict[Place, str]:
     return named
 
 
-def _described(system: Part, room: Path) -> dict[Place, Description]:
+def _described(system: SsdElement, room: Path) -> dict[Place, Description]:
     """The FMU of each component; an entry that several of them have is read once."""
     known: dict[tuple[Path, str], Description] = {}
     fmus = {}
@@ -133,7 +133,7 @@ def _described(system: Part, room: Path) -> dict[Place, Description]:
     return fmus
 
 
-def resized(
+def resize_arrays(
     described: Mapping[Place, Description], starts: Mapping[Place, Mapping[str, Any]]
 ) -> dict[Place, Description]:
     """The FMUs with arrays of the sizes that their structural parameters get."""
@@ -150,7 +150,7 @@ def _unpacked(room: Path, file: File, source: str, place: Place) -> Path:
     archive = file.archive
     if source not in archive.NameToInfo:
         held = ", ".join(n for n in archive.namelist() if n.endswith(".fmu")) or "none"
-        where = f"{file.path}: {dotted(place)}"
+        where = f"{file.path}: {join_place(place)}"
         raise InputFault(f"{where}: there is no {source!r} in it; FMUs in it: {held}")
     stem = re.sub(r"\W", "_", Path(source).stem)
     name = f"{stem[:100]}.fmu"

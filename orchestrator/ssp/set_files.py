@@ -22,7 +22,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.ssp import read
 from hapticlink.orchestrator.ssp.connections import Wires
 from hapticlink.orchestrator.ssp.parameters import Parameters
-from hapticlink.orchestrator.ssp.tree import File, Part
+from hapticlink.orchestrator.ssp.tree import File, SsdElement
 
 
 def options(scene: Scene, files: Iterable[Path]) -> tuple[str, ...]:
@@ -38,9 +38,9 @@ def options(scene: Scene, files: Iterable[Path]) -> tuple[str, ...]:
     else:
         own = {(f.name,): f for f in scene.fmu if f.path}
         described = {place: describe(Path(str(f.path))) for place, f in own.items()}
-        described = read.resized(described, {place: f.start for place, f in own.items()})
-        parts = tuple(Part(place, {}, ()) for place in own)
-        wires = Wires(path, Part((), {}, bindings, parts=parts), described)
+        described = read.resize_arrays(described, {place: f.start for place, f in own.items()})
+        parts = tuple(SsdElement(place, {}, ()) for place in own)
+        wires = Wires(path, SsdElement((), {}, bindings, parts=parts), described)
         names = {place: f.name for place, f in own.items()}
     return overrides.written(
         {

@@ -21,7 +21,7 @@ from lxml import etree
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import variables
-from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.archive import open_archive, read_xml
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
 from hapticlink.orchestrator.ssp.names import DEFINITION, FMU, PACKAGE, SSB, SSC, SSD, STRUCTURE
 
@@ -61,7 +61,7 @@ class Connector:
 
 
 @dataclass(frozen=True)
-class Line:
+class SsdConnection:
     """A connection as it is written, in either direction. The value is converted to the target's
     unit if `convert`, and then transformed by `linear`."""
 
@@ -71,7 +71,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Part:
+class SsdElement:
     """A component, with `source` its FMU's file and entry; or a system, with `parts` and with
     `lines`, the connections between its own connectors and those of its parts. bindings: its
     parameter bindings, each with the file that it is in. A reference to a signal dictionary is a
@@ -81,16 +81,16 @@ class Part:
     connectors: Mapping[str, Connector]
     bindings: tuple[tuple[File, Element], ...]
     source: tuple[File, str] | None = None
-    parts: tuple[Part, ...] = ()
-    lines: tuple[Line, ...] = ()
+    parts: tuple[SsdElement, ...] = ()
+    lines: tuple[SsdConnection, ...] = ()
     dictionary: Place | None = None
 
-    def everywhere(self, **changes: Any) -> Part:
+    def everywhere(self, **changes: Any) -> SsdElement:
         """The part with these fields changed, in all parts inside it, too."""
         inside = tuple(part.everywhere(**changes) for part in self.parts)
         return replace(self, parts=inside, **changes)
 
-    def __iter__(self) -> Iterator[Part]:
+    def __iter__(self) -> Iterator[SsdElement]:
         """All parts, each after the parts inside it, and finally this one."""
         for part in self.parts:
             yield from part
@@ -105,12 +105,12 @@ class Dictionary:
     units: Mapping[str, Unit | None]
 
 
-def dotted(place: Place, *names: str) -> str:
+def join_place(place: Place, *names: str) -> str:
     """The hierarchical name in the notation of SSP 1.0 parameters."""
     return ".".join((*place, *names)) or "the root system"
 
 
-def checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
+def parse_checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
     """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 2.0, whose
     elements and namespaces include those of 1.0."""
     try:
@@ -144,12 +144,12 @@ def content(file: File, element: Element, where: str, space: str, kind: str) -> 
     entry, schema = element.get("source"), space.rpartition("/")[2]
     if entry:
         entry = file.resolved(entry)
-        return checked(file.path, entry, read_xml(file.archive, entry), schema)
+        return parse_checked(file.path, entry, read_xml(file.archive, entry), schema)
     inside = next(element.iter(f"{{{space}}}{kind}"), None)
     if inside is None:
         raise InputFault(f"{file.path}: {where}: a {kind} has neither source nor content")
     inside.attrib.setdefault("version", "1.0")  # OMSimulator writes none in the .ssd
-    return checked(file.path, where, tostring(inside), schema)
+    return parse_checked(file.path, where, tostring(inside), schema)
 
 
 @cache
@@ -169,21 +169,21 @@ class Tree:
 
     archives: ExitStack
 
-    def root(self, file: File, place: Place = ()) -> tuple[Element, Part]:
+    def root(self, file: File, place: Place = ()) -> tuple[Element, SsdElement]:
         """The content of an .ssd, and its root system as the element at `place`."""
         text = read_xml(file.archive, file.entry)
-        root = checked(file.path, file.entry, text, "SystemStructureDescription")
+        root = parse_checked(file.path, file.entry, text, "SystemStructureDescription")
         element = root.find(f"{{{SSD}}}System")
         assert element is not None  # required by the schema
         return root, self._part(replace(file, units=units(root)), element, place, {})
 
     def _part(
         self, file: File, element: Element, place: Place, known: Mapping[str, Dictionary]
-    ) -> Part:
+    ) -> SsdElement:
         """The part of an element of a system, with all parts inside it. known: the dictionaries of
         the systems around it. Raises InputFault for elements that are not supported and for names
         that are not unique."""
-        path, where = file.path, dotted(place)
+        path, where = file.path, join_place(place)
         connectors = {
             c.get("name", ""): _connector(file, place, c)
             for c in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
@@ -195,7 +195,7 @@ class Tree:
         if element.tag != f"{{{SSD}}}System":
             source = file, file.resolved(_source_of(path, where, element))
             if element.get("type", FMU) == FMU:
-                return Part(place, connectors, bindings, source)
+                return SsdElement(place, connectors, bindings, source)
             system = self._inner(*source, element, place)
             return replace(system, bindings=(*system.bindings, *bindings))
         inside = [*element.iterfind(f"{{{SSD}}}Elements/*")]
@@ -207,17 +207,19 @@ class Tree:
         parts = (self._part(file, e, (*place, e.get("name", "")), known) for e in inside)
         lines = element.iterfind(f"{{{SSD}}}Connections/{{{SSD}}}Connection")
         read = tuple(_line(path, place, line) for line in lines)
-        return Part(place, connectors, bindings, parts=tuple(parts), lines=read)
+        return SsdElement(place, connectors, bindings, parts=tuple(parts), lines=read)
 
-    def _inner(self, file: File, entry: str, element: Element, place: Place) -> Part:
+    def _inner(self, file: File, entry: str, element: Element, place: Place) -> SsdElement:
         """The root system of the .ssp or .ssd that a component is (SSP 2.0, section 5.4)."""
         if len(place) > DEEPEST:
-            raise InputFault(f"{file.path}: {dotted(place)}: more than {DEEPEST} files in files")
+            raise InputFault(
+                f"{file.path}: {join_place(place)}: more than {DEEPEST} files in files"
+            )
         if element.get("type") == PACKAGE:
             if entry not in file.archive.NameToInfo:
-                raise InputFault(f"{file.path}: {dotted(place)}: there is no {entry!r} in it")
+                raise InputFault(f"{file.path}: {join_place(place)}: there is no {entry!r} in it")
             path, content = file.path / entry, BytesIO(file.archive.read(entry))
-            archive = self.archives.enter_context(opened(path, "SSP", content))
+            archive = self.archives.enter_context(open_archive(path, "SSP", content))
             return self.root(File(path, archive), place)[1]
         return self.root(replace(file, entry=entry), place)[1]
 
@@ -227,7 +229,7 @@ def _dictionaries(file: File, system: Element, place: Place) -> dict[str, Dictio
     found = {}
     for element in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
         name = element.get("name", "")
-        read = content(file, element, dotted(place, name), SSB, "SignalDictionary")
+        read = content(file, element, join_place(place, name), SSB, "SignalDictionary")
         own = {**file.units, **units(read, SSB)}
         entries = {
             e.get("name", ""): _unit(e, own) for e in read.iterfind(f"{{{SSB}}}DictionaryEntry")
@@ -242,19 +244,21 @@ def _reference(
     place: Place,
     connectors: Mapping[str, Connector],
     known: Mapping[str, Dictionary],
-) -> Part:
+) -> SsdElement:
     """A reference to a dictionary. Raises InputFault where that or an entry does not exist."""
     name = element.get("dictionary", "")
     if name not in known:
         there = ", ".join(known) or "none"
-        raise InputFault(f"{file.path}: {dotted(place)}: no signal dictionary {name!r}; {there}")
+        raise InputFault(
+            f"{file.path}: {join_place(place)}: no signal dictionary {name!r}; {there}"
+        )
     entries = known[name].units
     if missing := connectors.keys() - entries:
         there = ", ".join(entries) or "none"
-        what = f"{dotted(place, min(missing))} is no entry of {name!r}"
+        what = f"{join_place(place, min(missing))} is no entry of {name!r}"
         raise InputFault(f"{file.path}: {what}; entries: {there}")
     with_units = {n: replace(c, unit=c.unit or entries[n]) for n, c in connectors.items()}
-    return Part(place, with_units, (), dictionary=known[name].place)
+    return SsdElement(place, with_units, (), dictionary=known[name].place)
 
 
 def _source_of(path: Path, where: str, element: Element) -> str:
@@ -274,7 +278,7 @@ def _source_of(path: Path, where: str, element: Element) -> str:
 
 
 def _connector(file: File, place: Place, element: Element) -> Connector:
-    kind, name = element.get("kind", ""), dotted(place, element.get("name", ""))
+    kind, name = element.get("kind", ""), join_place(place, element.get("name", ""))
     if kind in ("inout", "unspecified"):
         raise InputFault(f"{file.path}: {name} is {kind}; give its kind as input or output")
     sizes = (d.get("size") for d in element.iterfind(f"{{{SSC}}}Dimension"))
@@ -299,7 +303,7 @@ def indices(sizes: Sequence[int | None]) -> list[str]:
     return variables.indices(size or 0 for size in sizes)
 
 
-def _line(path: Path, place: Place, element: Element) -> Line:
+def _line(path: Path, place: Place, element: Element) -> SsdConnection:
     def node(end: str) -> Node:
         inside, name = element.get(f"{end}Element"), element.get(f"{end}Connector", "")
         if entry := element.get(f"{end}Indices", "").split():  # from 1, by its authors' examples
@@ -307,11 +311,11 @@ def _line(path: Path, place: Place, element: Element) -> Line:
         return (*place, inside) if inside else place, name
 
     ends = (node("start"), node("end"))
-    names = " and ".join(dotted(*end) for end in ends)
+    names = " and ".join(join_place(*end) for end in ends)
     if table := table_of(element):
         what = f"{table[0]}MappingTransformation is read in parameter mappings only"
         raise InputFault(f"{path}: connection of {names}: {what}; put its table into an FMU")
-    return Line(ends, linear_of(element), converts(element))
+    return SsdConnection(ends, linear_of(element), converts(element))
 
 
 def linear_of(element: Element) -> Linear:

@@ -54,7 +54,7 @@ PREFIXES = {
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
-def write(scene: Scene, system: System, target: Path) -> Path:
+def write_ssp(scene: Scene, system: System, target: Path) -> Path:
     """Write the SSP `target` atomically; the same scene gives the same bytes. Raises InputFault if
     it is a folder, or its own cannot be written to."""
     folders.ensure(target.parent)

@@ -19,7 +19,13 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Latency, PowerPort, SetSpring
 from hapticlink.orchestrator.system import springs
-from hapticlink.orchestrator.system.ports import beside, between_plants, carries_power, kind, names
+from hapticlink.orchestrator.system.ports import (
+    between_plants,
+    carries_power,
+    companion_outputs,
+    kind,
+    names,
+)
 from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
 
 
@@ -85,7 +91,7 @@ def _assign(
         c = replace(c, latency=latency, kind=next(named, kind(c, fmus)))
         iterated = rules.between_plants if between_plants(c, fmus) else None
         hold = hold or iterated
-        reason = hold and misfit(hold, c, fmus, rules.power, iterated is not None)
+        reason = hold and why_unsuitable(hold, c, fmus, rules.power, iterated is not None)
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
             hold = "foh" if iterated and not _has_rows(c) else "zoh"
@@ -114,7 +120,7 @@ def _has_rows(c: Connection) -> bool:
     return c.kind == "table" or c.outputs[0].type in ("Clock", *WRITTEN)
 
 
-def misfit(
+def why_unsuitable(
     hold: str,
     c: Connection,
     fmus: Mapping[str, Fmu],
@@ -131,12 +137,12 @@ def misfit(
         counts = "clock, whose counts" if c.outputs[0].type == "Clock" else "text, which can"
         what = "table, whose rows" if c.kind == "table" else counts
         return f"{c.source_port} is a {what} have no values in between; take {able}"
-    if needs == "derivative" and not beside(c, fmus, hold):
+    if needs == "derivative" and not companion_outputs(c, fmus, hold):
         return (
             f"{c.source} does not put out the derivative of {c.source_port}, or does not declare "
             "it (docs/holds.md, Derivatives); take 'foh', which uses the difference of two samples"
         )
-    if needs == "integral" and not beside(c, fmus, hold):
+    if needs == "integral" and not companion_outputs(c, fmus, hold):
         return (
             f"{c.source} does not put out anything of which {c.source_port} is the derivative, or "
             "does not declare it (docs/holds.md, Derivatives); take 'foh'"
@@ -170,5 +176,5 @@ def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connec
         scene.kinds,
         (*scene.power, *power),
         scene.iteration.interpolation if scene.coupling == "iterated" else None,
-        (*scene.spring, *springs.declared(fmus, connections)),
+        (*scene.spring, *springs.find_declared_springs(fmus, connections)),
     )

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.fmi.process_cache import described
+from hapticlink.orchestrator.fmi.process_cache import describe_once
 from hapticlink.orchestrator.scene.blocks import Blocks, blocks
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
@@ -28,9 +28,9 @@ from hapticlink.orchestrator.system import (
     timed_events,
 )
 from hapticlink.orchestrator.system.assign_holds import assign, rules_of
-from hapticlink.orchestrator.system.connections import connect, whole, with_texts
+from hapticlink.orchestrator.system.connections import check_partial_vectors, connect, with_texts
 from hapticlink.orchestrator.system.fmu_files import fmu_files
-from hapticlink.orchestrator.system.outputs_to_record import recorded
+from hapticlink.orchestrator.system.outputs_to_record import choose_outputs
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
     Connection,
@@ -51,7 +51,7 @@ def built(scene: Scene, starts: Mapping[str, Starts] | None = None) -> Iterator[
     Files that are not in the cache exist only within the context. Raises InputFault where no FMU
     can be built from the settings, SceneFault where FMUs and connections do not fit.
     """
-    with temporary_folders.room_if_needed() as room:
+    with temporary_folders.folder_if_needed() as room:
         planned = blocks(scene)
         time = timeline(scene, planned)
         files = fmu_files(scene, planned, time, room, starts=starts)
@@ -65,9 +65,9 @@ def _assembled(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str
     that do not fit, and names in the scene that its FMUs do not have.
     """
     problems: list[Problem] = []
-    replaced, rows = replacements.replaced(planned.replaced), haptic_loop.rows(scene)
+    replaced, rows = replacements.find_replaced_blocks(planned.replaced), haptic_loop.rows(scene)
     of, order = time.of, {b.name: i for i, b in enumerate(planned.loop)}
-    ours = [Fmu(b.name, described(files[b.name]), of[b.name]) for b in planned.own]
+    ours = [Fmu(b.name, describe_once(files[b.name]), of[b.name]) for b in planned.own]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (Fmu(t.name, about, of[t.name], starts, t.isolate) for t, about, starts, _ in tables)
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
@@ -94,10 +94,10 @@ def _assembled(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str
         EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
         refused=refused,
     )
-    problems += checks.unfit(scene, system)
+    problems += checks.check_system(scene, system)
     problems += replacements.unfit(scene, replaced, rows, system)
     changes = timed_events.changes(scene, system, problems)
-    written = recorded(scene.record, system, problems)
+    written = choose_outputs(scene.record, system, problems)
     if problems:
         raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
     mapped = {table.name: names for table, *_, names in tables}
@@ -135,7 +135,7 @@ def _connections(
     paths: dict[str, Keys] = {f.name: ("fmu", i) for i, f in enumerate(scene.fmu)}
     wires = [(_path(w, paths), w) for w in rows if w.to not in fed]
     loop = tuple(connect(wires, described, problems))
-    problems += whole(asked, rows, described)
+    problems += check_partial_vectors(asked, rows, described)
     return tuple(c for _, c in (*loop, *asked))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
-from hapticlink.orchestrator.fmi.units import misfit
+from hapticlink.orchestrator.fmi.units import why_unsuitable
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import PowerPort
@@ -17,7 +17,7 @@ from hapticlink.orchestrator.system.ports import between_plants, names, size
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
-def unfit(scene: Scene, system: System) -> Iterator[Problem]:
+def check_system(scene: Scene, system: System) -> Iterator[Problem]:
     """A finding for each name in these tables that the system does not have, and for each entry
     that does not fit it."""
     held = [c for c in system.connections if not c.initial]
@@ -32,7 +32,7 @@ def unfit(scene: Scene, system: System) -> Iterator[Problem]:
     for key, kind in scene.kinds.items():
         for c in (c for c in held if key in names(c)):
             source = system.fmu[c.source].description
-            if why := misfit(kind, [source.unit(s) for s in c.outputs]):
+            if why := why_unsuitable(kind, [source.unit(s) for s in c.outputs]):
                 message = f"{c.source}.{c.source_port} {why}; take another kind, or leave it out"
                 yield ("kinds", key), message
     yield from _refused(scene, system)

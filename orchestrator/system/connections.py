@@ -9,7 +9,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Linear, conversion
 from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 from hapticlink.orchestrator.scene.scene_tables import Wire
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem, reported
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, collect_problem
 from hapticlink.orchestrator.system.fmu_tables import outputs, settable
 from hapticlink.orchestrator.system.system import Connection, Fmu
 
@@ -26,14 +26,14 @@ def connect(
         (source, output), (target, entry) = (e.split(".", 1) for e in (wire.from_, wire.to))
         scalars: tuple[Scalar, ...] = ()
         inputs: tuple[Scalar, ...] = ()
-        with reported(problems, (*path, "from")):
+        with collect_problem(problems, (*path, "from")):
             scalars = outputs(described[source], output)
-        with reported(problems, (*path, "to")):
+        with collect_problem(problems, (*path, "to")):
             inputs = settable(described[target], entry)
         if not scalars or not inputs:
             continue
         converted: tuple[Scalar, ...] = ()
-        with reported(problems, path):
+        with collect_problem(problems, path):
             converted = _converted(wire, described[source], scalars, described[target], inputs)
         if not (inputs := converted):
             continue
@@ -61,7 +61,7 @@ def with_texts(fmu: Fmu, connections: Iterable[Connection]) -> Fmu:
     return replace(fmu, description=about)
 
 
-def whole(
+def check_partial_vectors(
     asked: Iterable[tuple[Path, Connection]],
     rows: Iterable[Wire],
     described: Mapping[str, Description],

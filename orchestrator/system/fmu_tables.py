@@ -12,13 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.description import Description, describe
-from hapticlink.orchestrator.fmi.process_cache import described
+from hapticlink.orchestrator.fmi.process_cache import describe_once
 from hapticlink.orchestrator.fmi.start_values import Starts, fitting
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import ForeignFmu, Value
-from hapticlink.orchestrator.scene.toml_keys import Problem, reported
-from hapticlink.orchestrator.system.port_map import Mapped, mapped, renamed, with_declarations
+from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem
+from hapticlink.orchestrator.system.port_map import (
+    Mapped,
+    map_ports,
+    rename_ports,
+    with_declarations,
+)
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component
@@ -42,28 +47,28 @@ def fmus(
         block, names = replaced.get(fmu.name), Mapped()
         if block:
             try:
-                names = mapped(description, block, fmu.map)
+                names = map_ports(description, block, fmu.map)
             except ValueError as fault:
                 problems.append((("fmu", i, "map"), str(fault)))
                 continue
-            description = with_declarations(renamed(description, names, block), block)
+            description = with_declarations(rename_ports(description, names, block), block)
         if fmu.timing:
             description = replace(description, timing=fmu.timing)
         elif block and not description.declares_timing:
             description = replace(description, timing=block.timing)
         for name, derivative in fmu.derivatives.items():
-            with reported(problems, ("fmu", i, "derivatives", name)):
+            with collect_problem(problems, ("fmu", i, "derivatives", name)):
                 description = _with_derivative(description, name, derivative)
         starts: Starts = ()
         for name, value in fmu.start.items():
-            with reported(problems, ("fmu", i, "start", name)):
+            with collect_problem(problems, ("fmu", i, "start", name)):
                 starts += _start(description, name, value)
         yield fmu, description, starts, names
 
 
 def _described(path: FilePath, fmu: ForeignFmu) -> Description:
     """The FMU with the sizes that `start` gives it by structural parameters. Raises InputFault."""
-    description = described(path)
+    description = describe_once(path)
     structural = {s.name for s in description.scalars if s.structural}
     sizes = {n: v for n, v in fmu.start.items() if n in structural and type(v) is int}
     return describe(path, sizes) if sizes else description

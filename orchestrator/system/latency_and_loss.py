@@ -23,7 +23,7 @@ from hapticlink.orchestrator.holds.hold import Vector
 from hapticlink.orchestrator.scene.scene_tables import Latency
 
 
-class Link:
+class SampleLink:
     """The samples in transit on one connection. A latency is drawn uniformly between min and max
     (s), a loss with the given probability, both from PCG64 with the seed."""
 
@@ -68,7 +68,7 @@ class Link:
 class Late(Hold):
     """A hold that receives its samples through a link."""
 
-    def __init__(self, hold: Hold, link: Link) -> None:
+    def __init__(self, hold: Hold, link: SampleLink) -> None:
         self.hold, self.link = hold, link
         self._started = False
 

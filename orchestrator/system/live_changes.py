@@ -9,7 +9,7 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.assign_holds import misfit
+from hapticlink.orchestrator.system.assign_holds import why_unsuitable
 from hapticlink.orchestrator.system.ports import power_across_rates
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -23,7 +23,7 @@ def held_by(c: Connection, hold: str | None, delay: float | None) -> Connection:
 def changed(system: System, c: Connection, hold: str | None, delay: float | None) -> Connection:
     """`held_by`. Raises InputFault where the hold does not fit, or cannot be changed in a run."""
     new = held_by(c, hold, delay)
-    why = misfit(new.hold or "", new, system.fmu, system.energy.power, False)
+    why = why_unsuitable(new.hold or "", new, system.fmu, system.energy.power, False)
     if system.coupling.scheme == "iterated":
         why = "steps are repeated"
     spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)

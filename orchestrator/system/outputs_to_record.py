@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 from hapticlink.orchestrator.base.errors import near
 from hapticlink.orchestrator.fmi.variables import WRITTEN
-from hapticlink.orchestrator.scene.scene_tables import Record
+from hapticlink.orchestrator.scene.scene_tables import RecordTable
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.system import System
 
 
-def recorded(record: Record, system: System, problems: list[Problem]) -> tuple[str, ...] | None:
+def choose_outputs(
+    record: RecordTable, system: System, problems: list[Problem]
+) -> tuple[str, ...] | None:
     """The outputs that are written, `fmu.output`, in the order of the FMUs; None for all. Texts are
     not. Adds a problem for each name that is none of an FMU, a port or an output."""
     called = {

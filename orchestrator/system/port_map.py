@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.units import misfit
+from hapticlink.orchestrator.fmi.units import why_unsuitable
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ Mapped = dict[str, tuple[str, ...]]
 """By the block's port, the names of the FMU's scalars, row by row."""
 
 
-def mapped(
+def map_ports(
     description: Description, block: Component, given: Mapping[str, str | tuple[str, ...]]
 ) -> Mapped:
     """What is called otherwise in an FMU than in the block that it replaces. Raises ValueError for
@@ -54,7 +54,7 @@ def mapped(
     return renamings
 
 
-def renamed(description: Description, names: Mapped, block: Component) -> Description:
+def rename_ports(description: Description, names: Mapped, block: Component) -> Description:
     """The description with the scalars of `mapped` under the block's names."""
     every = {v.name: v for v in (*block.inputs, *block.outputs, *block.parameters)}
     new = {
@@ -86,7 +86,11 @@ def with_declarations(description: Description, block: Component) -> Description
     rates: dict[str, str] = {}
     for v in block.outputs:
         entries = there(v.name, "output")
-        if v.kind and entries and not misfit(v.kind, [description.unit(s) for s in entries]):
+        if (
+            v.kind
+            and entries
+            and not why_unsuitable(v.kind, [description.unit(s) for s in entries])
+        ):
             kinds[v.name] = v.kind
         if v.derivative_of:
             values = there(v.derivative_of, "output")

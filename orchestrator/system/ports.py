@@ -43,7 +43,7 @@ def scalars_of(fmus: Mapping[str, Fmu], name: str, *causalities: str) -> tuple[S
     raise InputFault(f"{fmu}: {unknown(' or '.join(causalities), port, every)}")
 
 
-def paired(c: Connection, entry: Scalar, power: Iterable[PowerPort]) -> PowerPort | None:
+def find_power_port(c: Connection, entry: Scalar, power: Iterable[PowerPort]) -> PowerPort | None:
     """The power port of an input of a connection, declared for that entry or for its vector; None
     where there is none."""
     names = (f"{c.target}.{entry.name}", f"{c.target}.{entry.port}")
@@ -53,7 +53,7 @@ def paired(c: Connection, entry: Scalar, power: Iterable[PowerPort]) -> PowerPor
 def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
     """Whether an entry of a connection has a power port."""
     own = [p for p in power if p.effort.startswith(f"{c.target}.")]
-    return any(paired(c, entry, own) for entry in c.inputs)
+    return any(find_power_port(c, entry, own) for entry in c.inputs)
 
 
 def power_across_rates(system: System) -> list[str]:
@@ -83,7 +83,9 @@ def turns(c: Connection, fmus: Mapping[str, Fmu]) -> dict[int, float]:
     return {i: whole for i, whole in by_entry.items() if whole}
 
 
-def beside(c: Connection, fmus: Mapping[str, Fmu], hold: str | None = None) -> tuple[Scalar, ...]:
+def companion_outputs(
+    c: Connection, fmus: Mapping[str, Fmu], hold: str | None = None
+) -> tuple[Scalar, ...]:
     """The outputs of the source that `hold`, by default the connection's own, reads beside the
     connection's outputs: their time derivatives or integrals, if it needs them; () where the source
     does not declare them."""

@@ -22,7 +22,7 @@ MAX_PORTS = 12
 """Ports of one kind that a message lists."""
 
 
-def replaced(plans: Mapping[str, BlockPlan]) -> dict[str, Component]:
+def find_replaced_blocks(plans: Mapping[str, BlockPlan]) -> dict[str, Component]:
     """The blocks that FMUs replace, by name. Raises InputFault where the settings of one give no
     block."""
     try:

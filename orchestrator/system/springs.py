@@ -19,7 +19,9 @@ def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     return next((s for s in springs if _end(c) in s.ports), None)
 
 
-def declared(fmus: Iterable[Fmu], connections: Collection[Connection]) -> Iterator[SetSpring]:
+def find_declared_springs(
+    fmus: Iterable[Fmu], connections: Collection[Connection]
+) -> Iterator[SetSpring]:
     """The spring-dampers that FMUs declare in their annotations, by their names in a system, with
     the start values of their gains. Springs whose gains a connection sets are left out: their
     values are only known once the run begins."""

@@ -30,14 +30,14 @@ class ServedAt:
 @dataclass(frozen=True)
 class Fmu:
     """One FMU of the system, the clock that it steps at, its start values, and whether it runs in
-    a process of its own. seldom: outputs that are only read for the rows of a table."""
+    a process of its own. recorded_only: outputs that are only read for the rows of a table."""
 
     name: str
     description: Description
     clock: str
     starts: Starts = ()
     isolate: bool = False
-    seldom: frozenset[str] = frozenset()
+    recorded_only: frozenset[str] = frozenset()
     served: ServedAt | None = None
     """Where it runs, if that is on another computer."""
 

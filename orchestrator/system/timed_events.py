@@ -6,12 +6,12 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 
-from hapticlink.orchestrator.base.errors import shortened
+from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import TimedEvent, Value
-from hapticlink.orchestrator.scene.toml_keys import Problem, reported
+from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem
 from hapticlink.orchestrator.system.fmu_tables import entries_of
 from hapticlink.orchestrator.system.ports import carries_power, scalars_of
 from hapticlink.orchestrator.system.springs import limited_gains
@@ -29,13 +29,13 @@ def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[Chan
     for i, event in enumerate(scene.at):
         for key, asked in (("set", event.set), ("override", event.override)):
             for name, value in asked.items():
-                with reported(problems, ("at", i, key, name)):
+                with collect_problem(problems, ("at", i, key, name)):
                     taken.append(events.given(event, key, name, value))
         for name in event.freeze:
-            with reported(problems, ("at", i, "freeze")):
+            with collect_problem(problems, ("at", i, "freeze")):
                 taken.append(events.brought(event, name, 0.0))
         for name, noise in event.noise.items():
-            with reported(problems, ("at", i, "noise", name)):
+            with collect_problem(problems, ("at", i, "noise", name)):
                 taken.append(events.brought(event, name, noise))
         problems += ((("at", i, key), why) for key, why in _times(event))
     end = system.timeline.seconds(system.timeline.end)
@@ -66,7 +66,7 @@ class _Events:
             raise ValueError(f"of the keys of a scene's rates {GRAPHICS_RATE} alone can be set")
         scalars = self._scalars(name)
         feeding = self._feeding(name)
-        text = f"{name} = {shortened(str(value))}"
+        text = f"{name} = {shorten(str(value))}"
         if key == "override":
             self._require_disturbable(name, feeding)
             return self._change(event, name, f"{text} instead of its connection",

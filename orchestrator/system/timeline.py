@@ -84,12 +84,12 @@ def _changed(
     return starts
 
 
-def _period(pace: Pace) -> Fraction:
+def _period(pace: ClockRate) -> Fraction:
     assert isinstance(pace.rate, Fraction)
     return 1 / pace.rate
 
 
-def _on_ticks(pace: Pace, haptic: Fraction, steps: int) -> Sequence[int]:
+def _on_ticks(pace: ClockRate, haptic: Fraction, steps: int) -> Sequence[int]:
     """Starts of steps that are aligned to haptic ticks, counted in haptic ticks."""
     if isinstance(pace.rate, VariableRate):
         low, high, seed = exact(pace.rate.min), exact(pace.rate.max), pace.rate.seed
@@ -102,7 +102,7 @@ def _on_ticks(pace: Pace, haptic: Fraction, steps: int) -> Sequence[int]:
 
 
 @dataclass(frozen=True)
-class Pace:
+class ClockRate:
     """When the clock `name` steps. rate: Hz, bounds (Hz), or the times (s) at which steps end.
     first: end of the first step (s), None where the rate varies. on_ticks: steps end on haptic
     ticks. path: the scene's key for it."""
@@ -119,7 +119,7 @@ class Clocks:
     """of: the clock of each FMU. paces: the pace of each clock, the haptic one first."""
 
     of: Mapping[str, str]
-    paces: Mapping[str, Pace]
+    paces: Mapping[str, ClockRate]
 
 
 def clocks(scene: Scene, planned: Blocks | None = None) -> Clocks:
@@ -133,7 +133,7 @@ def clocks(scene: Scene, planned: Blocks | None = None) -> Clocks:
     return Clocks({fmu: pace.name for fmu, pace in of.items()}, paces)
 
 
-def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> Pace:
+def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> ClockRate:
     pace = _pace(rate, path, scene)
     if fmu not in scene.phases or exact(scene.phases[fmu]) == pace.first:
         return pace
@@ -142,7 +142,7 @@ def _of(fmu: str, rate: AnyRate, path: Path, scene: Scene) -> Pace:
     return replace(pace, name=name, first=first, path=("phases", fmu))
 
 
-def _pace(rate: AnyRate, path: Path, scene: Scene) -> Pace:
+def _pace(rate: AnyRate, path: Path, scene: Scene) -> ClockRate:
     if rate == "haptics":
         return _pace(scene.haptics.rate, ("haptics", "rate"), scene)
     if rate == "graphics":
@@ -154,13 +154,13 @@ def _pace(rate: AnyRate, path: Path, scene: Scene) -> Pace:
         return replace(pace, name="graphics", first=first, on_ticks=on_ticks)
     if isinstance(rate, VariableRate):
         low, high = _text(exact(rate.min)), _text(exact(rate.max))
-        return Pace(f"{low}to{high}hz_seed{rate.seed}", rate, None, True, path)
+        return ClockRate(f"{low}to{high}hz_seed{rate.seed}", rate, None, True, path)
     if isinstance(rate, tuple):
         name = next((fmu.name for fmu in scene.fmu if fmu.rate == rate), "graphics")
-        return Pace(f"times_of_{name}", rate, None, True, path)
+        return ClockRate(f"times_of_{name}", rate, None, True, path)
     same = exact(rate) == exact(scene.haptics.rate)
     name = "haptics" if same else f"{_text(exact(rate))}hz"
-    return Pace(name, exact(rate), 1 / exact(rate), False, path)
+    return ClockRate(name, exact(rate), 1 / exact(rate), False, path)
 
 
 def _text(number: Fraction) -> str:

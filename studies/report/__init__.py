@@ -19,7 +19,7 @@ def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Pat
     Returns the page's path; raises InputFault if `folder` cannot be written to."""
     folders.ensure(folder)
     entries: list[Entry] = []
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         runs = Runs(room, tell)
         for chapter in CHAPTERS:
             for entry in chapter.entries(runs, folder):

@@ -29,7 +29,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
 def images(rule: str, poles: np.ndarray) -> np.ndarray:
     """The discrete pole z of each pole s (T = 1 s), from one step of the FMU from x = 1."""
     settings = {"rule": rule}
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         path = build_block("discrete_equivalent", settings, room)
         with session(path, room / "fmu") as opened:
             reference = {v.name: v.valueReference for v in opened.description.modelVariables}

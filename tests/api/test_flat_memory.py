@@ -13,7 +13,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.fmus.build_fmu import build
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
-from hapticlink.orchestrator.fmi.process_cache import described
+from hapticlink.orchestrator.fmi.process_cache import describe_once
 from tests.orchestrator.coupled import gain
 
 pytestmark = [
@@ -52,7 +52,7 @@ def test_runs_in_a_loop_stay_flat() -> None:
 
 def test_states_that_are_saved_over_are_freed(tmp_path: Path) -> None:
     """Of a Python FMU: 0.6 kB each of 256 would be kept."""
-    description = described(build(gain("gain", 2.0, 0.0), tmp_path))
+    description = describe_once(build(gain("gain", 2.0, 0.0), tmp_path))
 
     with InProcess("gain", description, np.zeros(2)) as instance:
         instance.enter_initialization(1.0)

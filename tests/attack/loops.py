@@ -57,7 +57,7 @@ def scenes(number: int, seed: int, folder: Path) -> Iterator[Path]:
     """Shipped scenes with numbers near theirs, other rates and other holds."""
     names = [*find_scene.shipped()]
     for i, _, draw in seeded(number, seed):
-        tables: Any = tomllib.loads(find_scene.find(draw.choice(names))[1])
+        tables: Any = tomllib.loads(find_scene.find_scene(draw.choice(names))[1])
         tables["duration"] = draw.choice((0.05, 0.1, 0.2))
         for path in draw.sample([*mutations.places(tables)], 2):
             old = mutations.at(tables, path)

@@ -28,7 +28,7 @@ NUMBERS = ("0", "1", "-1", "1e400", "1e-400", "0.5", "nan", "inf", "1e9", "9" * 
 
 def _keys(draw: random.Random) -> tuple[str, Any]:
     """A dotted key of a scene, and what stands there."""
-    tables = tomllib.loads(find_scene.find(draw.choice(SMALL))[1])
+    tables = tomllib.loads(find_scene.find_scene(draw.choice(SMALL))[1])
     path = draw.choice([*mutations.places(tables)])
     names = [str(name) for name in path]
     for _ in range(draw.choice((0, 0, 0, 1, 2))):

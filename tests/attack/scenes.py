@@ -27,7 +27,7 @@ def written(tables: dict[str, Any]) -> str:
 def cases(number: int, seed: int) -> Iterator[tuple[str, str, bytes]]:
     """Kind, what was changed, and the scene's file."""
     draw = random.Random(seed)
-    scenes = {name: find_scene.find(name)[1] for name in find_scene.shipped()}
+    scenes = {name: find_scene.find_scene(name)[1] for name in find_scene.shipped()}
     for i in range(number):
         kind = KINDS[i % 6] if i % 6 < len(KINDS) else "values"
         name = draw.choice([*SMALL, *SMALL, *scenes])

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.image import imread
 
 import hapticlink as hl
-from hapticlink.commands.progress import progress, timed
+from hapticlink.commands.progress import progress, time_command
 from hapticlink.fmus import durations
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
@@ -197,7 +197,7 @@ def test_a_long_command_tells_how_long_it_took(
     times = iter([0.0, 90.0, 0.0, 30.0, 0.0, 0.0])
     monkeypatch.setattr(durations, "monotonic", lambda: next(times))
     for _ in range(3):
-        with timed("bench it", "about 3 minutes"):
+        with time_command("bench it", "about 3 minutes"):
             pass
     told = re.findall("duration (.*)", capsys.readouterr().err)
     known = "up to 1.5 minutes here, less if partly finished before"
@@ -208,6 +208,6 @@ def test_an_interrupted_command_keeps_no_duration(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
-    with pytest.raises(Fault, match="finished runs are kept"), timed("bench it"):
+    with pytest.raises(Fault, match="finished runs are kept"), time_command("bench it"):
         raise Interrupted
     assert not [*tmp_path.iterdir()]

@@ -31,7 +31,7 @@ def test_the_command_prints_a_valid_schema(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize("name", find_scene.shipped())
 def test_shipped_scenes_follow_it(name: str) -> None:
-    SCHEMA.validate(tomllib.loads(find_scene.find(name)[1]))
+    SCHEMA.validate(tomllib.loads(find_scene.find_scene(name)[1]))
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_every_way_to_write_a_key_follows_it(more: str) -> None:
     text = f"{more}\n{text.replace('[graphics]', '')}" if "graphics" in more else f"{more}\n{text}"
     if more.startswith("controller"):
         text = text.replace("[controller]\n", "")
-    read_and_check.read(text)
+    read_and_check.read_scene(text)
     SCHEMA.validate(tomllib.loads(text))
 
 

@@ -12,7 +12,7 @@ from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
 from hapticlink.orchestrator.base.signal_names import POINT_POSE
-from hapticlink.orchestrator.base.terminal_output import aligned
+from hapticlink.orchestrator.base.terminal_output import align_columns
 from hapticlink.orchestrator.results.numbers import last_time, short
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization.compare.settings import one_mechanism
@@ -61,7 +61,7 @@ def as_text(names: Sequence[str], tables: Mapping[str, Sequence[Row]]) -> Iterat
         if differing := [row for row in rows if len({*row.values}) > 1]:
             yield title
             table = [("", *names), *((row.label, *row.values) for row in differing)]
-            yield from (f"  {line}" for line in aligned(table))
+            yield from (f"  {line}" for line in align_columns(table))
             yield ""
     same = sum(len({*row.values}) == 1 for rows in tables.values() for row in rows)
     yield f"{same} rows are the same for all: `hapticlink report` has them"

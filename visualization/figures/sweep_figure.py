@@ -17,7 +17,7 @@ from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.table import columns
 from hapticlink.fmus.cache import sha, sources
 from hapticlink.fmus.versions import version
-from hapticlink.orchestrator.base.errors import InputFault, shortened, unknown
+from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -162,7 +162,7 @@ def _label(row: Row, keys: Sequence[str]) -> str:
     """The values of a row; of many keys those that it gives, by name."""
     if len(keys) <= FEW_KEYS:
         return plain(", ".join(str(row.get(k, "as in the scene")) for k in keys))
-    given = ", ".join(shortened(f"{k}={row[k]}") for k in _naming(row, keys))
+    given = ", ".join(shorten(f"{k}={row[k]}") for k in _naming(row, keys))
     return plain(fill(given, 50)) or "as in the scene"
 
 

@@ -41,7 +41,7 @@ def write(scene: Scene, name: str, path: Path) -> None:
 
 def html(scene: Scene, name: str) -> str:
     """The page. The same scene gives the same bytes."""
-    with temporary_folders.room() as room:
+    with temporary_folders.temporary_folder() as room:
         with resolved(scene, changing=True) as program:
             blocks = components(program)
             variables = ports(program, blocks)

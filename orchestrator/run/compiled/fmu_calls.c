@@ -86,8 +86,8 @@ static inline int call(const Transfer *t, int64_t i, int64_t *count, At *at) {
 }
 
 int fmu_get(const Fmu *f, int64_t judged, At *at) {
-    const Transfer *gets = *f->due ? f->gets : f->fewer;
-    const int64_t n = *f->due ? f->n_gets : f->n_fewer;
+    const Transfer *gets = *f->row_due ? f->gets : f->gets_between_rows;
+    const int64_t n = *f->row_due ? f->n_gets : f->n_gets_between_rows;
     for (int64_t i = 0; i < n; i++) {
         const int code = call(gets + i, i, &f->place->gets, at);
         if (code) return code;
@@ -113,7 +113,7 @@ static inline int differs(double *before, double value) {
 }
 
 int fmu_set(const Setter *s, const double *board, At *at) {
-    Place *p = s->place;
+    StepState *p = s->place;
     if (p->ended) return 0;
     int differ = !s->key || p->setter != s->key;
     if (s->factors)
@@ -157,7 +157,7 @@ int fmu_save(const Fmu *f, void *get_state, void **state) {
 }
 
 int fmu_step(Fmu *f, double time, double end, double size, At *at) {
-    Place *p = f->place;
+    StepState *p = f->place;
     p->time = p->begin = time;
     p->size = size;
     p->end = end;

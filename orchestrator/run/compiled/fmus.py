@@ -70,7 +70,7 @@ def of_instance(
 ) -> structures.Fmu:
     """Fills `c`, which has to be kept."""
     fmi, slave = instance.description.fmi, instance.slave
-    c.fill(instance, "place", "outputs", "due", "good", "forward", fmu=slave.component)
+    c.fill(instance, "place", "outputs", "row_due", "good", "forward", fmu=slave.component)
     c.fill(do_step=slave.dll[f"fmi{fmi}DoStep"], n_outputs=len(instance.outputs))
     c.kind.fill(fmi=int(fmi), python=instance.holds_python)
     if isinstance(instance, InProcess3):
@@ -78,9 +78,12 @@ def of_instance(
         c.fill(instance, "reached", event=event, terminate=terminate, early=early)
     c.gets, c.n_gets = of_transfers(instance.gets, instance, memory), len(instance.gets)
     c.inverse = memory.copy(instance.bounds.inverse)
-    c.fewer, c.n_fewer = c.gets, c.n_gets
-    if instance.fewer is not instance.gets:
-        c.fewer, c.n_fewer = of_transfers(instance.fewer, instance, memory), len(instance.fewer)
+    c.gets_between_rows, c.n_gets_between_rows = c.gets, c.n_gets
+    if instance.gets_between_rows is not instance.gets:
+        c.gets_between_rows, c.n_gets_between_rows = (
+            of_transfers(instance.gets_between_rows, instance, memory),
+            len(instance.gets_between_rows),
+        )
     if check:
         _fill_with(check, instance, c)
     return c

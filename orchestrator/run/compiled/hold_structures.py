@@ -18,7 +18,7 @@ from hapticlink.orchestrator.holds.passive_set_position import PassiveSetPositio
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.run.make_holds import WithFurther
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, SampleLink
 
 KINDS: Mapping[type[Hold], int] = {
     HOLDS[name]: kind
@@ -50,7 +50,7 @@ class Parts(NamedTuple):
     own: Hold
     angles: Unwrapped | None
     matrix: Projector | Semidefinite | None
-    link: Link | None
+    link: SampleLink | None
     further: Reader | None
     far: tuple[Account, Vector] | None
     """The account on the far side of the spring that it sets, and where its energy is written."""

@@ -24,7 +24,7 @@
 typedef struct {
     double time, begin, size, end, step_time, waiting;
     int64_t ended, setter, altered, gets, sets, steps, saves, rollbacks;
-} Place;
+} StepState;
 
 /* What kind of number a call moves, of which version of FMI, and whether the FMU holds a Python
  * interpreter. */
@@ -60,7 +60,7 @@ typedef struct {
 } Check;
 
 typedef struct {
-    Place *place;
+    StepState *place;
     void *fmu, *do_step;
     Kind kind;
     int64_t forward;                      /* noSetFMUStatePriorToCurrentPoint */
@@ -71,9 +71,9 @@ typedef struct {
     double *good /* [n_outputs] */;       /* the last finite outputs, or NULL */
     int64_t n_outputs, n_steps, sparse;   /* sparse: steps so short that few of them are timed */
     Check *check;                         /* NULL if there is none */
-    const int64_t *due;                   /* whether the next row is written; else `fewer` suffice */
-    const Transfer *fewer /* [n_fewer] */;
-    int64_t n_fewer;
+    const int64_t *row_due;                /* whether the next row is written; else `gets_between_rows` suffice */
+    const Transfer *gets_between_rows /* [n_gets_between_rows] */;
+    int64_t n_gets_between_rows;
     void *free_state;                     /* before a state is saved over, or NULL */
     uint8_t *event, *terminate, *early;   /* FMI 3: what doStep tells */
     double *reached;
@@ -84,7 +84,7 @@ typedef struct {
  * tells the setters of an FMU apart, 0 where the FMU may change its inputs: they are then set
  * though they have not changed. */
 typedef struct {
-    Place *place;
+    StepState *place;
     int64_t n, key;
     const int64_t *where /* [n] */;
     double *values /* [n] */;
@@ -361,7 +361,7 @@ void watch_signals(int on);
 int signal_came(void);
 int exception_left(void);
 void note_arithmetic(void);      /* how numbers are rounded from here on */
-void keep_arithmetic(Place *p);  /* restored where an FMU has changed it, and counted */
+void keep_arithmetic(StepState *p);  /* restored where an FMU has changed it, and counted */
 double *hold_scratch(const Hold *h); /* (2, n) */
 int manifold_push(Hold *h, const double *y);
 void manifold_value(const Hold *h, double *value);

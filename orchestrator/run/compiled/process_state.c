@@ -37,7 +37,7 @@ static unsigned before = USUAL;
 
 void note_arithmetic(void) { before = control(); }
 
-void keep_arithmetic(Place *p) {
+void keep_arithmetic(StepState *p) {
     if (control() == before) return;
     set_control(before);
     p->altered++;

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.orchestrator.fmi.instance import Place
+from hapticlink.orchestrator.fmi.instance import StepState
 from hapticlink.orchestrator.run.compiled.build import HERE
 
 _COUNT = re.compile(r"/\* \[(.*?)\] \*/")
@@ -95,7 +95,7 @@ def _declared(text: str) -> dict[str, Any]:
 
 
 _TYPES = _declared((HERE / "loop.h").read_text(encoding="utf-8"))
-assert [*_TYPES.pop("Place")._fields_] == [*Place._fields_]
+assert [*_TYPES.pop("StepState")._fields_] == [*StepState._fields_]
 globals().update(_TYPES)
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene_tables import PowerPort
-from hapticlink.orchestrator.system.ports import paired
+from hapticlink.orchestrator.system.ports import find_power_port
 from hapticlink.orchestrator.system.system import Connection
 
 
@@ -51,7 +51,9 @@ class Bond:
 
 def bond(c: Connection, signals: SignalVector) -> Bond | None:
     target = signals.system.fmu[c.target].description
-    pairs = ((i, s, paired(c, s, signals.system.energy.power)) for i, s in enumerate(c.inputs))
+    pairs = (
+        (i, s, find_power_port(c, s, signals.system.energy.power)) for i, s in enumerate(c.inputs)
+    )
     carrying = [(i, s, p.sign, _displacement(target, s, p)) for i, s, p in pairs if p]
     if not carrying or c.initial:
         return None

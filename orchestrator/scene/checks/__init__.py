@@ -15,9 +15,11 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
 
 
-def check(scene: Scene) -> list[Problem]:
+def check_scene(scene: Scene) -> list[Problem]:
     """Every problem found, up to COUNTED: each may search for a similar name."""
-    shapes = list(islice(chain(linkage.check(scene), contacts.check(scene)), COUNTED))
+    shapes = list(
+        islice(chain(linkage.check_linkage(scene), contacts.check_contacts(scene)), COUNTED)
+    )
     if shapes and scene.contacts:
         # The broad phase needs a valid tree and valid polygons.
         scene = replace(scene, contacts=replace(scene.contacts, broad_phase=False))
@@ -26,11 +28,11 @@ def check(scene: Scene) -> list[Problem]:
         _condition(scene),
         numbers.check_rates(scene, planned),
         numbers.check_delays(scene),
-        blocks.missing(scene),
-        fmus.check(scene, planned),
+        blocks.check_needed_tables(scene),
+        fmus.check_fmus(scene, planned),
         shapes,
         numbers.check_numbers(scene),
-        blocks.check(scene, planned),
+        blocks.check_blocks(scene, planned),
     )
     return list(islice(rest, COUNTED))
 

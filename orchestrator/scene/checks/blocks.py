@@ -11,7 +11,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
+def check_blocks(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
     yield from points(scene)
     if scene.packaging == "native" and not blocks.built:
         message = (
@@ -36,7 +36,7 @@ def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
         )
 
 
-def missing(scene: Scene) -> Iterator[Problem]:
+def check_needed_tables(scene: Scene) -> Iterator[Problem]:
     """A problem for each table that needs another one which is missing."""
     if not scene.linkage and not scene.device and not scene.fmu:
         yield ("linkage",), "nothing to simulate: give a [linkage], a [device] or an [[fmu]]"

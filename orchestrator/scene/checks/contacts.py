@@ -14,7 +14,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(scene: Scene) -> Iterator[Problem]:
+def check_contacts(scene: Scene) -> Iterator[Problem]:
     if scene.linkage:
         yield from _shapes(scene.linkage)
     limited = scene.linkage is not None and scene.linkage.limited

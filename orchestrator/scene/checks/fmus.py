@@ -15,7 +15,7 @@ from hapticlink.orchestrator.scene.scene_tables import ForeignFmu
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
+def check_fmus(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
     taken = dict.fromkeys(b.name for b in blocks.own)
     for i, fmu in enumerate(scene.fmu):
         path: Path = ("fmu", i)

@@ -11,7 +11,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check(scene: Scene) -> Iterator[Problem]:
+def check_linkage(scene: Scene) -> Iterator[Problem]:
     if (linkage := scene.linkage) is None:
         return
     here: Path = ("linkage",)

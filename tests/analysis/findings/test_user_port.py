@@ -18,7 +18,7 @@ from hapticlink.visualization.figures.run_figures import figures
 @cache
 def account(scene: str, *options: str) -> tuple[Results, UserPort | None]:
     """A run in memory and the energy at its user's port."""
-    with temporary_folders.room() as folder:
+    with temporary_folders.temporary_folder() as folder:
         results = simulate(scene, folder, options, csv=False).results
     return results, user_port(results)
 

@@ -219,5 +219,5 @@ def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("name", ["x" * 5000, "no\0name", "/dev/zero", "missing.csv"])
 def test_a_log_is_a_file(name: str) -> None:
-    with pytest.raises(hl.InputFault, match="cannot be read as a log: it is no file"):
+    with pytest.raises(hl.InputFault, match="cannot be read as a log: not a regular file"):
         hl.fit(name)

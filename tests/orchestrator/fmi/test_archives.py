@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.archive import opened, read_xml
+from hapticlink.orchestrator.fmi.archive import open_archive, read_xml
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.ssp import read
 from tests.orchestrator.c_fmus import HOSTILE, description3
@@ -73,7 +73,7 @@ REFERENCES = [2**32, 2**32 + 1, -1, 2**64]
     ("make", "message"),
     [
         (lambda p: p, "there is no such file"),
-        (piped, "it is no file"),
+        (piped, "not a regular file"),
         (lambda p: p.write_text("no zip") and p, "damaged, not a readable zip archive"),
         (lambda p: fmu(p).write_bytes(fmu(p).read_bytes()[:-30]) and p, "damaged"),
         (flipped, "damaged"),
@@ -115,7 +115,10 @@ def test_malformed_fmus(tmp_path, make, message):
 def test_xml_of_any_size_is_not_read(tmp_path, monkeypatch):
     monkeypatch.setattr("hapticlink.orchestrator.fmi.archive.MAX_XML_BYTES", 100)
     path = fmu(tmp_path / "model.fmu")
-    with opened(path, "FMU") as found, pytest.raises(InputFault, match="at most 100 are read"):
+    with (
+        open_archive(path, "FMU") as found,
+        pytest.raises(InputFault, match="at most 100 are read"),
+    ):
         read_xml(found, "modelDescription.xml")
 
 

@@ -11,17 +11,17 @@ from tests.orchestrator.foreign_scenes import fmu_table, scene
 
 
 def test_the_newest_messages_are_kept_and_no_novel():
-    key = messages.opened()
+    key = messages.open_log()
     for i in range(20_000):
-        messages.keep(key, 2, b"%d " % i + b"x" * 10_000)
-    messages.keep(key, 0, b"all is well")
-    messages.keep(key, -1, b"20000 is no status that FMI defines")
-    kept = messages.newest(key)
-    messages.closed(key)
+        messages.keep_message(key, 2, b"%d " % i + b"x" * 10_000)
+    messages.keep_message(key, 0, b"all is well")
+    messages.keep_message(key, -1, b"20000 is no status that FMI defines")
+    kept = messages.newest_messages(key)
+    messages.close_log(key)
     assert [said.split()[0] for said in kept] == [str(i) for i in range(19_996, 20_001)]
     assert {len(said) for said in kept[:-1]} == {messages.MAX_LENGTH}
-    messages.keep(key, 3, b"after the end")
-    assert messages.newest(key) == []
+    messages.keep_message(key, 3, b"after the end")
+    assert messages.newest_messages(key) == []
 
 
 @pytest.mark.parametrize("isolate", ["", "isolate = true\n"])

@@ -9,7 +9,7 @@ import pytest
 from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.fmi.process_cache import described
+from hapticlink.orchestrator.fmi.process_cache import describe_once
 from tests.orchestrator import coupled
 from tests.orchestrator.c_fmus import hostile_fmu
 
@@ -24,7 +24,7 @@ def test_instances_of_our_file_share_a_folder_until_the_last_is_closed(
     tmp_path, own_temporary_folder, make
 ):
     """y = 2 u, and z the w of the step before."""
-    description = described(make(coupled.gain("gain", 2.0, 0.0), tmp_path))
+    description = describe_once(make(coupled.gain("gain", 2.0, 0.0), tmp_path))
     instances = [InProcess(f"f{i}", description, np.zeros(2)) for i in range(8)]
     with ExitStack() as stack:
         for instance in instances:

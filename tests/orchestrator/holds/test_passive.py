@@ -17,7 +17,7 @@ from hapticlink.orchestrator.holds.energy_account import Account
 from hapticlink.orchestrator.holds.passive import Passive
 from hapticlink.orchestrator.run.energy.meter import Meter
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, SampleLink
 
 Vector = NDArray[np.float64]
 
@@ -177,7 +177,7 @@ class Line:
         assert isinstance(hold, Account)
         self.hold = hold
         arrived = Told(hold)
-        self.late = Late(arrived, Link(self.latency, Fraction(1)))
+        self.late = Late(arrived, SampleLink(self.latency, Fraction(1)))
         self.truth, self.told = (
             Meter(source.copy, self.held.copy, self.x.copy)
             for source in (self.force, arrived.sample)

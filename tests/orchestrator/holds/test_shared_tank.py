@@ -16,7 +16,7 @@ from hapticlink.orchestrator.holds.hold import Hold
 from hapticlink.orchestrator.holds.holds_on_manifolds import Unwrapped
 from hapticlink.orchestrator.run.make_holds import WithFurther
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, SampleLink
 
 Vector = NDArray[np.float64]
 N, TICK, TURN = 3, 1e-3, 2 * np.pi
@@ -52,7 +52,7 @@ class Coupling:
             return HOLDS["pspm"](HoldContext(N, tank=(self.tank, row)))
 
         held = Unwrapped(make, [2], [TURN]) if self.wrapped and row == 0 else make()
-        late = Late(held, Link(latency, Fraction(1, 1000)))
+        late = Late(held, SampleLink(latency, Fraction(1, 1000)))
         if row:
             return late
         return WithFurther(late, lambda: self.credit.copy(), (self.back, self.credit))

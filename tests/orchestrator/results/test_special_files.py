@@ -69,7 +69,7 @@ def test_a_run_replaces_them(out, spoil):
 def test_a_folder_in_the_place_of_run_json_is_told(out, capsys):
     folder_as_story(out)
     assert status("run", "pendulum", "--out", out, "--no-figures") != 0
-    assert "it is no file" in capsys.readouterr().err
+    assert "not a regular file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

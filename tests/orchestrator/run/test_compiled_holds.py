@@ -26,7 +26,7 @@ from hapticlink.orchestrator.run.compiled.hold_structures import (
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.energy.bonds import Reader
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.latency_and_loss import Late, Link
+from hapticlink.orchestrator.system.latency_and_loss import Late, SampleLink
 
 NUMERATOR, DENOMINATOR = 3, 7680
 SIZE = 3
@@ -46,7 +46,7 @@ def seconds(ticks: float) -> float:
 
 def delayed(hold: Hold) -> Late:
     latency = Latency(min=0.001, max=0.02, loss=0.2, seed=5)
-    return Late(hold, Link(latency, Fraction(NUMERATOR, DENOMINATOR)))
+    return Late(hold, SampleLink(latency, Fraction(NUMERATOR, DENOMINATOR)))
 
 
 class Twins:

@@ -272,7 +272,7 @@ def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path)
     script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
     dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())
     elsewhere = dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}")
-    others = [Path(temporary_folders.new()), elsewhere]
+    others = [Path(temporary_folders.make_folder()), elsewhere]
     elsewhere.mkdir()
     assert dead.is_dir()
     subprocess.run([*COMMAND, "--version"], check=True, capture_output=True)

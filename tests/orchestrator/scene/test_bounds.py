@@ -28,7 +28,7 @@ from tests.orchestrator.scene.test_scene import GOOD, findings
 )
 def test_what_is_too_deep_is_told_before_it_is_parsed(text):
     with pytest.raises(SceneFault, match=r"more than 32 names or brackets deep \(at line [12]\)"):
-        read_and_check.read(text)
+        read_and_check.read_scene(text)
 
 
 def test_dots_around_names_are_no_names():
@@ -52,8 +52,8 @@ def test_only_files_of_bounded_size_are_read(tmp_path):
         (tmp_path / "scene.toml").write_text(
             GOOD.replace("rate = 30", f'rate = {{ trace = "{trace}" }}')
         )
-        assert "it is no file" in refused(tmp_path / "scene.toml")
-    with pytest.raises(InputFault, match="it is no file"):
+        assert "not a regular file" in refused(tmp_path / "scene.toml")
+    with pytest.raises(InputFault, match="not a regular file"):
         grid.listed(tmp_path / "fifo")
 
 
@@ -93,7 +93,9 @@ def test_a_date_in_a_list_of_runs_is_told_of_by_its_run(tmp_path):
 
 def test_findings_are_shown_to_the_twentieth():
     with pytest.raises(SceneFault) as fault:
-        read_and_check.read(GOOD + "[holds]\n" + "".join(f"a{i}.b = 'zoo'\n" for i in range(70)))
+        read_and_check.read_scene(
+            GOOD + "[holds]\n" + "".join(f"a{i}.b = 'zoo'\n" for i in range(70))
+        )
     assert len(fault.value.findings) == 70
     lines = str(fault.value).splitlines()
     assert len(lines) == 22
@@ -148,7 +150,7 @@ def test_time_grows_with_the_size_of_a_file(text):
     def read(n):
         def reads():
             with suppress(SceneFault):
-                read_and_check.read(text(n))
+                read_and_check.read_scene(text(n))
 
         return reads
 

@@ -119,7 +119,7 @@ SCENES = tuple(find_scene.shipped())
 
 def tables(name: str) -> dict[str, Any]:
     """What a shipped scene and those that it extends write."""
-    return extends.document(find_scene.find(name)[1], name, None)[0]
+    return extends.document(find_scene.find_scene(name)[1], name, None)[0]
 
 
 @cache

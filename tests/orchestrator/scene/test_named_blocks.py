@@ -25,7 +25,7 @@ def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path):
     """x' = s x: z = 1/(1 - s h) backward, (1 + s h/2)/(1 - s h/2) trapezoidal, of each step."""
     text = HEAD + pole("fast", "backward") + pole("slow", "trapezoidal", "rate = 10")
     results = simulate(
-        read_and_check.read(text, ["fmu.fast.start.re=-3"]), tmp_path / "out"
+        read_and_check.read_scene(text, ["fmu.fast.start.re=-3"]), tmp_path / "out"
     ).results
     backward = (1 / 1.03) ** np.arange(101)
     np.testing.assert_allclose(results.haptics["fast.x"][:, 0], backward, rtol=1e-13)
@@ -55,7 +55,7 @@ def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path):
 )
 def test_faults_stand_at_their_place(keys, finding):
     with pytest.raises(SceneFault) as fault:
-        read_and_check.read(f'{HEAD}[[fmu]]\nname = "one"\n{keys}\n')
+        read_and_check.read_scene(f'{HEAD}[[fmu]]\nname = "one"\n{keys}\n')
     assert [finding] == [str(f)[: len(finding)] for f in fault.value.findings]
 
 
@@ -63,11 +63,11 @@ def test_a_file_takes_neither_block_nor_settings(tmp_path):
     (tmp_path / "a.fmu").touch()
     text = f'{HEAD}[[fmu]]\nname = "one"\npath = "a.fmu"\nblock = "hand"\nsettings.hand = 1\n'
     with pytest.raises(SceneFault) as fault:
-        read_and_check.read(text, folder=tmp_path)
+        read_and_check.read_scene(text, folder=tmp_path)
     told = [f.key for f in fault.value.findings]
     assert told == [f"fmu[0] (one).{key}" for key in ("settings.hand", "block")]
 
 
 def test_values_that_give_no_component(tmp_path):
     with pytest.raises(InputFault, match=r"discrete_equivalent: .*'sideways'"):
-        simulate(read_and_check.read(HEAD + pole("one", "sideways")), tmp_path / "out")
+        simulate(read_and_check.read_scene(HEAD + pole("one", "sideways")), tmp_path / "out")

@@ -229,7 +229,7 @@ def refused(scene: object, *options: str) -> str:
     """What is said of a scene: one of TEXTS, or by its name or path."""
     text = TEXTS.get(str(scene))
     with pytest.raises(InputFault) as fault:
-        read_and_check.read(text, options) if text else system_of(scene, *options)
+        read_and_check.read_scene(text, options) if text else system_of(scene, *options)
     assert fault.value.exit_status == 2
     return str(fault.value)
 

@@ -46,13 +46,13 @@ SPRING = "[[linkage.spring]]\nbodies = ['bra', 'ground']\nat = [[0.0, 0.0], [0.0
 
 def findings(text: str, *options: str) -> dict[str, tuple[int | None, str]]:
     with pytest.raises(SceneFault) as refused:
-        read_and_check.read(text, options)
+        read_and_check.read_scene(text, options)
     assert refused.value.exit_status == 2
     return {f.key: (f.line, f.message) for f in refused.value.findings}
 
 
 def test_a_good_scene_is_read():
-    scene = read_and_check.read(GOOD)
+    scene = read_and_check.read_scene(GOOD)
     assert scene.hand.type == "constant"
     assert scene.ends_when == "haptic_device.workspace_margin < 0"
 
@@ -63,10 +63,10 @@ def test_a_path_is_rows_or_a_sine_which_replaces_them_in_a_scene_that_extends(tm
     (tmp_path / "base.toml").write_text(GOOD[: GOOD.index("[hand]")] + rows)
     sine = "target = { amplitude = [0.1, 0.0, 0.0], frequency = [2.0, 1.0, 0.0] }\n"
     text = 'title = "t"\nextends = "base.toml"\n[hand]\n'
-    scene = read_and_check.read(text + sine, folder=tmp_path)
+    scene = read_and_check.read_scene(text + sine, folder=tmp_path)
     assert isinstance(scene.hand, SpringHand)
     assert scene.hand.target == PoseSine(amplitude=(0.1, 0.0, 0.0), frequency=(2.0, 1.0, 0.0))
-    scene = read_and_check.read(text + 'interpolation = "spline"\n', folder=tmp_path)
+    scene = read_and_check.read_scene(text + 'interpolation = "spline"\n', folder=tmp_path)
     assert scene.hand.interpolation == "spline"
     found = findings(GOOD[: GOOD.index("[hand]")] + hand + sine.replace("2.0", "-2.0"))
     assert "give a number >= 0 (Hz)" in found["hand.target.frequency[0]"][1]
@@ -110,7 +110,7 @@ def test_options_change_the_scene():
         "linkage.body.bar.mass=2.5",
         "title=two words",
     ]
-    scene = read_and_check.read(GOOD, options)
+    scene = read_and_check.read_scene(GOOD, options)
     assert scene.controller.topology is False
     assert scene.graphics.rate == VariableRate(min=10, max=60, seed=4)
     assert scene.linkage.body[0].mass == 2.5
@@ -119,7 +119,8 @@ def test_options_change_the_scene():
 
 def test_sensing_reaches_the_device():
     built = {
-        b.name: b.settings for b in blocks(read_and_check.read(GOOD, ["sensing=encoders"])).built
+        b.name: b.settings
+        for b in blocks(read_and_check.read_scene(GOOD, ["sensing=encoders"])).built
     }
     assert built["haptic_device"]["encoders"]
 
@@ -131,7 +132,7 @@ def test_a_shipped_scene_is_suggested_by_name():
 
 def test_not_toml():
     with pytest.raises(SceneFault, match="line 1, column"):
-        read_and_check.read("title = =")
+        read_and_check.read_scene("title = =")
 
 
 def test_lines_of_keys_after_texts_and_arrays_over_several_lines():
@@ -146,7 +147,7 @@ def test_lines_of_keys_after_texts_and_arrays_over_several_lines():
 
 def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
     base, top = tmp_path / "base.toml", tmp_path / "top.toml"
-    base.write_text(find_scene.find("closed-loop")[1])
+    base.write_text(find_scene.find_scene("closed-loop")[1])
     top.write_text(f'extends = "{base}"\nduration = 1.0\n[hand]\nwrench = [1.0, 0.0, 0.0]\n')
     scene = open_scene.load(str(top))
     assert scene.duration == 1.0

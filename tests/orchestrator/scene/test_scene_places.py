@@ -25,7 +25,7 @@ CLOSED = 'title = "t"\nextends = "closed-loop"\n'
 
 def told(text: str, *options: str, folder: Path | None = None) -> str:
     with pytest.raises(SceneFault) as refused:
-        read_and_check.read(text, options, "scene", folder)
+        read_and_check.read_scene(text, options, "scene", folder)
     return str(refused.value)
 
 
@@ -38,13 +38,15 @@ def told(text: str, *options: str, folder: Path | None = None) -> str:
 )
 def test_a_name_with_dots_is_one_name_in_every_spelling(key, text):
     whole = text + GOOD if text.startswith("holds") else GOOD + text
-    scene = read_and_check.read(whole, [f"holds.{key}=lead"])
+    scene = read_and_check.read_scene(whole, [f"holds.{key}=lead"])
     assert scene.holds == {"e.P_c": "lead"}
 
 
 @pytest.mark.parametrize("option", ['delays."e.P_c".loss=0.5', "delays.e.P_c.loss=0.5"])
 def test_a_part_of_a_delay_is_set_beside_its_others(option):
-    late = read_and_check.read(GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option])
+    late = read_and_check.read_scene(
+        GOOD + '[delays]\n"e.P_c" = { min = 0.1, seed = 3 }\n', [option]
+    )
     found = late.delays["e.P_c"]
     assert (found.min, found.loss, found.seed) == (0.1, 0.5, 3)
 

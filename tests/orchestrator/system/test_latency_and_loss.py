@@ -15,7 +15,7 @@ from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.assign_holds import Rules, assign
-from hapticlink.orchestrator.system.latency_and_loss import Link
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 from hapticlink.orchestrator.system.system import System
 from tests.orchestrator.plan.test_plan import timelines
 from tests.orchestrator.timelines import CAUSAL, fixed
@@ -89,7 +89,7 @@ def test_extrapolated_stamps_are_the_time_itself(stamped, rate):
 
 def test_loss_takes_its_share_and_a_seed_repeats():
     def kept(latency):
-        link = Link(latency, Fraction(1, 1000))
+        link = SampleLink(latency, Fraction(1, 1000))
         for stamp in range(4000):
             link.send(stamp)
         return [stamp for _, stamp, _ in link.arrived(10**6)]

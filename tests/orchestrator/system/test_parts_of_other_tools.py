@@ -12,7 +12,7 @@ from fmpy.model_description import CoSimulation, ModelVariable
 from fmpy.util import create_zip_archive
 
 import hapticlink as hl
-from hapticlink.commands.options import Changes
+from hapticlink.commands.options import SceneOptions
 from hapticlink.orchestrator.base.errors import SceneFault
 from tests.orchestrator.results.records import tables_of
 
@@ -95,4 +95,4 @@ def test_a_hand_of_pythonfmu3_changes_no_byte(tmp_path, own):
 def test_mujoco_is_refused_where_it_has_no_such_block(block):
     said = rf"--swap {block}=mujoco: .*give `path`, an FMU with the ports of {block}"
     with pytest.raises(SceneFault, match=said):
-        hl.scene("closed-loop", Changes(swap=[f"{block}=mujoco"]).options)
+        hl.scene("closed-loop", SceneOptions(swap=[f"{block}=mujoco"]).options)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.commands.options import Changes
+from hapticlink.commands.options import SceneOptions
 from hapticlink.components.ports import Power
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import SceneFault
@@ -201,7 +201,7 @@ def test_what_replaces_no_block_is_refused(tmp_path):
         with pytest.raises(SceneFault, match=message):
             hl.scene("closed-loop", options)
     with pytest.raises(SceneFault) as raised:  # as it was typed
-        hl.scene("closed-loop", Changes(swap=["controler=/missing.fmu"]).options)
+        hl.scene("closed-loop", SceneOptions(swap=["controler=/missing.fmu"]).options)
     said = "--swap controler=/missing.fmu: fmu[0]"
     assert f"{said}.path: there is no file" in str(raised.value)
     assert f"{said}.replaces: no block 'controler'" in str(raised.value)
