@@ -34,12 +34,12 @@ OUTSIDE = ("studies", "benchmarks", "tests", "docs")
 CODE_LINES = {
     "components": 4598,
     "fmus": 2611,
-    "orchestrator": 12034,
+    "orchestrator": 12061,
     "programs": 1144,
-    "analysis": 6450,
+    "analysis": 6451,
     "visualization": 3348,
     "api": 429,
-    "commands": 1326,
+    "commands": 1328,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
@@ -54,6 +54,7 @@ CAPABILITIES = {
 
 KNOWN_TWICE = {
     "Block",
+    "Changes",
     "Coordinate",
     "Cost",
     "Description",
