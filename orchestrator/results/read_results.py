@@ -26,7 +26,7 @@ TABLES = (".csv", rows_file.SUFFIX)
 """Endings of the names of tables."""
 IN_MEMORY = 1 << 24
 """Bytes of the rows of a table, above which they stay in their file."""
-BLOCK = 1 << 13
+BLOCK = 1 << 12
 """Rows of a long run that are in memory at a time."""
 
 

@@ -63,12 +63,12 @@ def test_a_long_run_reads_no_table_back_and_tells_the_same(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A run of many windows: its lines, run.json and figures, without a CSV that is read. That of a
-    bar has no numbers."""
+    """A run whose tables stay in their files: its lines, run.json and figures, without a CSV that
+    is read. That of a bar has no numbers."""
     told, runs = [], []
     given = (bar,) if scene == "bar" else (scene, *sets(["duration=0.06"]))
     for name, size in (("short", 1 << 24), ("long", 2000)):
-        monkeypatch.setattr("hapticlink.orchestrator.results.windows.WINDOW_BYTES", size)
+        monkeypatch.setattr("hapticlink.orchestrator.results.read_results.IN_MEMORY", size)
         monkeypatch.setattr("numpy.loadtxt", lambda *_, **__: pytest.fail("a CSV was read"))
         assert status("run", *given, "--out", tmp_path / name) == 0
         said = capsys.readouterr().out.replace(f"/{name}", "")
