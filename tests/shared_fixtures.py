@@ -81,14 +81,14 @@ def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         return (kept / key).read_bytes()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compiler, "_compiled", compiled)
+        patch.setattr(compiler, "_compile", compiled)
         yield
 
 
 @pytest.fixture
 def compiler_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing that another test has compiled is taken in the place of what this one compiles."""
-    monkeypatch.setattr(compiler, "_compiled", COMPILED)
+    monkeypatch.setattr(compiler, "_compile", COMPILED)
 
 
 RUNNING = (

@@ -8,7 +8,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.sweep.grid import points
-from hapticlink.visualization.live_and_standalone.viewed_scene import viewed
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 
 DEVICE = 'title = "A device"\nduration = 1.0\n[device]\n'
 
@@ -40,7 +40,7 @@ REFUSED: list[tuple[Callable[[Path, Path], object], str]] = [
     (lambda bar, out: hl.sweep(bar, {"hold": ["a", "b"]}), "no hold 'a'"),
     (lambda bar, out: hl.sweep(bar, {"duration": [0.1]}, jobs=0), "jobs 0: give 1 or more"),
     # what is shown
-    (lambda bar, out: viewed(str(written(out / "device.toml", DEVICE))),
+    (lambda bar, out: load_viewed_scene(str(written(out / "device.toml", DEVICE))),
      r"device.toml: has no \[linkage\].*closed-loop"),
 ]  # fmt: skip
 

@@ -301,7 +301,7 @@ def test_a_disk_that_is_full_for_the_figures_keeps_the_run(
             file.write(b"a figure")
         return []
 
-    monkeypatch.setattr("hapticlink.visualization.figure_axes.write", full)
+    monkeypatch.setattr("hapticlink.visualization.figure_axes.write_pngs", full)
     made = hl.run(bar, out=tmp_path)
     assert made.fault is None
     assert "No space left on device" in caplog.text

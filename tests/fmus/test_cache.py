@@ -79,7 +79,7 @@ def test_order_of_keys_does_not_matter_but_values_do():
 @pytest.mark.parametrize("name", cache.VERSIONS)
 def test_versions_are_part_of_the_key(name, monkeypatch):
     before, installed = cache.key(MATERIAL), cache.installed
-    monkeypatch.setattr(cache, "installed", lambda names: installed(names) | {name: "0.0"})
+    monkeypatch.setattr(cache, "find_versions", lambda names: find_versions(names) | {name: "0.0"})
     assert cache.key(MATERIAL) != before
 
 
@@ -251,7 +251,7 @@ def test_locks_and_libraries_lie_where_no_other_user_gets(
         seen.append(path)
         return attempted(path)
 
-    monkeypatch.setattr(lock, "attempted", noted)
+    monkeypatch.setattr(lock, "try_lock", noted)
     hl.run("pendulum", {"duration": 0.02})
     assert seen
     assert all(path.parent == root / "locks" for path in seen)

@@ -274,7 +274,7 @@ def test_fmpy_rebuilds_a_block(both, tmp_path, which):
 
 
 def test_libraries_for_fmi3_are_in_a_folder_for_each_processor(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiler, "_compiled", lambda *given: given[2])
+    monkeypatch.setattr(compiler, "_compile", lambda *given: given[2])
     assert dict(compiler.binaries([], "one", tmp_path, compiler.PLATFORMS_3, ())) == {
         "binaries/x86_64-linux/one.so": "x86_64-linux-gnu.2.17",
         "binaries/aarch64-linux/one.so": "aarch64-linux-gnu.2.17",

@@ -72,11 +72,11 @@ def test_the_graph_has_the_slopes_of_the_fmu(case: str, monkeypatch: pytest.Monk
         return own + 1.0, J
 
     monkeypatch.setattr(ForwardSensitivity, "_in_graph", asked)
-    monkeypatch.setattr(forward_sensitivity, "decided", counted)
+    monkeypatch.setattr(forward_sensitivity, "combine_slopes", counted)
     found = own_hand(scene, options)
     by_graph = dict(apart)
     apart.clear()
-    monkeypatch.setattr(forward_sensitivity, "decided", watched)
+    monkeypatch.setattr(forward_sensitivity, "combine_slopes", watched)
     for name in ("step", "get"):  # a graph with another result leaves the differences to the FMU
         call = getattr(GraphSlopes, name)
         monkeypatch.setattr(GraphSlopes, name, lambda *given, call=call: elsewhere(*call(*given)))

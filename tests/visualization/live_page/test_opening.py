@@ -22,7 +22,7 @@ def lock_of_last_block(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "cache"))
     last = blocks(load_viewed_scene("closed-loop")).built[-1]
     with monkeypatch.context() as patched:
-        patched.setattr(cache, "cached", lambda material, *_: cache.key(material))
+        patched.setattr(cache, "get_or_build", lambda material, *_: cache.key(material))
         key = block_fmus.build_block(last.block, last.settings, tmp_path, packaging="native")
     return tmp_path / "cache" / "locks" / f"{key}.lock"
 
