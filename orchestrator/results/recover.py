@@ -46,8 +46,8 @@ def _recover_tables(folder: Path, kind: str, message: str) -> dict[str, Recovere
         table = folder / f"{name}.csv"
         if table.with_suffix(rows_file.SUFFIX).is_file():
             rows = make_csv(table)
-            last = rows[len(rows) - 1 :] if len(rows) else np.zeros((1, 1))
-            recovered[name] = Recovered(len(rows), float(last[0, 0]))
+            newest = rows[len(rows) - 1 :] if len(rows) else np.zeros((1, 1))
+            recovered[name] = Recovered(len(rows), float(newest[0, 0]))
             remove_rows(table)
     changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
     if record.end.process is not None:
