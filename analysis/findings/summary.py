@@ -107,7 +107,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
         yield _energy(port)
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
-            yield f"held {name} {_describe_generated(energy.peak, energy.generated)}"
+            yield f"held {name} {describe_generated(energy.peak, energy.generated)}"
     if measures.closure_m is not None:
         yield f"loops close within {measures.closure_m:.2g} m"
 
@@ -134,19 +134,23 @@ def _energy(port: PortEnergy) -> str:
     hands = [1e3 * work for name, work in port.works.items() if name.endswith("hand")]
     put_in = f"the hand put in {short(sum(hands))} mJ, " if hands else ""
     is_over = port.peak > tolerated_energy(port.hand_work)
-    generated = _describe_generated(port.peak, port.generated, f", at {port.time_of_peak:.3g} s")
+    generated = describe_generated(port.peak, port.generated, f", at {port.time_of_peak:.3g} s")
     return (
         f"energy at the user's port: {put_in}the rendering {generated}. A passive one generates "
         f"none; this is {'over' if is_over else 'within'} the tolerated {allowance(port.hand_work)}"
     )
 
 
-def _describe_generated(peak: float, end: float, when: str = "") -> str:
+def describe_generated(peak: float, end: float, when: str = "") -> str:
     """What was generated (J): at most, at the time `when`, and by the end."""
-    by_the_end = f"{'generated' if end > 0 else 'dissipated'} {short(1e3 * abs(end))} mJ"
+    most, last = short(1e3 * peak), short(1e3 * abs(end))
+    dissipated = f"dissipated {last} mJ"
     if peak <= 0:
-        return f"generated no energy and {by_the_end}"
-    return f"generated at most {short(1e3 * peak)} mJ{when}, and by the end has {by_the_end}"
+        return f"generated no energy and {dissipated}" if end < 0 else "generated no energy"
+    if end > 0 and most == last:
+        return f"generated {last} mJ by the end, and at no time more"
+    by_the_end = f"generated {last} mJ" if end > 0 else dissipated
+    return f"generated at most {most} mJ{when}, and by the end has {by_the_end}"
 
 
 def _describe_saturation(measures: Measures) -> Iterator[str]:

@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from hapticlink.orchestrator.base import temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folder_lock, rows_file
@@ -44,7 +46,8 @@ def _recover_tables(folder: Path, kind: str, message: str) -> dict[str, Recovere
         table = folder / f"{name}.csv"
         if table.with_suffix(rows_file.SUFFIX).is_file():
             rows = make_csv(table)
-            recovered[name] = Recovered(len(rows), float(rows[len(rows) - 1 :][0, 0]))
+            newest = rows[len(rows) - 1 :] if len(rows) else np.zeros((1, 1))
+            recovered[name] = Recovered(len(rows), float(newest[0, 0]))
             remove_rows(table)
     changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
     if record.end.process is not None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import ctypes
+import errno
 import mmap
 import os
 from contextlib import suppress
@@ -75,8 +76,8 @@ class RowsFile:
 
 
 class RowsBeingWritten:
-    """A file of up to `most` rows, into which a run writes: `rows` are all of them, of which the
-    first `filled` are written and the first `reserved` have their place on the disk.
+    """A file of up to `most` rows, into which a run writes: `rows` are all that it can have, of
+    which the first `filled` are written and the first `reserved` have their place on the disk.
 
     Raises OSError, as on a full disk, and where there is a file already.
     """
@@ -88,8 +89,7 @@ class RowsBeingWritten:
         self.reserved = 0
         try:
             self._file.write(line.ljust(self._begin - COUNT, b"\n") + bytes(COUNT))
-            self._file.truncate(size := self._begin + max(most, 1) * self._row)
-            self._memory = mmap.mmap(self._file.fileno(), size)
+            self._memory = self._map(max(most, 1))
             self.reserve()
         except OSError:
             self._file.close()
@@ -99,9 +99,23 @@ class RowsBeingWritten:
         flat = np.frombuffer(self._memory, np.float64, offset=self._begin)
         self.rows: Rows = flat.reshape(-1, len(columns))
 
+    def _map(self, most: int) -> mmap.mmap:
+        """The file in memory, with room for `most` rows or, where files are not that long (4 GB on
+        FAT, 16 TB on ext4), for half of them, a quarter and so on."""
+        size = self._begin + most * self._row
+        try:
+            self._file.truncate(size)
+            return mmap.mmap(self._file.fileno(), size)
+        except (OSError, OverflowError):
+            if most == 1:
+                raise
+            return self._map(most // 2)
+
     def reserve(self) -> None:
         """Have a place on the disk for further rows. Raises OSError where not one more fits."""
         begin = self._begin + self.reserved * self._row
+        if begin == len(self._memory):
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
         self._file.seek(begin)
         left = memoryview(bytes(min(max(RESERVED, self._row), len(self._memory) - begin)))
         with suppress(OSError):

@@ -8,6 +8,21 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.findings.summary import describe_generated
+
+
+@pytest.mark.parametrize(
+    ("peak", "end", "said"),
+    [
+        (4e-4, -2e-4, "generated at most 0.4 mJ, and by the end has dissipated 0.2 mJ"),
+        (4e-4, 2e-4, "generated at most 0.4 mJ, and by the end has generated 0.2 mJ"),
+        (4e-4, 4e-4, "generated 0.4 mJ by the end, and at no time more"),
+        (0.0, -2e-4, "generated no energy and dissipated 0.2 mJ"),
+        (0.0, 0.0, "generated no energy"),
+    ],
+)
+def test_energy_that_was_generated_in_words(peak: float, end: float, said: str) -> None:
+    assert describe_generated(peak, end) == said
 
 
 def warned(options: dict[str, object]) -> list[str]:

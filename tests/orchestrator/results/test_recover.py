@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.results.recover import Recovered, recover
-from hapticlink.orchestrator.results.rows_file import RowsFile
+from hapticlink.orchestrator.results.rows_file import RowsBeingWritten, RowsFile, write_empty
 from hapticlink.orchestrator.results.write_files import FileRecorder
 from tests.little_fmus import python_fmu
 from tests.orchestrator.c_fmus import hostile_fmu
@@ -79,3 +79,26 @@ def test_memory_does_not_grow_with_the_run(tmp_path):
         assert ended.outcome.fault is None
         assert ended.outcome.end_time == seconds
     assert peaks[1] - peaks[0] < 3e3
+
+
+def test_a_file_of_more_rows_than_any_file_can_have(tmp_path):
+    """As of a run of 30 years that its `stop_when` ends: it has room for as many as a file can
+    have, and one that has no more room says so."""
+    table = RowsBeingWritten(tmp_path / "haptics.rows", ("time", "y"), 10**15)
+    assert len(table.rows) > 10**6
+    table.rows[0], table.filled.value = (0.0, 1.0), 1
+    table.close()
+    assert RowsFile(tmp_path / "haptics.rows")[:].tolist() == [[0.0, 1.0]]
+    full = RowsBeingWritten(tmp_path / "graphics.rows", ("time", "y"), 2)
+    assert full.reserved == 2
+    with pytest.raises(OSError, match="File too large"):
+        full.reserve()
+    full.close()
+
+
+def test_a_table_without_a_row_is_recovered(tmp_path):
+    """As on Windows, where a table has its name before its first row."""
+    run = run_json(rates=["haptics"], files=["haptics.csv"])
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    write_empty(tmp_path / "haptics.rows", ("time", "y"), as_csv=False)
+    assert recover(tmp_path, ended=True) == {"haptics": Recovered(0, 0.0)}
