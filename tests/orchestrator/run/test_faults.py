@@ -261,7 +261,7 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, cr
 
 def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path):
     name = "hapticlink.orchestrator.base.temporary_folders"
-    made = f"import {name} as folders; print(folders.new()); {{}}"
+    made = f"import {name} as folders; print(folders.make_folder()); {{}}"
     kill = "__import__('os').kill(__import__('os').getpid(), 9)"
     script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
     dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())
