@@ -84,14 +84,6 @@ def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path):
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_a_discarded_step_stops(tmp_path, isolate):
-    python_fmu(tmp_path, "Stiff", "return False", canGetAndSetFMUstate=True)
-    experiment, found = run(tmp_path, fmu_table("one", "Stiff", isolate))
-    assert "one: fmi2DoStep returned discard at t = 0 s" in str(experiment.outcome.fault)
-    assert found.haptics["time"].tolist() == [0.0]
-
-
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_an_exception_in_a_python_fmu(tmp_path, isolate):
     python_fmu(tmp_path, "Raises", "if time > 0.2: raise RuntimeError('broken gear')")
     python_fmu(tmp_path, "Other")
