@@ -27,12 +27,6 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from tests.fmus import sample_components
 
 
-def test_same_component_same_bytes(fmus, tmp_path):
-    for component in sample_components.EVERY:
-        again = build(component, tmp_path)
-        assert again.read_bytes() == fmus[component.name].read_bytes()
-
-
 def test_same_bytes_from_another_process(fmus, tmp_path):
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"

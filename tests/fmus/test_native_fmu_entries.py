@@ -12,7 +12,6 @@ import threading
 import zipfile
 from array import array
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Literal
 from xml.etree import ElementTree as ET
@@ -509,16 +508,6 @@ def test_a_windows_binary(tmp_path):
     assert data[header : header + 4] == b"PE\0\0"
     assert struct.unpack_from("<H", data, header + 4) == (0x8664,)
     assert b"fmi2DoStep\0" in data
-
-
-def test_without_ziglang_the_extra_is_named(tmp_path, monkeypatch):
-    def missing(name: str) -> str:
-        raise PackageNotFoundError(name)
-
-    monkeypatch.setattr(compiler, "version", missing)
-    with pytest.raises(FmuError, match=r'pip install "hapticlink\[native\]"'):
-        build_native(sample_components.stateless(), tmp_path)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_platform_is_named(tmp_path):

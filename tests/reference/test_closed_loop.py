@@ -70,10 +70,3 @@ def test_jacobi_delay_makes_the_printed_gains_unstable(tmp_path):
         rate = experiment.results.haptics["controller.F_drift"][:, 2]
         worst[damping] = np.abs(np.diff(rate)).max()
     assert worst[0.375] > 30 * worst[0.2]
-
-
-def test_same_scene_same_bytes(tmp_path):
-    for folder in "ab":
-        simulate("closed-loop", tmp_path / folder, ["duration=0.2"])
-    for name in ("haptics.csv", "graphics.csv"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()

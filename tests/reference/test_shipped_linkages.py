@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.errors import SceneFault
 from tests.blocks import Running, virtual_mechanism
 
 H = 1 / 512
@@ -127,19 +126,3 @@ def test_a_family_has_the_members_asked_for_and_takes_changes():
     assert [len(linkage.body), len(linkage.joint), len(linkage.loop)] == [7, 7, 3]
     assert [b.mass for b in linkage.body] == [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0]
     assert linkage.gravity == (0.0, -1.0)
-
-
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        (
-            "linkage.n=0",
-            "--set linkage.n=0: linkage.n: 0 is out of range: give a whole number >= 1",
-        ),
-        ("linkage.n=2.5", "2.5 is out of range: give a whole number >= 1"),
-        ("linkage.family=n-four-bars", "did you mean 'n-four-bar'"),
-    ],
-)
-def test_a_family_refuses_what_it_cannot_build(option, message):
-    with pytest.raises(SceneFault, match=message):
-        open_scene.load("n-four-bar", [option])

@@ -36,42 +36,24 @@ duration = 0.5
 sensing = "encoders"
 haptics.rate = 512
 graphics.rate = 32
+hand = { type = "constant", wrench = [1.0, 0.0, 0.0] }
+device = {}
 
 [linkage]
-operational_point = { body = "block" }
-start = { rail = 0.0201 }
-
-[[linkage.body]]
-name = "block"
-mass = 0.8
-inertia = 1e-4
-radius = 0.02
-capsule = [[0.0, 0.0]]
-
-[[linkage.joint]]
-name = "rail"
-type = "prismatic"
-child = "block"
-axis = 0.0
-
-[device]
+operational_point.body = "block"
+start.rail = 0.0201
+body = [{ name = "block", mass = 0.8, inertia = 1e-4, radius = 0.02, capsule = [[0.0, 0.0]] }]
+joint = [{ name = "rail", type = "prismatic", child = "block", axis = 0.0 }]
 
 [controller]
 topology = { stiffness = 400.0, damping = 50.0 }
 contact = true
-
-[controller.teleoperation]
-stiffness = [300.0, 300.0, 1.0]
-damping = [20.0, 20.0, 0.1]
+teleoperation = { stiffness = [300.0, 300.0, 1.0], damping = [20.0, 20.0, 0.1] }
 
 [contacts]
 enclosure = [[-0.04, -0.1], [0.04, -0.1], [0.04, 0.1], [-0.04, 0.1]]
 stiffness = 2000.0
 damping = 10.0
-
-[hand]
-type = "constant"
-wrench = [1.0, 0.0, 0.0]
 """
 
 
@@ -81,61 +63,27 @@ duration = 1.0
 sensing = "encoders"
 haptics.rate = 512
 graphics.rate = 32
+hand = { type = "constant", wrench = [1.0, 0.5, 0.0] }
+device = {}
 
 [linkage]
 operational_point = { body = "coupler", at = [0.03, 0.01] }
 start = { crank = 1.2, wrist = -0.9, rocker = 1.3 }
-
-[[linkage.body]]
-name = "crank"
-mass = 0.4
-inertia = 8e-5
-center = [0.02, 0.0]
-
-[[linkage.body]]
-name = "coupler"
-mass = 0.5
-inertia = 1.2e-4
-center = [0.03, 0.0]
-
-[[linkage.body]]
-name = "rocker"
-mass = 0.4
-inertia = 1e-4
-center = [0.025, 0.0]
-
-[[linkage.joint]]
-name = "crank"
-child = "crank"
-
-[[linkage.joint]]
-name = "wrist"
-parent = "crank"
-child = "coupler"
-at_parent = [0.04, 0.0]
-
-[[linkage.joint]]
-name = "rocker"
-child = "rocker"
-at_parent = [0.06, 0.0]
-
-[[linkage.loop]]
-name = "pin"
-bodies = ["coupler", "rocker"]
-at = [[0.06, 0.0], [0.05, 0.0]]
-
-[device]
+body = [
+  { name = "crank", mass = 0.4, inertia = 8e-5, center = [0.02, 0.0] },
+  { name = "coupler", mass = 0.5, inertia = 1.2e-4, center = [0.03, 0.0] },
+  { name = "rocker", mass = 0.4, inertia = 1e-4, center = [0.025, 0.0] },
+]
+joint = [
+  { name = "crank", child = "crank" },
+  { name = "wrist", parent = "crank", child = "coupler", at_parent = [0.04, 0.0] },
+  { name = "rocker", child = "rocker", at_parent = [0.06, 0.0] },
+]
+loop = [{ name = "pin", bodies = ["coupler", "rocker"], at = [[0.06, 0.0], [0.05, 0.0]] }]
 
 [controller]
 topology = { stiffness = 2000.0, damping = 50.0 }
-
-[controller.teleoperation]
-stiffness = [100.0, 100.0, 0.3]
-damping = [20.0, 20.0, 0.06]
-
-[hand]
-type = "constant"
-wrench = [1.0, 0.5, 0.0]
+teleoperation = { stiffness = [100.0, 100.0, 0.3], damping = [20.0, 20.0, 0.06] }
 """
 
 

@@ -44,14 +44,6 @@ def test_joint_spring_and_damper_are_a_damped_oscillator():
     assert block.y["q"][0] == pytest.approx(exact, abs=1e-12)
 
 
-def test_coulomb_friction_decelerates_at_its_own_rate():
-    """Sliding at v >> v_f: a = f/m, until it sticks; energy only falls."""
-    block = advance(slider(rate=1.0, friction=1.0, friction_speed=1e-3), 1.0, 1000)
-    assert block.y["qd"][0] == pytest.approx(1.0 - 0.5 * 1.0, abs=1e-10)
-    advance(block, 1.5, 1000)
-    assert abs(block.y["qd"][0]) < 1e-3
-
-
 @pytest.mark.parametrize("length", [None, 0.2])
 def test_spring_between_two_bodies_pulls_along_its_line(length):
     """Joint efforts by virtual work from the hand-computed force."""

@@ -37,11 +37,6 @@ def limit(method, beta):
     return brentq(growth, 0.5, 4.0)
 
 
-def test_limits_of_rk4_lie_between_2_6_and_2_8():
-    assert limit("rk4", 0.5) == pytest.approx(2.62, abs=0.005)
-    assert limit("rk4", 1.0) == pytest.approx(2.785, abs=0.005)
-
-
 def closure_after(component, steps):
     block = Running(component)
     block.put(q=block.state["q"] + (1e-6, 0, 0, 0))

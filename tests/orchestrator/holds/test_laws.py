@@ -270,17 +270,22 @@ def test_samples_that_are_late_and_lost(name, seed):
     assert counts == (way.sent, way.lost, way.overtaken)
 
 
+@pytest.mark.parametrize("turn", [2 * np.pi, 360.0, 400.0])
 @few
 @given(seeds)
-def test_angles_are_unwrapped_as_numpy_does(seed):
+def test_angles_are_unwrapped_as_numpy_does(turn, seed):
+    """Each in the turn of its own unit: a walk in steps below half a turn."""
     generator = np.random.default_rng(seed)
-    hold = Bench(base=BASE).hold("foh", 2, turns={1: 360.0})
-    walk = np.cumsum(generator.uniform(-170, 170, size=20))
-    seen = (walk + 180.0) % 360.0 - 180.0
-    straight = np.unwrap(seen, period=360.0)
+    hold = Bench(base=BASE).hold("foh", 2, turns={0: 2 * np.pi, 1: turn})
+    walk = np.cumsum(generator.uniform(-0.49, 0.49, size=30)) * turn
+    seen = (walk + turn / 2) % turn - turn / 2
+    straight = np.unwrap(seen, period=turn)
     for k, angle in enumerate(seen.tolist()):
-        hold.push(10 * k, np.array([angle, angle]), 10 * k)
-    close(hold.value(195)[1], straight[-1] + (straight[-1] - straight[-2]) / 2, 1e3)
+        hold.push(10 * k, np.array([0.0, angle]), 10 * k)
+        close(hold.value(10 * k)[1], straight[k], 1e3)
+    beyond = hold.value(10 * k + 5)
+    close(beyond[1], straight[-1] + (straight[-1] - straight[-2]) / 2, 1e3)
+    assert beyond[0] == 0.0
 
 
 MATRICES = [name for name, row in TABLE.items() if not row.needs and not row.gives_samples]

@@ -80,8 +80,7 @@ def test_a_set_position_that_is_not_paid_for_has_no_order(fmus):
         ("lead", 1, 7.08e-3),
     ],
 )
-@pytest.mark.parametrize("inputs", ["interpolating"])
-def test_largest_error_at_a_hundredth(fmus, inputs, hold, substeps, published):
+def test_largest_error_at_a_hundredth(fmus, hold, substeps, published):
     found = error(fmus, 100, hold, substeps)
     assert found == pytest.approx(published, rel=0.02)
 

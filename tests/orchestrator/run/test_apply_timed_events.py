@@ -86,11 +86,6 @@ def test_graphics_go_on_at_another_rate():
     assert [time for time, _ in run.run["events"]] == [0.5, times[times >= 0.75][0]]
 
 
-def test_of_the_keys_of_rates_one_alone_can_be_set():
-    with pytest.raises(InputFault, match=r"graphics\.rate alone can be set"):
-        hl.run("closed-loop", ['at=[{time=0.1, set={"graphics.rte"=15}}]'])
-
-
 def test_lines_in_the_figures():
     at = 'at=[{time=0.25, set={"graphics.rate"=15}}]'
     found = hl.run("closed-loop", ["duration=0.6", at])

@@ -84,14 +84,6 @@ def test_not_finite_at_the_start_is_a_fault_even_where_held(tmp_path):
 
 
 @pytest.mark.parametrize("isolate", ["", ISOLATED])
-def test_a_discarded_step_stops(tmp_path, isolate):
-    python_fmu(tmp_path, "Stiff", "return False", canGetAndSetFMUstate=True)
-    experiment, found = run(tmp_path, fmu_table("one", "Stiff", isolate))
-    assert "one: fmi2DoStep returned discard at t = 0 s" in str(experiment.outcome.fault)
-    assert found.haptics["time"].tolist() == [0.0]
-
-
-@pytest.mark.parametrize("isolate", ["", ISOLATED])
 def test_an_exception_in_a_python_fmu(tmp_path, isolate):
     python_fmu(tmp_path, "Raises", "if time > 0.2: raise RuntimeError('broken gear')")
     python_fmu(tmp_path, "Other")
@@ -261,7 +253,7 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, cr
 
 def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path):
     name = "hapticlink.orchestrator.base.temporary_folders"
-    made = f"import {name} as folders; print(folders.new()); {{}}"
+    made = f"import {name} as folders; print(folders.make_folder()); {{}}"
     kill = "__import__('os').kill(__import__('os').getpid(), 9)"
     script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
     dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())

@@ -129,6 +129,7 @@ REFUSED = {
             (f"set={{{X_D}=[0.0, 0.0, 0.0]}}", "take override"),
             ('set={"haptic_device.x_start"=[0.0, 0.0, 0.0]}', "x_start"),
             ('set={"graphics.rate"=1000}', "give a rate"),
+            ('set={"graphics.rte"=15}', "graphics.rate alone can be set"),
             ('override={"controller.k_j"=0.0}', "take set"),
             ('override={"virtual_mechanism.F_hand"=[0.0, 0.0, 0.0]}', "carries power"),
             ('freeze=["nobody.x"]', "no FMU 'nobody'"),
@@ -181,6 +182,11 @@ REFUSED = {
         ("linkage.body.block.center=[0.01, 0.0]", "give its `inertia` too"),
         ("contacts={detection='graphics'}; graphics.sync=operational",
          "nothing pulls the copy of 'block' along"),
+    ],
+    "n-four-bar": [
+        ("linkage.n=0", "linkage.n: 0 is out of range: give a whole number >= 1"),
+        ("linkage.n=2.5", "2.5 is out of range: give a whole number >= 1"),
+        ("linkage.family=n-four-bars", "did you mean 'n-four-bar'"),
     ],
     "pendulum": [
         ("linkage.joint.pivot.limits={stiffness=9.0}", "give `lower`, `upper` or both"),

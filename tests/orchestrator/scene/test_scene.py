@@ -5,7 +5,7 @@ import pytest
 from hapticlink.components.specs.hand import SpringHand
 from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.errors import InputFault, SceneFault
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.scene import find_scene, read_and_check
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
@@ -123,11 +123,6 @@ def test_sensing_reaches_the_device():
         for b in blocks(read_and_check.read_scene(GOOD, ["sensing=encoders"])).built
     }
     assert built["haptic_device"]["encoders"]
-
-
-def test_a_shipped_scene_is_suggested_by_name():
-    with pytest.raises(InputFault, match="did you mean 'closed-loop'"):
-        open_scene.load("closed-lop")
 
 
 def test_not_toml():
