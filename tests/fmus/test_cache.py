@@ -78,7 +78,7 @@ def test_order_of_keys_does_not_matter_but_values_do():
 
 @pytest.mark.parametrize("name", cache.VERSIONS)
 def test_versions_are_part_of_the_key(name, monkeypatch):
-    before, installed = cache.key(MATERIAL), cache.installed
+    before, find_versions = cache.key(MATERIAL), cache.find_versions
     monkeypatch.setattr(cache, "find_versions", lambda names: find_versions(names) | {name: "0.0"})
     assert cache.key(MATERIAL) != before
 

@@ -59,8 +59,8 @@ def test_a_refused_run_leaves_no_folder(tmp_path, wrong):
 def test_a_killed_run_leaves_no_lock(tmp_path):
     lines = (
         "from pathlib import Path; import os",
-        "from hapticlink.orchestrator.results.folder_lock import held",
-        f"held(Path({str(tmp_path)!r})).__enter__(); os.kill(os.getpid(), 9)",
+        "from hapticlink.orchestrator.results.folder_lock import lock_folder",
+        f"lock_folder(Path({str(tmp_path)!r})).__enter__(); os.kill(os.getpid(), 9)",
     )
     killed = subprocess.run([sys.executable, "-c", "\n".join(lines)], check=False)
     assert killed.returncode == -9

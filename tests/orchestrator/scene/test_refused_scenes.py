@@ -102,6 +102,7 @@ REFUSED = {
         ("iteration.most=0", "iteration.most"),
         ("iteration.tolerance=-1.0", "iteration.tolerance"),
         ("step_control={ tolerance = 1.0 }", "with a higher rate or `substeps`"),
+        ("contacts.broad_phase=false", "are left out, to the same result: take it out"),
         ("faults.discard=retry", "faults.discard: a step that an FMU discards ends the run"),
         ("record.signals=some", '"all", "connected" or "none" or a list'),
         ("hold=passive", NO_POWER),
