@@ -10,7 +10,7 @@ import math
 import shutil
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing
 from copy import copy
 from functools import partial
 from pathlib import Path
@@ -136,14 +136,9 @@ class Session:
         shutil.rmtree(self.folder)
 
 
-@contextmanager
-def session(path: Path | str, folder: Path | None = None) -> Iterator[Session]:
+def session(path: Path | str, folder: Path | None = None) -> closing[Session]:
     """A Session that is closed at the end of the context."""
-    opened = Session(path, folder)
-    try:
-        yield opened
-    finally:
-        opened.close()
+    return closing(Session(path, folder))
 
 
 def initialize(slave: FMU2Slave) -> None:

@@ -86,7 +86,7 @@ class Described:
         return {"modelIdentifier": self.name, "needsExecutionTool": tool}
 
 
-def described(
+def describe_component(
     component: Component,
     needs_tool: bool = True,
     /,

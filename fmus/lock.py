@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
 
 POLL = 0.05
 """Time (s) between two attempts to take a lock."""
@@ -15,12 +20,19 @@ POLL = 0.05
 
 @contextmanager
 def try_lock(path: Path) -> Iterator[bool]:
-    """Whether the lock of the file `path`, which is made if necessary, is held within the context:
-    not if it is held already, by another process or another call in this one. Raises OSError where
-    the file cannot be opened."""
+    """Whether the lock of a folder, or of a file, which is made if necessary, is held within the
+    context: not if it is held already, by another process or another call in this one. A file
+    system without locks gives it to everyone; on Windows folders have none. Raises OSError where it
+    cannot be opened."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("ab") as file:
-        yield _take(file)
+    number = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR | os.O_CREAT)
+    try:
+        yield _take(number)
+    finally:
+        if sys.platform != "win32":
+            with suppress(OSError):  # forked processes may have it open, too
+                fcntl.flock(number, fcntl.LOCK_UN)
+        os.close(number)
 
 
 @contextmanager
@@ -35,16 +47,12 @@ def hold_lock(path: Path, poll: Callable[[], object]) -> Iterator[None]:
         time.sleep(POLL)
 
 
-def _take(file: IO[bytes]) -> bool:
+def _take(number: int) -> bool:
     try:
         if sys.platform == "win32":
-            import msvcrt
-
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+            msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
         else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return sys.platform != "win32" and not isinstance(error, BlockingIOError)
     return True

@@ -22,7 +22,7 @@ import casadi as ca
 
 from hapticlink.components.component import Component, Variable
 from hapticlink.fmus import model_description
-from hapticlink.fmus.description_common import described
+from hapticlink.fmus.description_common import describe_component
 from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.fmu_functions import one_pass
@@ -83,7 +83,7 @@ def pack_entries(
 ) -> dict[str, bytes]:
     """As `entries`, with the files that hold the functions, and what the slave needs to know of
     them. engine: the text of a module whose functions replace these."""
-    described_as = described(component, **experiment)
+    described_as = describe_component(component, **experiment)
     own_equations = not engine
     run = reference_run(component, described_as.step_size) if own_equations else None
     files = {PAGE: documentation(component, run), **functions}

@@ -23,7 +23,7 @@ from hapticlink.orchestrator.scene.arguments import require, require_name
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.changes import (
-    check_changed,
+    check_change,
     choices,
     require_other_rate,
     settable,
@@ -138,8 +138,7 @@ class LiveRun:
             every = [key for c in system.connections if c.hold for key in names(c)]
             raise InputFault(unknown("connection with a hold", name, every))
         new = [
-            check_changed(system, self._connections.get(c.name, c), hold, delay)
-            for c in connections
+            check_change(system, self._connections.get(c.name, c), hold, delay) for c in connections
         ]
         for connection in new:
             held = self._simulation.make_hold(connection)

@@ -27,7 +27,7 @@ from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault
-from hapticlink.orchestrator.fmi.capabilities import ONCE, SERIALISED, STATE
+from hapticlink.orchestrator.fmi.description import ONCE, SERIALISED, STATE
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -76,7 +76,7 @@ def build_program(
                         "compiler": [compiler_version(), *FLAGS]}  # fmt: skip
 
             def make(folder: Path) -> Path:
-                return _build_checked(files, identifier, platforms, folder)
+                return _build_and_check(files, identifier, platforms, folder)
 
             path = cache.get_or_build(material, make, room, interrupt.raise_if_interrupted)
         except CompilerError as error:
@@ -142,7 +142,7 @@ def capabilities(program: Resolved) -> dict[str, str]:
     """What of CAPABILITIES the FMUs of others leave a program, as FMI 2.0 calls it."""
     flags = [foreign.description.flags for foreign in program.foreign.values()]
     capable = dict(CAPABILITIES)
-    for name in (STATE["2"], SERIALISED["2"]):
+    for name in (STATE["2"], SERIALISED):
         capable[name] = str(all(name in of for of in flags)).lower()
     capable[ONCE] = str(any(ONCE in of for of in flags)).lower()
     if flags:
@@ -158,7 +158,7 @@ def _resources(program: Resolved) -> Iterator[tuple[str, bytes]]:
                 yield f"resources/{id_}/{name}", content
 
 
-def _build_checked(
+def _build_and_check(
     files: Mapping[str, bytes], identifier: str, platforms: Sequence[str], folder: Path
 ) -> Path:
     """The FMU with a binary for each platform, written once FMPy finds nothing wrong with it."""

@@ -14,7 +14,7 @@ from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
 from hapticlink.fmus.native.native_fmu_entries import COMMON, WRAPPER
 from hapticlink.fmus.native.source import component_source, number, table
 from hapticlink.fmus.reproducible_zip import guid_of
-from hapticlink.orchestrator.fmi.capabilities import SERIALISED, STATE
+from hapticlink.orchestrator.fmi.description import SERIALISED, STATE
 from hapticlink.orchestrator.run.compiled import build as loop
 from hapticlink.programs.memory_as_c import Regions, TypedData
 from hapticlink.programs.ports import Port
@@ -134,7 +134,7 @@ def _scene(
             *(f"#define {name} {value}" for name, value in sizes.items()),
             f"#define START_SETTERS(s) {setters}",
             f"#define WITHOUT_STATE {_lacking(resolved, STATE['2'])}",
-            f"#define WITHOUT_BYTES {_lacking(resolved, SERIALISED['2'])}",
+            f"#define WITHOUT_BYTES {_lacking(resolved, SERIALISED)}",
             f"#define ALTERNATIVES(s) {'(s)->alternatives' if changes.choices else '((Hold **)0)'}",
             "#define MEMBERS(X) " + " ".join(
                 f"X({ids[fmu]}, {json.dumps(fmu)}, {json.dumps(guids[fmu])})" for fmu in members

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.capabilities import restores_state
 from hapticlink.orchestrator.run.compiled.state import Saved, StateBlock
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.system import Fmu, System
@@ -187,7 +186,7 @@ def _signal(column: str) -> Coordinate:
 
 def require_layout(fmu: Fmu) -> None:
     """Raises InputFault unless the FMU declares the layout of its serialised state."""
-    if fmu.description.states is None or not restores_state(fmu.description):
+    if fmu.description.states is None or not fmu.description.restores_state:
         raise InputFault(
             f"{fmu.name}: its FMU does not declare the layout of its serialised state, which the "
             "map needs (`States` in its annotation: docs/fmus.md); an FMU that replaces a block "

@@ -42,7 +42,7 @@ def near(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
 
 
 def out_of_reach(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:
-    """The pairs that can never touch; none if the scene turns the broad phase off."""
+    """The pairs that can never touch; none without a broad phase."""
     if not contacts.broad_phase:
         return ()
     return tuple(p for p in pairs(linkage, contacts) if not _can_touch(linkage, contacts, p))

@@ -63,8 +63,14 @@ class Contacts:
     (the report's local model); haptics: the mechanism detects them at every evaluation."""
     margin: Annotated[float, Quantity("m", ge=0)] = 0.01
     """Gap up to which the virtual environment reports a contact."""
-    broad_phase: bool = True
-    """Whether to leave out pairs of a body and an obstacle that can never touch."""
+    broad_phase = True
+    """Whether pairs that can never touch are left out."""
+
+
+class ContactsOfAllPairs(Contacts):
+    """Contacts with the pairs that can never touch, too."""
+
+    broad_phase = False
 
 
 @dataclass(frozen=True)

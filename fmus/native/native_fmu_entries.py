@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hapticlink.components.component import Component
 from hapticlink.fmus import model_description
-from hapticlink.fmus.description_common import described
+from hapticlink.fmus.description_common import describe_component
 from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.fmu_functions import GRAPHS
 from hapticlink.fmus.native.compiler import (
@@ -50,7 +50,7 @@ def entries(
     with GRAPHS:
         check_functions(component)
         header, pieces = component_source(component)
-        about = described(component, False, **experiment)
+        about = describe_component(component, False, **experiment)
         run = reference_run(component, about.step_size)
         files = {PAGE: documentation(component, run)}
     own = {path.name: path.read_bytes() for path in (WRAPPER, COMMON)}

@@ -21,8 +21,7 @@ from fmpy import fmi2
 
 from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
-from hapticlink.orchestrator.fmi import messages, process_cache, python_libraries
-from hapticlink.orchestrator.fmi.capabilities import restores_state
+from hapticlink.orchestrator.fmi import load_library, messages, process_cache
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.load_library import load_slave
@@ -34,7 +33,7 @@ from hapticlink.orchestrator.fmi.status import (
     FATAL,
     SHARE,
     STATUS,
-    ended_in_discard,
+    make_end_query,
     succeeded,
     worse,
 )
@@ -90,7 +89,7 @@ class InProcess(Instance):
                 raise self.raised(self.do_step, error) from error
             finally:
                 self._keep_arithmetic()
-            return self._settled(status, time)
+            return self._judge_status(status, time)
 
         self._advance: Callable[[float, float], int] = advance
 
@@ -99,12 +98,12 @@ class InProcess(Instance):
         slave = load_slave(
             self._library, about.fmi, about.guid, about.identifier, self._folder, self.name
         )
-        module = python_libraries.prepare(slave.dll, self._folder)
+        module = load_library.prepare(slave.dll, self._folder)
         self.holds_python = bool(module)
         slave.instantiate(loggingOn=True, **self._logging())
         if module and about.block is None:
             tell = partial(messages.keep_message, self._key, ERROR)
-            python_libraries.tell_exceptions(module, self.name, tell)
+            load_library.tell_exceptions(module, self.name, tell)
         return slave
 
     def _logging(self) -> dict[str, Any]:
@@ -115,7 +114,7 @@ class InProcess(Instance):
         """(time, size) -> status of a doStep."""
         do_step, component = self.slave.dll["fmi2DoStep"], self.slave.component
         do_step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
-        self._ended = ended_in_discard(self.slave)
+        self._ended = make_end_query(self.slave)
         forward = int(self.forward)
         return lambda time, size: do_step(component, time, size, forward)
 
@@ -127,9 +126,9 @@ class InProcess(Instance):
     @property
     def forward(self) -> bool:
         """noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to."""
-        return not restores_state(self.description)
+        return not self.description.restores_state
 
-    def _settled(self, status: int, time: float) -> int:
+    def _judge_status(self, status: int, time: float) -> int:
         """The status of a step from `time` (s) that returned `status`: ok where the FMU requests
         the end of the simulation by it."""
         if status == DISCARD and (end := self._ended(time)) is not None:
@@ -241,7 +240,7 @@ class InProcess(Instance):
 
     def after_step(self, status: int) -> None:
         """Ends a step whose doStep, called by the compiled loop, returned `status`."""
-        self.stepped(self._settled(status, self.place.begin))
+        self.stepped(self._judge_status(status, self.place.begin))
 
     def finish(self) -> None:
         """Nothing to wait for: `step` returns after doStep."""

@@ -35,6 +35,13 @@ from hapticlink.orchestrator.fmi.variables import (
 if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
     from hapticlink.components.component import Timing
 
+VARIABLE_STEP = "canHandleVariableCommunicationStepSize"
+NEEDS_TOOL = "needsExecutionTool"
+STATE = {"2": "canGetAndSetFMUstate", "3": "canGetAndSetFMUState"}
+SERIALISED = "canSerializeFMUstate"
+"""As FMI 2.0 calls it."""
+ONCE = "canBeInstantiatedOnlyOncePerProcess"
+"""FMI 2.0.5 section 4.3.1, FMI 3.0 section 4.3.1."""
 PLATFORMS = {"2": platform, "3": platform_tuple}
 """The folder of this platform in binaries/, by FMI version."""
 
@@ -73,6 +80,23 @@ class Description:
     clocks: tuple[clocks.FmiClock, ...] = ()
     block: str | None = None
     """The block of this project that it was built from; None for FMUs of others."""
+
+    @property
+    def has_event_mode(self) -> bool:
+        """Whether its importer may handle its events (FMI 3.0 section 4.3.1)."""
+        return self.fmi == "3" and "hasEventMode" in self.flags
+
+    @property
+    def varies_step(self) -> bool:
+        return VARIABLE_STEP in self.flags
+
+    @property
+    def restores_state(self) -> bool:
+        return STATE[self.fmi] in self.flags
+
+    @property
+    def gives_directional_derivatives(self) -> bool:
+        return f"providesDirectionalDerivative{'s' * (self.fmi == '3')}" in self.flags
 
     def port(self, name: str, *causalities: str) -> tuple[Scalar, ...]:
         """The entries of the vector `name` (or the scalar of exactly that name), sorted by index:

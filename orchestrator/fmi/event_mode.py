@@ -28,7 +28,6 @@ import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd
-from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, FmiClock
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
@@ -64,7 +63,7 @@ class InProcessWithEvents(InProcess3):
         self.in_c = False
         self.restored = 0
         """How often its state was restored."""
-        self._cuts = varies_step(self.description)
+        self._cuts = self.description.varies_step
         self.pending = Pending(np.zeros(len(self.outputs)))
         self.inputs: EventSetter | None = None
         """The newest that was called."""
@@ -106,7 +105,7 @@ class InProcessWithEvents(InProcess3):
         if not self.has_events:
             super().exit_initialization()
             return
-        self._clocks = tuple(self._told(clock) for clock in self._clocks)
+        self._clocks = tuple(self._with_interval(clock) for clock in self._clocks)
         self._plan(0.0, {c.reference for c in self._clocks if c.kind == "changing"})
         self._call("fmi3ExitInitializationMode")
         self._initialized = True
@@ -126,7 +125,7 @@ class InProcessWithEvents(InProcess3):
         """One that sets them in the mode in which it is called."""
         return super().connect(scalars, places)
 
-    def _told(self, clock: FmiClock) -> FmiClock:
+    def _with_interval(self, clock: FmiClock) -> FmiClock:
         """A periodic clock with the interval that the FMU tells in initialisation mode."""
         if clock.kind not in PERIODIC or clock.interval is not None:
             return clock
@@ -150,8 +149,8 @@ class InProcessWithEvents(InProcess3):
         do_step = super()._stepper()
         return partial(self._in_parts, do_step) if self.has_events else do_step
 
-    def _settled(self, status: int, time: float) -> int:
-        return status if self.has_events else super()._settled(status, time)
+    def _judge_status(self, status: int, time: float) -> int:
+        return status if self.has_events else super()._judge_status(status, time)
 
     def _in_parts(self, do_step: Callable[[float, float], int], time: float, size: float) -> int:
         """The status of a step from `time` over `size` (s), in parts that end at events."""

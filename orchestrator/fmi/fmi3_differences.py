@@ -15,7 +15,7 @@ from fmpy import fmi3
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.messages import keep_message
 from hapticlink.orchestrator.fmi.setter import Setting
-from hapticlink.orchestrator.fmi.start_values import wide
+from hapticlink.orchestrator.fmi.start_values import find_wide_integers
 from hapticlink.orchestrator.fmi.status import succeeded
 from hapticlink.orchestrator.fmi.transfer import as_signal
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
@@ -46,7 +46,7 @@ class InProcess3(InProcess):
 
         return advance
 
-    def _settled(self, status: int, time: float) -> int:
+    def _judge_status(self, status: int, time: float) -> int:
         if succeeded(status):
             _, ends, early = self.step_flags
             if ends:
@@ -72,7 +72,7 @@ class InProcess3(InProcess):
             if np.isnan(everything[place[name]]):
                 what = f"{name} has no start value in an array of this size; give start.{name}"
                 raise self._fault(what, 0.0)
-        exact = {n: v for n, v in wide(self.starts).items() if n in unconnected}
+        exact = {n: v for n, v in find_wide_integers(self.starts).items() if n in unconnected}
         return everything, into, self._transfers("Set", whole, everything, exact)
 
     def enter_initialization(self, stop_time: float) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
-from hapticlink.orchestrator.fmi.capabilities import has_event_mode
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.event_mode import InProcessWithEvents
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
@@ -11,6 +10,6 @@ from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 
 def in_process(description: Description) -> type[InProcess]:
     """The class of an FMU in this process, by its version of FMI and what it offers."""
-    if has_event_mode(description):
+    if description.has_event_mode:
         return InProcessWithEvents
     return {"2": InProcess, "3": InProcess3}[description.fmi]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
-from hapticlink.orchestrator.fmi import python_libraries
+from hapticlink.orchestrator.fmi import load_library
 from hapticlink.orchestrator.fmi.instance import StepState
 
 
@@ -20,7 +20,7 @@ class Saved:
         self._instance, self.state = ctypes.c_void_p(slave.component), ctypes.c_void_p()
         calls = (slave.dll[f"fmi{fmi}{verb}FMU{state}"] for verb in ("Get", "Set", "Free"))
         self.get, self.set, self.free_state = calls
-        self.overwrites = python_libraries.is_python(slave.dll)
+        self.overwrites = load_library.is_python(slave.dll)
 
     def save(self) -> int:
         self._place.saves += 1

@@ -13,7 +13,7 @@ EXACT = 2**53
 """Every integer of at most this magnitude is a double."""
 
 
-def fitting(scalar: Scalar, given: Given) -> Given:
+def fit_start_value(scalar: Scalar, given: Given) -> Given:
     """The value to set for a start value `given` by a scene: itself, or the number of an item of an
     enumeration that is given by its name.
 
@@ -49,7 +49,7 @@ Starts = tuple[tuple[Scalar, Given], ...]
 """Variables with their start values."""
 
 
-def wide(starts: Starts) -> dict[str, int]:
+def find_wide_integers(starts: Starts) -> dict[str, int]:
     """The 64-bit integers among `starts` that are larger than `EXACT`, by the variable's name."""
     return {
         s.name: v for s, v in starts if s.type in WIDE and isinstance(v, int) and abs(v) > EXACT

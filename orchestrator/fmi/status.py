@@ -47,7 +47,7 @@ def require_success(slave: Any) -> None:
     slave._call = checked
 
 
-def ended_in_discard(slave: Any) -> Callable[[float], float | None]:
+def make_end_query(slave: Any) -> Callable[[float], float | None]:
     """A function that returns, after a step from a time (s) was discarded, the time at which the
     FMU ended, None if it has not. pythonfmu 0.7 and pythonfmu3 0.3 say fmi2Terminated of every
     discard, so their FMUs are not asked."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.capabilities import STATE, restores_state
+from hapticlink.orchestrator.fmi.description import STATE
 from hapticlink.orchestrator.plan.operations import (
     Evaluate,
     Event,
@@ -97,7 +97,7 @@ def record(system: System, event: Event) -> Iterator[Operation]:
 def require_rollback(system: System, names: Iterable[str], what: str) -> None:
     """Raises InputFault with the FMUs of `names` that cannot save and restore their state; `what`
     needs it."""
-    unable = [n for n in names if not restores_state(system.fmu[n].description)]
+    unable = [n for n in names if not system.fmu[n].description.restores_state]
     if unable:
         flags = {STATE[system.fmu[n].description.fmi] for n in unable}
         raise InputFault(

@@ -34,58 +34,29 @@ def lock_folder(folder: Path) -> Iterator[None]:
     if _holders.get(key) == threading.get_ident():
         yield
         return
+    file = folder / ".run.lock"  # on Windows, where a folder has no lock of its own
     try:
-        with _try_lock(folder) as locked:
+        with lock.try_lock(file if sys.platform == "win32" else folder) as locked:
             if not locked:
+                known = f", in process {process}" if (process := find_process(folder)) else ""
                 raise InputFault(
-                    f"--out {folder}: another run writes there{_process(folder)}; wait for its "
-                    "end, or name another folder"
+                    f"--out {folder}: another run writes there{known}; wait for its end, or name "
+                    "another folder"
                 )
             _holders[key] = threading.get_ident()
             try:
                 yield
             finally:
                 del _holders[key]
+        file.unlink(missing_ok=True)
     finally:
         with suppress(OSError):  # it has results
             for path in missing:
                 path.rmdir()
 
 
-@contextmanager
-def _try_lock(folder: Path) -> Iterator[bool]:
-    """Whether the lock is held within the context: that of the folder itself; on Windows, where a
-    folder has none, of a file in it. A file system without locks gives it to everyone."""
-    if sys.platform == "win32":
-        path = folder / ".run.lock"
-        with lock.try_lock(path) as locked:
-            yield locked
-        if locked:
-            path.unlink(missing_ok=True)
-        return
-    import fcntl
-
-    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        try:
-            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            yield False
-            return
-        except OSError:
-            pass
-        try:
-            yield True
-        finally:
-            with suppress(OSError):  # forked processes may have the folder open, too
-                fcntl.flock(number, fcntl.LOCK_UN)
-    finally:
-        os.close(number)
-
-
-def _process(folder: Path) -> str:
-    """Which process the run in `folder` belongs to, as far as its run.json says so."""
+def find_process(folder: Path) -> int | None:
+    """The process ID of the run in progress in `folder`, from its run.json; None without one."""
     with suppress(InputFault, ValueError, LookupError, TypeError, AttributeError):
-        end = text_files.read_json(folder / "run.json")["end"]
-        return f", in process {int(end['process'])}"
-    return ""
+        return int(text_files.read_json(folder / "run.json")["end"]["process"])
+    return None

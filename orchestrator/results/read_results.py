@@ -276,7 +276,8 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector]:
     except csv.Error as error:  # a line without end
         raise InputFault(f"{path}: {error}: run the scene again") from error
     except ValueError as error:
-        raise InputFault(f"{path}: {_malformed(path) or error}: run the scene again") from error
+        line = _find_malformed_line(path)
+        raise InputFault(f"{path}: {line or error}: run the scene again") from error
     ordered = np.diff(values[:, 0], prepend=-math.inf) >= 0
     if not ordered.all():
         late = int(ordered.argmin())
@@ -291,7 +292,7 @@ def _require_file(path: Path) -> None:
         raise InputFault(f"{path}: not a regular file: run the scene again")
 
 
-def _malformed(path: Path) -> str:
+def _find_malformed_line(path: Path) -> str:
     """The first line of a CSV that has a value too many or too few, or one that is no number."""
     with path.open(encoding="utf-8", errors="replace", newline="") as file:
         names, *lines = csv.reader(file)

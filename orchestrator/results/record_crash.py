@@ -8,14 +8,15 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from hapticlink.orchestrator.base import temporary_folders, text_files
+from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 
 
 def record_crash(folder: Path, process: int) -> None:
     """Records in run.json that the run with the given process ID has crashed, and removes its
     temporary folders. Without a row of that run, only prints a message."""
-    from hapticlink.orchestrator.results.read_results import load  # slow to load
+    from hapticlink.orchestrator.results.folder_lock import find_process  # slow to load
+    from hapticlink.orchestrator.results.read_results import load
     from hapticlink.orchestrator.results.recover import recover
 
     temporary_folders.clear(process)
@@ -25,21 +26,12 @@ def record_crash(folder: Path, process: int) -> None:
         "an FMU may have crashed it: with isolate = true each FMU has a process of its own, and "
         "the run names the one that crashes"
     )
-    if _process(folder) != process:  # the crashed run has written no row
+    if find_process(folder) != process:  # the crashed run has written no row
         print(f"hapticlink: the process ended before its first row; {remedy}", file=sys.stderr)
         return
     message = f"the process of the run ended after t = {load(folder).last_time!r} s; {remedy}"
     recover(folder, "Crash", message, ended=True)
     print(f"hapticlink: {message}; results are in {folder}", file=sys.stderr)
-
-
-def _process(folder: Path) -> int | None:
-    """The process ID of the run in progress in `folder`, from its run.json; None without one."""
-    try:
-        process: int | None = text_files.read_json(folder / "run.json")["end"].get("process")
-    except (InputFault, LookupError, TypeError, AttributeError):
-        return None
-    return process
 
 
 def main() -> None:

@@ -148,7 +148,7 @@ def text(rows: Rows) -> bytes:
 
 def header(columns: tuple[str, ...]) -> bytes:
     """The first line of a table, also of its CSV."""
-    return ",".join(map(_quoted, columns)).encode() + b"\n"
+    return ",".join(map(_quote, columns)).encode() + b"\n"
 
 
 def write_csv(table: RowsFile, target: BinaryIO) -> None:
@@ -177,7 +177,7 @@ def _columns(line: bytes, path: Path) -> tuple[str, ...]:
         raise InputFault(f"{path}: its header names no columns: {error}") from error
 
 
-def _quoted(name: str) -> str:
+def _quote(name: str) -> str:
     """A column name in CSV (RFC 4180): names of matrix entries contain a comma, those of FMUs
     any printable character."""
     doubled = name.replace('"', '""')

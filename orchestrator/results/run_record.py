@@ -203,7 +203,6 @@ class RunEnding:
     """Why an FMU ran in a process of its own."""
     held_outputs: dict[str, int] = field(default_factory=dict)
     """How often outputs were held since they were not finite."""
-    """Number of steps that were repeated with smaller ones."""
     in_python: dict[str, str] = field(default_factory=dict)
     """The operations and holds that were carried out in Python rather than in C, with the
     reason."""

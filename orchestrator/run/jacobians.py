@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Matrix
-from hapticlink.orchestrator.fmi.capabilities import gives_directional_derivatives
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
@@ -64,7 +63,7 @@ def ways(
             tuple(s for c in incoming for s in c.inputs),
             tuple(p for c in incoming for p in signals.places(c)),
         )
-        if not gives_directional_derivatives(fmu.description):
+        if not fmu.description.gives_directional_derivatives:
             return None
         if any(s.type not in ("Real", "Float64") for s in (*through.outputs, *through.inputs)):
             return None

@@ -9,7 +9,7 @@ from functools import partial
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.capabilities import NEEDS_TOOL
+from hapticlink.orchestrator.fmi.description import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.isolated import Isolated

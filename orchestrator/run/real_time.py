@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run import concurrent_fmus
@@ -48,7 +47,7 @@ class RealTimeRun:
         simulation.beside, self._in_loop = concurrent_fmus.beside(plan)
         for clock in dict.fromkeys(simulation.beside.values()):
             fmus = [fmu for fmu in plan.system.fmus if simulation.beside.get(fmu.name) == clock]
-            longer = all(varies_step(fmu.description) for fmu in fmus)
+            longer = all(fmu.description.varies_step for fmu in fmus)
             simulation.sides[clock] = Side(longer, self.pace.now, self._worker(clock))
         try:
             yield

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 
 from hapticlink.orchestrator.base.errors import FmuFault
-from hapticlink.orchestrator.fmi import capabilities
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.instance import Instance, Vector
 from hapticlink.orchestrator.results.run_record import StepErrors
@@ -63,8 +62,8 @@ class StepCheck:
         return (
             description.declares_timing
             and description.timing == "continuous"
-            and capabilities.restores_state(description)
-            and capabilities.varies_step(description)
+            and description.restores_state
+            and description.varies_step
             and bool(_first_derivatives(description))
         )
 

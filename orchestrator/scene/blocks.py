@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.specs.contacts import ContactsOfAllPairs
 from hapticlink.components.specs.linkage import GraphicsCopy
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
@@ -106,7 +107,7 @@ def from_graphics(scene: Scene) -> FromGraphics:
 def _loop(scene: Scene, skip: bool) -> Iterator[BlockPlan]:
     """The blocks of the haptic loop in its order."""
     if not skip:
-        scene = _unskipped(scene)
+        scene = _with_all_outputs(scene)
     yield from _blocks_of_users(scene)
     if not scene.linkage:
         return
@@ -185,8 +186,8 @@ def others(scene: Scene) -> bool:
     return bool(linkage and (linkage.point or any("effort" in j.ports for j in linkage.joint)))
 
 
-def _unskipped(scene: Scene) -> Scene:
+def _with_all_outputs(scene: Scene) -> Scene:
     """The scene with all optional outputs of the mechanism and every pair of contacts."""
-    contacts = scene.contacts and replace(scene.contacts, broad_phase=False)
+    contacts = scene.contacts and ContactsOfAllPairs(**vars(scene.contacts))
     mechanism = replace(scene.mechanism, directions=True, diagnostics=True)
     return replace(scene, mechanism=mechanism, contacts=contacts)

@@ -151,6 +151,9 @@ _GONE: dict[Path, str] = {
     ("faults", "discard"): (
         "a step that an FMU discards ends the run: take it out, with a higher rate or `substeps`"
     ),
+    ("contacts", "broad_phase"): (
+        "pairs that can never touch are left out, to the same result: take it out"
+    ),
     ("device", "sensing"): "is a key of the scene: write `sensing` outside of [device]",
 }
 """Keys of earlier versions, with what to write instead."""

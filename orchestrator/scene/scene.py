@@ -229,6 +229,12 @@ class Scene:
             self.controller, {name: self.controllers.get(name, own) for name in self.devices}
         )
 
+    @property
+    def named_holds(self) -> dict[str, str]:
+        """The holds of single connections, of [holds] and of [[connection]] tables."""
+        own = {f"{w.from_} -> {w.to}": w.hold for w in self.connection if w.hold}
+        return {**self.holds, **own}
+
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""
         tables: dict[str, Any] = plain(self.plain())

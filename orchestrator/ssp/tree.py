@@ -110,7 +110,7 @@ def join_place(place: Place, *names: str) -> str:
     return ".".join((*place, *names)) or "the root system"
 
 
-def parse_checked(path: Path, entry: str, text: bytes, schema: str) -> Element:
+def parse_xml(path: Path, entry: str, text: bytes, schema: str) -> Element:
     """The XML tree of `text`. Raises InputFault unless it conforms to the schema of SSP 2.0, whose
     elements and namespaces include those of 1.0."""
     try:
@@ -144,12 +144,12 @@ def content(file: File, element: Element, where: str, space: str, kind: str) -> 
     entry, schema = element.get("source"), space.rpartition("/")[2]
     if entry:
         entry = file.resolved(entry)
-        return parse_checked(file.path, entry, read_xml(file.archive, entry), schema)
+        return parse_xml(file.path, entry, read_xml(file.archive, entry), schema)
     inside = next(element.iter(f"{{{space}}}{kind}"), None)
     if inside is None:
         raise InputFault(f"{file.path}: {where}: a {kind} has neither source nor content")
     inside.attrib.setdefault("version", "1.0")  # OMSimulator writes none in the .ssd
-    return parse_checked(file.path, where, tostring(inside), schema)
+    return parse_xml(file.path, where, tostring(inside), schema)
 
 
 @cache
@@ -172,7 +172,7 @@ class Tree:
     def root(self, file: File, place: Place = ()) -> tuple[Element, SsdElement]:
         """The content of an .ssd, and its root system as the element at `place`."""
         text = read_xml(file.archive, file.entry)
-        root = parse_checked(file.path, file.entry, text, "SystemStructureDescription")
+        root = parse_xml(file.path, file.entry, text, "SystemStructureDescription")
         element = root.find(f"{{{SSD}}}System")
         assert element is not None  # required by the schema
         return root, self._part(replace(file, units=units(root)), element, place, {})

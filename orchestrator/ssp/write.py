@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import re
-import zipfile
 from collections import Counter
 from dataclasses import fields
 from functools import partial
@@ -21,6 +20,7 @@ import pydantic
 
 from hapticlink.components.ports import BASES
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.fmus.reproducible_zip import write_zip
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
@@ -51,7 +51,6 @@ PREFIXES = {
     "hapticlink": RUN,
 }
 """libcosim and Ecos know elements by prefixes, these ones, not by namespaces."""
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip archive can hold
 
 
 def write_ssp(scene: Scene, system: System, target: Path) -> Path:
@@ -60,17 +59,11 @@ def write_ssp(scene: Scene, system: System, target: Path) -> Path:
     folders.ensure(target.parent)
     if target.is_dir():
         raise InputFault(f"{target}: is a folder; name a file in it, {target / 'scene.ssp'}")
-    with atomic_file(target) as unfinished, zipfile.ZipFile(unfinished, "w") as archive:
-        _add(archive, STRUCTURE, structure(scene, system, re.sub(r"\W|^(?=\d)", "_", target.stem)))
-        for unit in system.fmus:
-            _add(archive, f"resources/{unit.name}.fmu", unit.description.path.read_bytes())
+    name = re.sub(r"\W|^(?=\d)", "_", target.stem)
+    fmus = {f"resources/{u.name}.fmu": u.description.path.read_bytes() for u in system.fmus}
+    with atomic_file(target) as unfinished, unfinished.open("xb") as file:
+        write_zip({STRUCTURE: structure(scene, system, name), **fmus}, file)
     return target
-
-
-def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
-    info = zipfile.ZipInfo(name, EPOCH)
-    info.create_system, info.external_attr = 3, 0o644 << 16
-    archive.writestr(info, content, zipfile.ZIP_DEFLATED)
 
 
 def structure(scene: Scene, system: System, name: str) -> bytes:
@@ -201,8 +194,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
         scene, mode="json", by_alias=True, exclude_none=True, include=keys
     )
     tables["stop_when"] = scene.ends_when if system.ends_when else ""
-    own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
-    tables["holds"] = {**scene.holds, **own}
+    tables["holds"] = scene.named_holds
     rates = blocks(scene).rates
     if scene.graphics and "graphics" in rates.values():
         graphics = pydantic.TypeAdapter(type(scene.graphics))

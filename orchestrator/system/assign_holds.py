@@ -11,14 +11,15 @@ assigned to every connection across clocks that carries power, in either directi
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.scene_tables import Latency, PowerPort, SetSpring
+from hapticlink.orchestrator.scene.scene_tables import Latency, PowerPort
 from hapticlink.orchestrator.system import springs
+from hapticlink.orchestrator.system.haptic_loop import energy_in_play
 from hapticlink.orchestrator.system.ports import (
     between_plants,
     carries_power,
@@ -26,33 +27,22 @@ from hapticlink.orchestrator.system.ports import (
     kind,
     names,
 )
-from hapticlink.orchestrator.system.system import Connection, Fmu, Refused
-
-
-@dataclass(frozen=True)
-class Rules:
-    """What a scene states about its connections, for `assign`."""
-
-    hold: str = "zoh"
-    downsampling: str = "latest"
-    holds: Mapping[str, str] = field(default_factory=dict)
-    delays: Mapping[str, Latency] = field(default_factory=dict)
-    kinds: Mapping[str, str] = field(default_factory=dict)
-    power: tuple[PowerPort, ...] = ()
-    between_plants: str | None = None
-    """The hold between plants of one rate under coupling "iterated"; None for other couplings."""
-    springs: tuple[SetSpring, ...] = ()
+from hapticlink.orchestrator.system.system import Connection, EnergyPorts, Fmu, Refused
 
 
 def assign(
-    fmus: Iterable[Fmu], connections: Iterable[Connection], timeline: Timeline, rules: Rules
+    fmus: Iterable[Fmu],
+    connections: Iterable[Connection],
+    timeline: Timeline,
+    scene: Scene,
+    energy: EnergyPorts,
 ) -> tuple[tuple[Connection, ...], tuple[Refused, ...]]:
     """The connections with their holds, latencies and kinds, and the holds that were refused."""
     by_name = {u.name: u for u in fmus}
     refused: list[Refused] = []
-    assigned = tuple(_assign(connections, by_name, timeline, rules, refused))
-    assigned = tuple(_with_springs(assigned, by_name, rules, refused))
-    if rules.hold not in {c.hold for c in assigned}:
+    assigned = tuple(_assign(connections, by_name, timeline, scene, energy, refused))
+    assigned = tuple(_with_springs(assigned, by_name, scene.named_holds, energy, refused))
+    if scene.hold not in {c.hold for c in assigned}:
         # A default hold that fits no connection is an error. Between iterated plants it was the
         # interpolation that did not fit, which is replaced silently.
         refused = [
@@ -66,32 +56,35 @@ def _assign(
     connections: Iterable[Connection],
     fmus: Mapping[str, Fmu],
     timeline: Timeline,
-    rules: Rules,
+    scene: Scene,
+    energy: EnergyPorts,
     refused: list[Refused],
 ) -> Iterator[Connection]:
+    holds = scene.named_holds
+    between = scene.iteration.interpolation if scene.coupling == "iterated" else None
     for c in connections:
         if c.initial:
             yield c
             continue
         source, target = (fmus[n].clock for n in (c.source, c.target))
-        key = next((k for k in names(c) if k in rules.holds), None)
-        latency = next((rules.delays[k] for k in names(c) if k in rules.delays), None)
-        if latency and not (latency.min or latency.max or latency.loss):
-            latency = None  # of 0 s: as where none is named
-        hold = rules.holds[key] if key else None
+        key = next((k for k in names(c) if k in holds), None)
+        delay = next((scene.delays[k] for k in names(c) if k in scene.delays), Latency())
+        latency = delay if isinstance(delay, Latency) else Latency(min=delay)
+        late = bool(latency.min or latency.max or latency.loss)
+        hold = holds[key] if key else None
         if not key and source != target:
             longest, other = (timeline.clock(name).longest for name in (source, target))
-            if longest > other or HOLDS[rules.hold].needs == "power":
-                hold = rules.hold
+            if longest > other or HOLDS[scene.hold].needs == "power":
+                hold = scene.hold
             else:
-                hold = rules.downsampling if longest < other else "zoh"
-        elif latency and not hold:
+                hold = scene.downsampling if longest < other else "zoh"
+        elif late and not hold:
             hold = "zoh"
-        named = (rules.kinds[k] for k in names(c) if k in rules.kinds)
-        c = replace(c, latency=latency, kind=next(named, kind(c, fmus)))
-        iterated = rules.between_plants if between_plants(c, fmus) else None
+        named = (scene.kinds[k] for k in names(c) if k in scene.kinds)
+        c = replace(c, latency=latency if late else None, kind=next(named, kind(c, fmus)))
+        iterated = between if between_plants(c, fmus) else None
         hold = hold or iterated
-        reason = hold and why_unsuitable(hold, c, fmus, rules.power, iterated is not None)
+        reason = hold and why_unsuitable(hold, c, fmus, energy.power, iterated is not None)
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
             hold = "foh" if iterated and not _has_rows(c) else "zoh"
@@ -101,15 +94,16 @@ def _assign(
 def _with_springs(
     connections: Sequence[Connection],
     fmus: Mapping[str, Fmu],
-    rules: Rules,
+    holds: Mapping[str, str],
+    energy: EnergyPorts,
     refused: list[Refused],
 ) -> Iterator[Connection]:
     """The connections, with `zoh` where the hold needs a spring and has none that fits."""
     for c in connections:
         needs_one = c.needs == "spring"
-        reason = springs.misfit(c, rules.springs, connections, fmus) if needs_one else None
+        reason = springs.why_unlimited(c, energy.springs, connections, fmus) if needs_one else None
         if c.hold and reason:
-            key = next((k for k in names(c) if k in rules.holds), None)
+            key = next((k for k in names(c) if k in holds), None)
             refused.append(Refused(key, c, c.hold, reason))
             c = replace(c, hold="zoh")
         yield c
@@ -156,25 +150,15 @@ def why_unsuitable(
     return None
 
 
-def rules_of(scene: Scene, fmus: Collection[Fmu], connections: Collection[Connection]) -> Rules:
-    """The rules of `scene`. Power ports and springs of the scene come before those that its FMUs
-    declare, so that they take precedence."""
-    own = {f"{w.from_} -> {w.to}": w.hold for w in scene.connection if w.hold}
+def find_energy_ports(
+    scene: Scene, fmus: Collection[Fmu], connections: Collection[Connection]
+) -> EnergyPorts:
+    """Power ports and springs of the scene come before those that its FMUs declare, so that they
+    take precedence."""
     power = (
         PowerPort(effort=f"{u.name}.{port}", displacement=f"{u.name}.{p.displacement}", sign=p.sign)
         for u in fmus
         for port, p in u.description.power.items()
     )
-    delays = {
-        key: d if isinstance(d, Latency) else Latency(min=d) for key, d in scene.delays.items()
-    }
-    return Rules(
-        scene.hold,
-        scene.downsampling,
-        {**scene.holds, **own},
-        delays,
-        scene.kinds,
-        (*scene.power, *power),
-        scene.iteration.interpolation if scene.coupling == "iterated" else None,
-        (*scene.spring, *springs.find_declared_springs(fmus, connections)),
-    )
+    declared = springs.find_declared_springs(fmus, connections)
+    return EnergyPorts((*scene.power, *power), (*scene.spring, *declared), energy_in_play(scene))

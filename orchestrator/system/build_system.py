@@ -27,7 +27,7 @@ from hapticlink.orchestrator.system import (
     replacements,
     timed_events,
 )
-from hapticlink.orchestrator.system.assign_holds import assign, rules_of
+from hapticlink.orchestrator.system.assign_holds import assign, find_energy_ports
 from hapticlink.orchestrator.system.connections import check_partial_vectors, connect, with_texts
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.outputs_to_record import choose_outputs
@@ -35,7 +35,6 @@ from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
     Connection,
     Coupling,
-    EnergyPorts,
     Fmu,
     Recording,
     System,
@@ -76,8 +75,8 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
     fmus = tuple(with_texts(u, connections) for u in fmus)
-    rules = rules_of(scene, fmus, connections)
-    assigned, refused = assign(fmus, connections, time, rules)
+    energy = find_energy_ports(scene, fmus, connections)
+    assigned, refused = assign(fmus, connections, time, scene, energy)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
     if condition and not _has_output(fmus, condition):
         if scene.stop_when is not None:
@@ -91,11 +90,11 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
         Coupling(scene.coupling, scene.iteration, scene.substeps, read_again),
         condition,
         scene.faults,
-        EnergyPorts(rules.power, rules.springs, haptic_loop.energy_in_play(scene)),
+        energy,
         refused=refused,
     )
     problems += checks.check_system(scene, system)
-    problems += replacements.unfit(scene, replaced, rows, system)
+    problems += replacements.check_replacements(scene, replaced, rows, system)
     changes = timed_events.changes(scene, system, problems)
     written = choose_outputs(scene.record, system, problems)
     if problems:

@@ -6,7 +6,6 @@ from contextlib import suppress
 from dataclasses import replace
 
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.capabilities import varies_step
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import Latency
@@ -45,7 +44,7 @@ def with_hold(c: Connection, hold: str | None, delay: float | None) -> Connectio
     return replace(c, hold=hold or c.hold, latency=latency)
 
 
-def check_changed(
+def check_change(
     system: System, c: Connection, hold: str | None, delay: float | None
 ) -> Connection:
     """`held_by`. Raises InputFault where the hold does not fit, or cannot be changed in a run."""
@@ -64,7 +63,7 @@ def check_changed(
 
 def require_other_rate(system: System, clock: str) -> None:
     """Raises InputFault where a run cannot change the rate of a clock."""
-    fixed = [f.name for f in system.fmus if f.clock == clock and not varies_step(f.description)]
+    fixed = [f.name for f in system.fmus if f.clock == clock and not f.description.varies_step]
     if fixed:
         raise InputFault(f"rate of {clock}: {fixed[0]} takes steps of one size only")
     for c in system.connections:
@@ -80,7 +79,7 @@ def choices(system: System, c: Connection) -> list[str]:
     holds = [c.hold or ""]
     for hold in HOLDS:
         with suppress(InputFault):
-            check_changed(system, c, hold, None)
+            check_change(system, c, hold, None)
             holds += [hold] if hold != c.hold else []
     return holds
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from hapticlink.orchestrator.base.errors import near
-from hapticlink.orchestrator.fmi.capabilities import VARIABLE_STEP, varies_step
+from hapticlink.orchestrator.fmi.description import VARIABLE_STEP
 from hapticlink.orchestrator.fmi.units import why_unsuitable
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
@@ -44,7 +44,7 @@ def check_system(scene: Scene, system: System) -> Iterator[Problem]:
             yield ("get_after_set",), f"{name!r} {why}"
     for i, p in enumerate(scene.power):
         yield from _power(i, p, system.fmu)
-    yield from springs.unfit(scene, system.fmu)
+    yield from springs.check_springs(scene, system.fmu)
     yield from _step_sizes(system)
     yield from _check_iterated(system)
 
@@ -95,7 +95,7 @@ def _step_sizes(system: System) -> Iterator[Problem]:
     timeline, seconds = system.timeline, system.timeline.seconds
     for fmu in system.fmus:
         clock = timeline.clock(fmu.clock)
-        if clock.first == clock.period or varies_step(fmu.description):
+        if clock.first == clock.period or fmu.description.varies_step:
             continue
         least = seconds(min(clock.first, clock.shortest))
         yield (

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.description import Description, describe
 from hapticlink.orchestrator.fmi.process_cache import describe_once
-from hapticlink.orchestrator.fmi.start_values import Starts, fitting
+from hapticlink.orchestrator.fmi.start_values import Starts, fit_start_value
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import ForeignFmu, Value
@@ -91,7 +91,7 @@ def _start(description: Description, name: str, value: Value) -> Starts:
     values = tuple(entries_of(value, scalars[-1].indices, name))
     if len(values) != len(scalars):
         raise ValueError(f"{len(values)} values for the {len(scalars)} of {name}")
-    return tuple((s, fitting(s, given)) for s, given in zip(scalars, values, strict=True))
+    return tuple((s, fit_start_value(s, given)) for s, given in zip(scalars, values, strict=True))
 
 
 def entries_of(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:

@@ -38,7 +38,7 @@ def map_ports(
             hint = "what it has with other settings alone is fed by a [[connection]]"
             raise ValueError(f"{there}; {hint}")
         renamings[port] = tuple(s.name for s in _find_scalars(description, names))
-        if len(renamings[port]) != (size := len(_places(ports[port][0]))):
+        if len(renamings[port]) != (size := ports[port][0].size):
             raise ValueError(f"{len(renamings[port])} variables for the {size} entries of {port}")
         if {s.name for s in description.scalars if port in (s.name, s.port)} - {*renamings[port]}:
             raise ValueError(f"the FMU has a port {port} of its own: take {port} out of the map")
@@ -55,12 +55,12 @@ def map_ports(
 
 
 def rename_ports(description: Description, names: Mapped, block: Component) -> Description:
-    """The description with the scalars of `mapped` under the block's names."""
+    """The description with the scalars of `names` under the block's names."""
     every = {v.name: v for v in (*block.inputs, *block.outputs, *block.parameters)}
     new = {
-        own: f"{port}{place}"
+        own: name
         for port, given in names.items()
-        for own, place in zip(given, _places(every[port]), strict=True)
+        for own, name in zip(given, every[port].names, strict=True)
     }
     return replace(
         description,
@@ -116,12 +116,6 @@ def _find_scalars(description: Description, names: str | tuple[str, ...]) -> Ite
             known = dict.fromkeys(s.port for s in description.scalars)
             raise ValueError(unknown("variable of the FMU", name, known))
         yield from sorted(there, key=lambda s: s.indices)
-
-
-def _places(variable: Variable) -> list[str]:
-    """The index of each entry as it is written: [1], [2], ...; "" of a scalar."""
-    places = product(*(range(1, n + 1) for n in variable.shape))
-    return [f"[{','.join(map(str, place))}]" if place else "" for place in places]
 
 
 def _alike(variable: Variable, scalars: Iterable[Scalar]) -> tuple[str, ...]:

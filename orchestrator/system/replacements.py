@@ -64,7 +64,7 @@ def replacements(
     }
 
 
-def unfit(
+def check_replacements(
     scene: Scene, blocks: Mapping[str, Component], rows: Iterable[Wire], system: System
 ) -> Iterator[Problem]:
     """FMUs none of whose outputs reaches another FMU, though those of the block that they replace
@@ -89,10 +89,10 @@ def unfit(
         }
         message = (
             f"none of its outputs reaches another FMU, so that it is no {name}: that block gives "
-            f"{_listed(gives)} and takes {_listed(takes)}; "
-            f"the FMU has outputs {_listed(has['output'])} and inputs {_listed(has['input'])}. "
-            "Give it ports of these names, say what it calls them (map, --map), or lead a "
-            "[[connection]] from it"
+            f"{_write_ports(gives)} and takes {_write_ports(takes)}; "
+            f"the FMU has outputs {_write_ports(has['output'])} and inputs "
+            f"{_write_ports(has['input'])}. Give it ports of these names, say what it calls them "
+            "(map, --map), or lead a [[connection]] from it"
         )
         yield ("fmu", i, "replaces"), message
 
@@ -102,7 +102,7 @@ def _port(variable: Variable) -> str:
     return f"{variable.name}[{size}]" if size else variable.name
 
 
-def _listed(ports: Iterable[str]) -> str:
+def _write_ports(ports: Iterable[str]) -> str:
     names = [*ports]
     more = f" and {len(names) - MAX_PORTS} more" if len(names) > MAX_PORTS else ""
     return ", ".join(names[:MAX_PORTS]) + more if names else "none"

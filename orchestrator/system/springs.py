@@ -57,7 +57,7 @@ def find_limited_gains(system: System) -> set[str]:
     }
 
 
-def misfit(
+def why_unlimited(
     c: Connection,
     springs: Iterable[SetSpring],
     connections: Collection[Connection],
@@ -87,7 +87,7 @@ def misfit(
     return None
 
 
-def unfit(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
+def check_springs(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     """A finding for each [[spring]] with ports that do not exist or that do not fit together."""
     for i, s in enumerate(scene.spring):
         fmu = s.set_position.partition(".")[0]

@@ -30,13 +30,13 @@ def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[Inpu
         for key, asked in (("set", event.set), ("override", event.override)):
             for name, value in asked.items():
                 with collect_problem(problems, ("at", i, key, name)):
-                    taken.append(events.given(event, key, name, value))
+                    taken.append(events.set_value(event, key, name, value))
         for name in event.freeze:
             with collect_problem(problems, ("at", i, "freeze")):
-                taken.append(events.brought(event, name, 0.0))
+                taken.append(events.disturb(event, name, 0.0))
         for name, noise in event.noise.items():
             with collect_problem(problems, ("at", i, "noise", name)):
-                taken.append(events.brought(event, name, noise))
+                taken.append(events.disturb(event, name, noise))
         problems += ((("at", i, key), why) for key, why in _times(event))
     end = system.timeline.seconds(system.timeline.end)
     return tuple(sorted((c for c in taken if c.begin < end), key=lambda change: change.begin))
@@ -56,7 +56,7 @@ class _Events:
     def __init__(self, scene: Scene, system: System) -> None:
         self._scene, self._system = scene, system
 
-    def given(self, event: TimedEvent, key: str, name: str, value: Value) -> InputChange:
+    def set_value(self, event: TimedEvent, key: str, name: str, value: Value) -> InputChange:
         """A value that is set once, or that overrides a connection."""
         if name == GRAPHICS_RATE and key == "set":
             begin = self._begin("graphics", event.time)
@@ -78,7 +78,7 @@ class _Events:
             event, name, text, inputs=scalars, values=_numbers(name, value, scalars)
         )
 
-    def brought(self, event: TimedEvent, name: str, noise: float) -> InputChange:
+    def disturb(self, event: TimedEvent, name: str, noise: float) -> InputChange:
         """An input that is frozen, or gets noise."""
         fed = feeding(self._system, name)
         self._require_disturbable(name, fed)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.components.port_space import PLANE
-from hapticlink.fmus.description_common import described as of_component
+from hapticlink.fmus.description_common import describe_component as of_component
 from hapticlink.fmus.errors import InvalidUnit
 from hapticlink.fmus.model_description import files
 from hapticlink.fmus.scalar_variables import find_feed_through, initial_dependencies

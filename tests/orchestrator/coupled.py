@@ -1,6 +1,7 @@
 """Small systems of real FMUs for tests of couplings, with answers known in closed form."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,11 +19,10 @@ from hapticlink.orchestrator.results.read_results import Table
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import Outcome, run
 from hapticlink.orchestrator.scene.scene_tables import Iteration, PowerPort, SetSpring
-from hapticlink.orchestrator.system.assign_holds import Rules
 from hapticlink.orchestrator.system.system import Coupling, EnergyPorts, Fmu, System
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 from tests.orchestrator.native_mass import POWER, ROWS, SPRINGS, exact, matrix
-from tests.orchestrator.systems import connected
+from tests.orchestrator.systems import BARE, connected
 
 HERMITE = [*ROWS, ("one.a", "two.a1")]
 """der(F) of `two` needs the acceleration of `one`."""
@@ -79,10 +79,13 @@ def system(
     units = tuple(Fmu(name, fmu, "haptics") for name, fmu in fmus.items())
     rows = list(rows)
     holds = dict.fromkeys(dict(rows), hold) if isinstance(hold, str) else hold or {}
-    rules = Rules(holds=holds, between_plants=between, power=power, springs=springs)
-    connections, _ = connected(units, rows, timeline, rules)
+    iteration = Iteration(interpolation=between or "foh")
+    scheme = "iterated" if between else "gauss-seidel"
+    bare = replace(BARE, holds=holds, coupling=scheme, iteration=iteration)
+    energy = EnergyPorts(power, springs)
+    connections, _ = connected(units, rows, timeline, bare, energy)
     how = Coupling(coupling, substeps=dict.fromkeys(fmus, substeps), **others)
-    return System(units, connections, timeline, how, energy=EnergyPorts(power, springs))
+    return System(units, connections, timeline, how, energy=energy)
 
 
 def masses(

@@ -5,12 +5,16 @@ from dataclasses import replace
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.assign_holds import assign
 from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.orchestrator.system.connections import connect
-from hapticlink.orchestrator.system.system import Connection, Fmu, Refused, System
+from hapticlink.orchestrator.system.system import Connection, EnergyPorts, Fmu, Refused, System
+
+BARE = Scene(title="", duration=1.0)
+NO_ENERGY = EnergyPorts()
 
 
 def system_of(scene: object, *options: str) -> System:
@@ -28,11 +32,12 @@ def connected(
     fmus: Sequence[Fmu],
     rows: Iterable[tuple[str, str]],
     timeline: Timeline,
-    rules: Rules | None = None,
+    scene: Scene = BARE,
+    energy: EnergyPorts = NO_ENERGY,
 ) -> tuple[tuple[Connection, ...], tuple[Refused, ...]]:
     """The connections of `rows` (source, target), and the holds that were refused."""
     problems: list[Problem] = []
     wires = [((), Wire(from_=source, to=target)) for source, target in rows]
     made = [c for _, c in connect(wires, {u.name: u.description for u in fmus}, problems)]
     assert not problems
-    return assign(fmus, made, timeline, rules or Rules())
+    return assign(fmus, made, timeline, scene, energy)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, islice
 
+from hapticlink.components.specs.contacts import ContactsOfAllPairs
 from hapticlink.orchestrator.base.errors import COUNTED
 from hapticlink.orchestrator.scene.blocks import blocks as plan_blocks
 from hapticlink.orchestrator.scene.checks import blocks, contacts, fmus, linkage, numbers
@@ -22,7 +23,7 @@ def check_scene(scene: Scene) -> list[Problem]:
     )
     if shapes and scene.contacts:
         # The broad phase needs a valid tree and valid polygons.
-        scene = replace(scene, contacts=replace(scene.contacts, broad_phase=False))
+        scene = replace(scene, contacts=ContactsOfAllPairs(**vars(scene.contacts)))
     planned = plan_blocks(scene)
     rest = chain(
         _condition(scene),

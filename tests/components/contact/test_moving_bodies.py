@@ -152,7 +152,7 @@ def test_a_link_that_pushes_a_disc():
     assert events >= 3
 
     def start():
-        both = block(linkage, {"broad_phase": False}).put(q=(0, 0.3, reach + 0.005, 0.7))
+        both = block(linkage).put(q=(0, 0.3, reach + 0.005, 0.7))
         return both.set(F_hand=(0, 0, torque))
 
     without_turn = [0, 1, 2, 4, 5, 6]

@@ -5,6 +5,7 @@ test_scene.py."""
 
 import pytest
 
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene import read_and_check
 from tests.orchestrator.scene.test_scene import GOOD
@@ -259,3 +260,8 @@ def test_what_is_refused(scene, options, message):
 @pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
 def test_rates_and_times_out_of_any_range(key, value):
     assert f"--set {key}={value}: {key}: " in refused("closed-loop", f"{key}={value}")
+
+
+def test_a_key_that_is_gone_says_what_to_do() -> None:
+    with pytest.raises(InputFault, match="are left out, to the same result: take it out"):
+        open_scene.load("obstacles", ["contacts.broad_phase=false"])

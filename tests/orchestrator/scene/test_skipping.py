@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hapticlink.components.specs.contacts import Contacts
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Table
@@ -46,9 +47,11 @@ def test_directions_without_a_topology_controller_change_no_bit(tmp_path):
     same(without, shown)
 
 
-def test_bodies_out_of_reach_change_nothing(tmp_path):
+def test_bodies_out_of_reach_change_nothing(tmp_path, monkeypatch):
     near = haptics("obstacles", tmp_path / "near")
-    every = haptics("obstacles", tmp_path / "every", "contacts.broad_phase=false")
+    monkeypatch.setenv("HAPTICLINK_CACHE", "off")
+    monkeypatch.setattr(Contacts, "broad_phase", False)
+    every = haptics("obstacles", tmp_path / "every")
     same(near, every, 1e-13)
 
 

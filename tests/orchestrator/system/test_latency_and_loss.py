@@ -14,18 +14,19 @@ from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.scene_tables import Latency
-from hapticlink.orchestrator.system.assign_holds import Rules, assign
+from hapticlink.orchestrator.system.assign_holds import assign
 from hapticlink.orchestrator.system.latency_and_loss import SampleLink
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import EnergyPorts, System
 from tests.orchestrator.plan.test_plan import timelines
+from tests.orchestrator.systems import BARE
 from tests.orchestrator.timelines import CAUSAL, fixed
 
 LATE = "graphics.stamp -> controller.g"
 
 
 def late(system: System, delays: dict[str, Latency], hold: str = "zoh") -> System:
-    rules = Rules(hold=hold, delays=delays)
-    assigned, _ = assign(system.fmus, system.connections, system.timeline, rules)
+    scene = replace(BARE, hold=hold, delays=delays)
+    assigned, _ = assign(system.fmus, system.connections, system.timeline, scene, EnergyPorts())
     return replace(system, connections=assigned)
 
 
