@@ -19,7 +19,7 @@ from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.event_kinds import key_of
-from hapticlink.orchestrator.plan.operations import Event, Push
+from hapticlink.orchestrator.plan.operations import Event, Instruction, Push
 from hapticlink.orchestrator.plan.plan import Plan, moments
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
@@ -28,7 +28,7 @@ from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
-from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample, instructions
+from hapticlink.orchestrator.run.instructions import Move, Sample, instructions
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import build_system

@@ -18,7 +18,7 @@ from typing import Protocol
 
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.plan.operations import Event, Firing, Step
+from hapticlink.orchestrator.plan.operations import Event, Firing, OfFmu, Step
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled import structures
 
@@ -140,7 +140,7 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
     for clock in system.timeline.clocks[1:]:
         block = plan.block(Event(False, (Firing(clock.name, clock.longest, False),)))
         for fmu in (u for u in system.fmus if u.clock == clock.name):
-            own = [op for op in block if getattr(op, "fmu", None) == fmu.name]
+            own = [op for op in block if isinstance(op, OfFmu) and op.fmu == fmu.name]
             steps = [op for op in own if isinstance(op, Step)]
             if system.coupling.scheme == "iterated":
                 unable[fmu.name] = "its steps may be repeated"

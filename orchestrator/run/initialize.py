@@ -90,7 +90,7 @@ def _solve(fmus: LoadedFmus, settled: np.ndarray, first: Vector, sweep: Callable
         agree[places] = np.abs(solution.residual) <= TOLERANCE * (1.0 + np.abs(solution.point))
         before = values.copy()
         before[places] = solution.point
-        _raise_unsettled(fmus, agree, before)
+        _raise_unconverged(fmus, agree, before)
 
 
 def _jacobian(fmus: LoadedFmus, places: list[int]) -> Callable[[], Matrix | None]:
@@ -119,7 +119,7 @@ def _jacobian(fmus: LoadedFmus, places: list[int]) -> Callable[[], Matrix | None
     return jacobian
 
 
-def _raise_unsettled(fmus: LoadedFmus, agree: np.ndarray, before: Vector) -> None:
+def _raise_unconverged(fmus: LoadedFmus, agree: np.ndarray, before: Vector) -> None:
     signals = fmus.signals
     for fmu in fmus.system.fmus:
         span = signals.fmu(fmu.name)
