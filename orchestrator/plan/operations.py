@@ -49,19 +49,22 @@ class Signals(NamedTuple):
 class Instruction:
     """What is declared of every operation.
 
-    code: its number in loop.h, PYTHON where it has none, with the reason `why_in_python`.
-    concurrent: whether FMUs in processes of their own may be stepping meanwhile. observes: whether
-    it leaves FMUs, holds and signals as they are, and writes rows, measures, or ends the run.
+    code: its number in loop.h, PYTHON where it has none, with the reason `why_in_python`. b, x: the
+    fields that are these numbers of its record there, if any. concurrent: whether FMUs in processes
+    of their own may be stepping meanwhile. observes: whether it leaves FMUs, holds and signals as
+    they are, and writes rows, measures, or ends the run.
     """
 
     code: ClassVar[str] = "PYTHON"
+    b: ClassVar[str] = ""
+    x: ClassVar[str] = ""
     why_in_python: ClassVar[str] = ""
     concurrent: ClassVar[bool] = False
     observes: ClassVar[bool] = False
 
     def numbers(self, system: System) -> dict[str, float]:
-        """What its record in loop.h has behind `a`, the object that it works on: b, c, d, x."""
-        return {}
+        """The numbers of its record beside the object that it works on, by their names there."""
+        return {slot: getattr(self, name) for slot in "bx" if (name := getattr(self, slot))}
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
         """The places to which it brings samples, each with the stamp of these."""
@@ -93,10 +96,7 @@ class Get(OfFmu):
 
     ahead: int = 0
     judged: bool = True
-    code = "GET"
-
-    def numbers(self, system: System) -> dict[str, float]:
-        return {"b": self.judged}
+    code, b = "GET", "judged"
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
         yield ("outputs", self.fmu), self.ahead
@@ -110,10 +110,7 @@ class Push(OfHold):
     """Push the newest sample of its source into a hold; its stamp is `ahead` of this tick."""
 
     ahead: int = 0
-    code = "PUSH"
-
-    def numbers(self, system: System) -> dict[str, float]:
-        return {"b": self.ahead}
+    code, b = "PUSH", "ahead"
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
         source = system.connection[self.connection].source
@@ -143,10 +140,7 @@ class Evaluate(_Evaluation):
     of the step for a plant, 0 for a sampled block."""
 
     ahead: Fraction = Fraction(0)
-    code = "EVALUATE"
-
-    def numbers(self, system: System) -> dict[str, float]:
-        return {"x": float(self.ahead)}
+    code, x = "EVALUATE", "ahead"
 
 
 @dataclass(frozen=True)

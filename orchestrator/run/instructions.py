@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 from hapticlink.orchestrator.plan.operations import Get, Instruction, Operation, Set, Step
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.system import System
 
 
 @dataclass(frozen=True)
@@ -29,10 +28,7 @@ class Sample(OfMeter):
     """The meter of a connection takes a sample of its source, stamped `ahead` of the tick."""
 
     ahead: int
-    code = "SAMPLE"
-
-    def numbers(self, system: System) -> dict[str, float]:
-        return {"b": self.ahead}
+    code, b = "SAMPLE", "ahead"
 
 
 @dataclass(frozen=True)
@@ -40,10 +36,7 @@ class Move(OfMeter):
     """The meter of a connection takes the displacement of its target, `ahead` of the tick."""
 
     ahead: int
-    code = "MOVE"
-
-    def numbers(self, system: System) -> dict[str, float]:
-        return {"b": self.ahead}
+    code, b = "MOVE", "ahead"
 
 
 @dataclass(frozen=True)
@@ -51,11 +44,8 @@ class Feed(OfMeter):
     """The meter of a connection takes the effort that its target holds over a `share` of a step."""
 
     share: float
-    code = "FEED"
+    code, x = "FEED", "share"
     concurrent = True
-
-    def numbers(self, system: System) -> dict[str, float]:
-        return {"x": self.share}
 
 
 @dataclass(frozen=True)
