@@ -133,7 +133,7 @@ class Side:
         return hung.name
 
 
-def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
+def find_concurrent(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
     """The FMUs whose steps can be taken beside the haptic loop, with their clocks, and those of
     other clocks than the haptic one that cannot, with the reason."""
     system, able, unable = plan.system, {}, {}
@@ -154,7 +154,7 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
 def require_concurrent(plan: Plan) -> dict[str, str]:
     """The FMUs whose steps can be taken beside the haptic loop, with their clocks. Raises
     InputFault where one that cannot is on another computer: the loop would wait for it."""
-    able, unable = beside(plan)
+    able, unable = find_concurrent(plan)
     for fmu in plan.system.fmus:
         if fmu.served and fmu.name not in able:
             why = unable.get(fmu.name, "it is at the haptic rate")

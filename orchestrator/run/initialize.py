@@ -99,21 +99,21 @@ def _jacobian(fmus: LoadedFmus, places: list[int]) -> Callable[[], Matrix | None
     none."""
     signals = fmus.signals
     moved = [c for c in fmus.system.connections if {*places} & {*signals.sources(c)}]
-    ways = jacobians.ways(fmus, moved, places)
+    every = jacobians.find_derivatives(fmus, moved, places)
     held = [(signals.hold(c.name), signals.sources(c)) for c in moved if c.hold]
 
     def jacobian() -> Matrix | None:
-        if ways is None:
+        if every is None:
             return None
         tangent = np.zeros((len(signals.values), len(places)))
         tangent[places] = np.eye(len(places))
-        for way in ways:
+        for partial in every:
             for taken, sources in held:
                 tangent[taken] = tangent[sources]
-            through = way.of(tangent)
+            through = partial.of(tangent)
             if through is None:
                 return None
-            tangent[list(way.rows)] = through
+            tangent[list(partial.rows)] = through
         return tangent[places] - np.eye(len(places))
 
     return jacobian
