@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,9 @@ from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
-from hapticlink.orchestrator.plan.event_kinds import key_of
-from hapticlink.orchestrator.plan.operations import Event, Push
-from hapticlink.orchestrator.plan.plan import Plan, moments
+from hapticlink.orchestrator.plan.event_kinds import key_of, keyed_events
+from hapticlink.orchestrator.plan.operations import Event, Instruction, Push
+from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled import fmus as compiled_fmus
 from hapticlink.orchestrator.run.compiled import structures
@@ -28,7 +27,7 @@ from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
-from hapticlink.orchestrator.run.instructions import Instruction, Move, Sample, instructions
+from hapticlink.orchestrator.run.instructions import Move, Sample, instructions
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import build_system
@@ -292,20 +291,15 @@ def _start_setter(simulation: Simulation, fmu: str, c: structures.Setter, memory
     return setter
 
 
-def _kinds(timeline: Timeline) -> Iterator[Event]:
+def _kinds(timeline: Timeline) -> list[Event]:
     """All kinds of events of a timeline without an end: up to where the pattern of its periodic
     clocks repeats, or a list of communication points ends."""
     ends = [clock.starts[-1] for clock in timeline.clocks if isinstance(clock.starts, tuple)]
     clocks = tuple(replace(clock, starts=_endless(clock.starts)) for clock in timeline.clocks)
     repeats = math.lcm(*(_repeats(clock.starts) for clock in clocks))
     until = min(ends) if ends else max(clock.first for clock in clocks) + repeats
-    kinds: dict[Event, None] = {}
     endless = replace(timeline, clocks=clocks, end=NO_END)
-    for tick, event in islice(moments(endless), MAX_EVENTS):
-        if tick >= until:
-            break
-        kinds.setdefault(event)
-    yield from kinds
+    return [*keyed_events(endless, until - 1, MAX_EVENTS)[1]]
 
 
 def _endless(starts: Sequence[int]) -> Sequence[int]:

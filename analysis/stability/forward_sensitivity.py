@@ -21,7 +21,7 @@ operation is differentiated once.
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,6 +46,10 @@ from hapticlink.orchestrator.plan.operations import (
     Blend,
     Evaluate,
     Get,
+    Instruction,
+    OfFmu,
+    OfHold,
+    Place,
     Push,
     Repeat,
     Rollback,
@@ -53,7 +57,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     flat,
 )
-from hapticlink.orchestrator.run.instructions import Finish, Instruction
+from hapticlink.orchestrator.run.instructions import Finish
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -117,8 +121,8 @@ class ForwardSensitivity:
         """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
         what they are told is the same with any."""
         for operation, *rest in list(self._known):
-            own = isinstance(operation, Step | Get) and operation.fmu in fmus
-            if own or isinstance(operation, Repeat):
+            own = isinstance(operation, OfFmu) and operation.fmu in fmus
+            if (own and not isinstance(operation, Set)) or isinstance(operation, Repeat):
                 del self._known[operation, *rest]
 
     def begin(self) -> None:
@@ -135,7 +139,7 @@ class ForwardSensitivity:
         if reach is None:
             call(tick)
             return None
-        of_fmu = isinstance(operation, Get | Set | Step)
+        of_fmu = isinstance(operation, OfFmu)
         since = b"" if of_fmu else reach.state.ages(tick, self._gives_sample(operation))
         found = reach.applied.get(since)
         if found and of_fmu:  # at rest it would change nothing
@@ -340,37 +344,34 @@ class ForwardSensitivity:
 
     def _found(self, operation: Instruction) -> Reach | None:
         """None for what changes no state: meters, barriers."""
-        simulation = self._simulation
-        system, signals = simulation.system, simulation.signals
-        every = np.arange(len(signals.values))
-
-        def reach(fmus: set[str], holds: set[str], reads: Any = (), writes: Any = ()) -> Reach:
-            state = StateVector(simulation, fmus, holds)
-            return Reach(state, np.array(reads, dtype=np.intp), np.array(writes, dtype=np.intp))
-
+        simulation, system = self._simulation, self._simulation.system
+        every = np.arange(len(simulation.signals.values))
         match operation:
-            case Get(fmu):
-                return reach({fmu}, set(), (), every[signals.fmu(fmu)])
-            case Set(fmu):
-                into = system.into(fmu)
-                places = {p for c in into for p in (*signals.places(c), *signals.sources(c))}
-                return reach({fmu}, set(), sorted(places))
-            case Step(fmu):
-                return reach({fmu}, set())
-            case Push(connection) | Evaluate(connection) | Blend(connection):
-                c = system.connection[connection]
-                shared = HOLDS[c.hold or ""].needs
-                holds = set(blocks(simulation)) - set(simulation.holds) if shared else set()
-                writes = [*every[signals.hold(connection)]]
-                pushed = isinstance(operation, Push)
-                reads = every if shared else signals.sources(c) if pushed else writes
-                written = every if shared else () if pushed else writes
-                return reach(set(), {connection} | holds, reads, written)
             case Repeat(body=body):
                 fmus = {op.fmu for op in flat(body) if isinstance(op, Step)}
-                return reach(fmus, set(blocks(simulation)), every, every)
-            case _:
-                return None
+                return Reach(StateVector(simulation, fmus, set(blocks(simulation))), every, every)
+            case OfHold(connection) if HOLDS[system.connection[connection].hold or ""].needs:
+                shared = set(blocks(simulation)) - set(simulation.holds)
+                state = StateVector(simulation, set(), {connection} | shared)
+                return Reach(state, every, every)
+        touched = operation.signals(system)
+        if touched is None:
+            return None
+        fmus = {operation.fmu} if isinstance(operation, OfFmu) else set()
+        holds = {operation.connection} if isinstance(operation, OfHold) else set()
+        reads, writes = map(self._indices, touched)
+        return Reach(StateVector(simulation, fmus, holds), reads, writes)
+
+    def _indices(self, places: Iterable[Place]) -> NDArray[np.intp]:
+        """The indices of places in the signal vector."""
+        system, signals = self._simulation.system, self._simulation.signals
+        every, found = range(len(signals.values)), set[int]()
+        for kind, name in places:
+            if kind == "sources":
+                found |= {*signals.sources(system.connection[name])}
+            else:
+                found |= {*every[signals.fmu(name) if kind == "outputs" else signals.hold(name)]}
+        return np.array(sorted(found), dtype=np.intp)
 
 
 def combine_slopes(exact: Matrix, slope: Matrix, error: Matrix) -> tuple[Matrix, Matrix]:

@@ -22,11 +22,11 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.plan.operations import Event, Operation, Record, Repeat, StopWhen
+from hapticlink.orchestrator.plan.operations import Event, Instruction, OfFmu, Repeat
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
-from hapticlink.orchestrator.run.instructions import Feed, Instruction, Move, Sample, instructions
+from hapticlink.orchestrator.run.instructions import instructions
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -162,10 +162,10 @@ class LiftedMap:
         parts = self._state.parts(self._template)
         return dict(zip(self._state.owners, map(len, parts), strict=True))
 
-    def count(self, kind: type[Operation], fmu: str) -> int:
+    def count(self, kind: type[OfFmu], fmu: str) -> int:
         """The number of operations of a kind on an FMU within a period."""
         return sum(
-            isinstance(operation, kind) and getattr(operation, "fmu", None) == fmu
+            isinstance(operation, kind) and operation.fmu == fmu
             for _, event in self._moments
             for operation in self._instructions(event)
         )
@@ -213,7 +213,7 @@ class LiftedMap:
             self._known[kind] = [
                 instruction
                 for instruction in instructions(self._plan.block(kind), self._simulation)
-                if not isinstance(instruction, Record | StopWhen | Sample | Move | Feed)
+                if not instruction.observes
             ]
         return self._known[kind]
 

@@ -30,7 +30,7 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap
 from hapticlink.analysis.stability.modes import Linearisation, Mode, constant, with_turns
 from hapticlink.analysis.stability.state_vector import SIGNALS
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
-from hapticlink.orchestrator.plan.operations import Get, Set, Step
+from hapticlink.orchestrator.plan.operations import OfFmu, Set, Step
 
 Rows = NDArray[np.intp]
 
@@ -318,7 +318,7 @@ def linear_period(map_: LiftedMap, point: Vector) -> LinearPeriod:
     def act(applied: Applied) -> Act:
         if id(applied) not in made:
             operation, source = applied.operation, None
-            if isinstance(operation, Step | Get | Set):
+            if isinstance(operation, OfFmu):
                 source = type(operation), operation.fmu
             into = _rows(applied, first, applied.after, applied.writes)
             of = _rows(applied, first, applied.before, applied.reads)

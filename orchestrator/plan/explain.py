@@ -10,8 +10,7 @@ from itertools import groupby
 from hapticlink.orchestrator.base.ticks import Clock
 from hapticlink.orchestrator.plan.operations import Event, Operation, Repeat
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import pattern_end
-from hapticlink.orchestrator.plan.stamps import uses
+from hapticlink.orchestrator.plan.sample_ages import pattern_end, uses
 from hapticlink.orchestrator.system.system import System
 
 LEGEND = """\

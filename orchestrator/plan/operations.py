@@ -1,11 +1,20 @@
-"""The operations of a plan, as data; `run` binds them to buffers and calls."""
+"""The operations of a plan, as data; `run` binds them to buffers and calls.
+
+An operation is a class, in which everybody who reads plans finds what it is: its code in C with its
+numbers (`run`), the stamps that it passes on (`sample_ages`), the signals between which it has
+slopes (`analysis.stability`); its name and fields are what is printed (`explain`). A further one
+that works on an FMU or a hold needs a class here, a number in loop.h and a case in operations.c.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
+
+from hapticlink.orchestrator.scene.conditions import COMPARISONS
+from hapticlink.orchestrator.system.system import System
 
 
 class Firing(NamedTuple):
@@ -23,88 +32,203 @@ class Event(NamedTuple):
     firings: tuple[Firing, ...]
 
 
+Place = tuple[str, str]
+"""Where a sample is: in the "outputs" of an FMU, in the "hold" of a connection, in its value that
+is "held", or in the "input" of its target; "sources" are those outputs that a connection takes."""
+Stamp = int | Place
+"""So many ticks after the event, or the stamp of what is in another place."""
+
+
+class Signals(NamedTuple):
+    """The places in the signal vector that an operation reads and writes."""
+
+    read: tuple[Place, ...] = ()
+    written: tuple[Place, ...] = ()
+
+
+class Instruction:
+    """What is declared of every operation.
+
+    code: its number in loop.h, PYTHON where it has none, with the reason `why_in_python`. b, x: the
+    fields that are these numbers of its record there, if any. concurrent: whether FMUs in processes
+    of their own may be stepping meanwhile. observes: whether it leaves FMUs, holds and signals as
+    they are, and writes rows, measures, or ends the run.
+    """
+
+    code: ClassVar[str] = "PYTHON"
+    b: ClassVar[str] = ""
+    x: ClassVar[str] = ""
+    why_in_python: ClassVar[str] = ""
+    concurrent: ClassVar[bool] = False
+    observes: ClassVar[bool] = False
+
+    def numbers(self, system: System) -> dict[str, float]:
+        """The numbers of its record beside the object that it works on, by their names there."""
+        return {slot: getattr(self, name) for slot in "bx" if (name := getattr(self, slot))}
+
+    def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
+        """The places to which it brings samples, each with the stamp of these."""
+        yield from ()
+
+    def signals(self, system: System) -> Signals | None:
+        """What it reads and writes beside its FMU or hold; None of what has no slopes."""
+        return None
+
+
 @dataclass(frozen=True)
-class Get:
+class OfFmu(Instruction):
+    """An operation of an FMU."""
+
+    fmu: str
+
+
+@dataclass(frozen=True)
+class OfHold(Instruction):
+    """An operation of the hold of a connection."""
+
+    connection: str
+
+
+@dataclass(frozen=True)
+class Get(OfFmu):
     """Read all outputs of an FMU; their stamp is `ahead` of the event's tick. Not `judged`, as
     within an iteration, they need be neither finite nor within their bounds."""
 
-    fmu: str
     ahead: int = 0
     judged: bool = True
+    code, b = "GET", "judged"
+
+    def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
+        yield ("outputs", self.fmu), self.ahead
+
+    def signals(self, system: System) -> Signals:
+        return Signals(written=(("outputs", self.fmu),))
 
 
 @dataclass(frozen=True)
-class Push:
+class Push(OfHold):
     """Push the newest sample of its source into a hold; its stamp is `ahead` of this tick."""
 
-    connection: str
     ahead: int = 0
+    code, b = "PUSH", "ahead"
+
+    def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
+        source = system.connection[self.connection].source
+        yield ("hold", self.connection), self.ahead or ("outputs", source)
+
+    def signals(self, system: System) -> Signals:
+        return Signals(read=(("sources", self.connection),))
 
 
 @dataclass(frozen=True)
-class Evaluate:
+class _Evaluation(OfHold):
+    """What gives the value of a hold."""
+
+    concurrent = True
+
+    def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
+        yield ("held", self.connection), ("hold", self.connection)
+
+    def signals(self, system: System) -> Signals:
+        held = (("held", self.connection),)
+        return Signals(held, held)
+
+
+@dataclass(frozen=True)
+class Evaluate(_Evaluation):
     """Evaluate a hold from the samples known at this tick for the instant `ahead` of it: the middle
     of the step for a plant, 0 for a sampled block."""
 
-    connection: str
     ahead: Fraction = Fraction(0)
+    code, x = "EVALUATE", "ahead"
 
 
 @dataclass(frozen=True)
-class Set:
+class Blend(_Evaluation):
+    """Evaluate a weighted sum of a hold's values, given by pairs (weight, `ahead` of this tick)."""
+
+    points: tuple[tuple[float, Fraction], ...]
+    code = "BLEND"
+
+
+@dataclass(frozen=True)
+class Set(OfFmu):
     """Set all connected inputs of an FMU to their held values; with `now`, to the sources' newest
     outputs without holds."""
 
-    fmu: str
     now: bool = False
+    code = "SET"
+
+    def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
+        for c in system.into(self.fmu):
+            held = c.hold and not self.now
+            yield ("input", c.name), ("held", c.name) if held else ("outputs", c.source)
+
+    def signals(self, system: System) -> Signals:
+        into = system.into(self.fmu)
+        sources = (("sources", c.name) for c in into)
+        return Signals((*sources, *(("held", c.name) for c in into if c.hold)))
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(OfFmu):
     """fmi2DoStep from this tick over `dticks`, or over part `part` of `parts` of it."""
 
-    fmu: str
     dticks: int
     part: int = 0
     parts: int = 1
+    code = "STEP"
+
+    def numbers(self, system: System) -> dict[str, float]:
+        size = float(self.dticks * (system.timeline.base / self.parts))
+        over = 0 if system.fmu[self.fmu].sampled and self.parts == 1 else self.dticks
+        return {"b": self.part * self.dticks, "c": self.parts, "d": over, "x": size}
+
+    def signals(self, system: System) -> Signals:
+        return Signals()
 
 
 @dataclass(frozen=True)
-class Record:
+class Record(Instruction):
     """Write a row of a clock's table: the outputs of all its FMUs."""
 
     clock: str
+    code = "RECORD"
+    observes = True
 
 
 @dataclass(frozen=True)
-class StopWhen:
+class StopWhen(Instruction):
     """End the run, without a fault, if the system's stop condition holds."""
 
+    code = "STOP_WHEN"
+    observes = True
+
+    def numbers(self, system: System) -> dict[str, float]:
+        assert system.ends_when
+        comparison = [*COMPARISONS].index(system.ends_when.comparison)
+        return {"b": comparison, "x": system.ends_when.value}
+
+
+_REPEATED = "Python repeats steps, whose operations are in C"
+
 
 @dataclass(frozen=True)
-class Blend:
-    """Evaluate a weighted sum of a hold's values, given by pairs (weight, `ahead` of this tick)."""
-
-    connection: str
-    points: tuple[tuple[float, Fraction], ...]
-
-
-@dataclass(frozen=True)
-class Save:
+class Save(OfFmu):
     """Save the state of an FMU (fmi2GetFMUstate)."""
 
-    fmu: str
+    why_in_python = _REPEATED
 
 
 @dataclass(frozen=True)
-class Rollback:
+class Rollback(OfFmu):
     """Restore the saved state of an FMU (fmi2SetFMUstate)."""
 
-    fmu: str
+    why_in_python = _REPEATED
 
 
 @dataclass(frozen=True)
-class Repeat:
+class Repeat(Instruction):
     """Fixed-point iteration over one co-simulation step of `dticks`.
 
     guess: push trial outputs into the holds of `connections`. body: the step itself. again:
@@ -117,11 +241,13 @@ class Repeat:
     guess: tuple[Push, ...]
     body: tuple[Operation, ...]
     again: tuple[Operation, ...]
+    why_in_python = _REPEATED
 
 
 Operation = (
     Get | Push | Evaluate | Blend | Set | Step | Save | Rollback | Repeat | Record | StopWhen
 )
+"""Those that a coupling scheme may give."""
 
 
 def flat(block: Iterable[Operation]) -> Iterator[Operation]:

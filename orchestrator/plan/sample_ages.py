@@ -1,21 +1,71 @@
-"""Ages of samples when they are used, and causality, derived from a plan."""
+"""Stamps and ages of samples when they are used, and causality: what operations declare of these,
+followed through a plan without running FMUs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.plan.event_kinds import keyed_events
-from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Event, Get, Push, Set
+from hapticlink.orchestrator.plan.operations import Event, Place, Stamp
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.stamps import uses
+from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 from hapticlink.orchestrator.system.system import System
+
+
+class Use(NamedTuple):
+    """At `tick` the target of `connection` got a value computed from samples up to `stamp`."""
+
+    tick: int
+    connection: str
+    stamp: int
+
+
+def uses(
+    plan: Plan, until: int | None = None, connections: Container[str] | None = None
+) -> Iterator[Use]:
+    """Every value given to every input over the whole run, or up to a tick, in order; of these
+    connections alone if they are given."""
+    system = plan.system
+    traced = {c.name: c for c in system.connections if connections is None or c.name in connections}
+    late = ((c.name, c.latency) for c in traced.values() if c.hold)
+    links = {name: SampleLink(latency, system.timeline.base) for name, latency in late if latency}
+    newest: dict[Place, int] = defaultdict(int)
+    blocks: dict[Event, list[tuple[Place, Stamp]]] = {}
+    for tick, event in plan:
+        if until is not None and tick > until:
+            return
+        if event not in blocks:
+            blocks[event] = [
+                (place, stamp)
+                for place, stamp in _stamps(plan, event)
+                if place[0] == "outputs" or place[1] in traced
+            ]
+        for (kind, name), stamp in blocks[event]:
+            if kind == "held" and name in links:
+                for _, arrived, _ in links[name].arrived(tick):
+                    newest["hold", name] = arrived
+            sample = tick + stamp if isinstance(stamp, int) else newest[stamp]
+            if kind == "hold" and name in links:
+                links[name].send(sample)
+            else:
+                newest[kind, name] = sample
+            if kind == "input":
+                yield Use(tick, name, sample)
+
+
+def _stamps(plan: Plan, kind: Event) -> Iterator[tuple[Place, Stamp]]:
+    """The places to which the operations of a kind of event bring samples, in order."""
+    for operation in plan.unrolled(kind):
+        yield from operation.stamps(plan.system)
 
 
 @dataclass(frozen=True)
@@ -60,31 +110,28 @@ def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
     }
 
 
-Register = tuple[str, str]
-"""What an event leaves for later ones: the newest sample that was "got" of an FMU, "pushed" to the
-hold of a connection, or is in its value that is "held"."""
-Stamp = int | Register
-"""A stamp in a block of operations: so many ticks after the event, or that which a register has
-before the event."""
-
-
 def _ages(
     plan: Plan, ticks: NDArray[np.int64], kinds: Mapping[Event, NDArray[np.intp]]
 ) -> Iterator[tuple[str, NDArray[np.int64]]]:
-    """By connection, the ages (ticks) of its inputs in events of each kind: what blocks leave in
-    the registers is found once a kind, and goes on from event to event for all of them at once.
-    Without latencies, of which each sample has its own."""
-    left: dict[Register, dict[Event, Stamp]] = {}
+    """By connection, the ages (ticks) of its inputs in events of each kind: what these leave in the
+    places is found once a kind, and goes on from event to event for all of them at once. Without
+    latencies, of which each sample has its own."""
+    left: dict[Place, dict[Event, Stamp]] = {}
     used: dict[Event, list[tuple[str, Stamp]]] = {}
     for kind in kinds:
-        block, used[kind] = _stamps(plan, kind)
-        for register, stamp in block.items():
-            left.setdefault(register, {})[kind] = stamp
+        now: dict[Place, Stamp] = {}
+        used[kind] = []
+        for place, stamp in _stamps(plan, kind):
+            now[place] = stamp if isinstance(stamp, int) else now.get(stamp, stamp)
+            if place[0] == "input":
+                used[kind].append((place[1], now[place]))
+        for place, stamp in now.items():
+            left.setdefault(place, {})[kind] = stamp
 
     @cache
-    def before(register: Register) -> NDArray[np.int64]:
+    def before(place: Place) -> NDArray[np.int64]:
         after, newest = np.zeros(len(ticks) + 1, np.int64), np.zeros(len(ticks) + 1, np.intp)
-        for kind, stamp in left.get(register, {}).items():
+        for kind, stamp in left.get(place, {}).items():
             after[kinds[kind] + 1] = of(stamp, kinds[kind])
             newest[kinds[kind] + 1] = kinds[kind] + 1
         stamps: NDArray[np.int64] = after[np.maximum.accumulate(newest)]
@@ -96,32 +143,6 @@ def _ages(
     for kind, rows in kinds.items():
         for connection, stamp in () if kind.first else used[kind]:
             yield connection, ticks[rows] - of(stamp, rows)
-
-
-def _stamps(plan: Plan, kind: Event) -> tuple[dict[Register, Stamp], list[tuple[str, Stamp]]]:
-    """What a block leaves in the registers, and the inputs that it sets, by connection."""
-    system = plan.system
-    now: dict[Register, Stamp] = {}
-    used: list[tuple[str, Stamp]] = []
-
-    def newest(*register: str) -> Stamp:
-        kind, name = register
-        return now.get((kind, name), (kind, name))
-
-    for operation in plan.unrolled(kind):
-        match operation:
-            case Get(fmu, ahead):
-                now["got", fmu] = ahead
-            case Push(name, ahead):
-                now["pushed", name] = ahead or newest("got", system.connection[name].source)
-            case Evaluate(name) | Blend(name):
-                now["held", name] = newest("pushed", name)
-            case Set(fmu, at_once):
-                for c in system.into(fmu):
-                    held = c.hold and not at_once
-                    stamp = newest("held", c.name) if held else newest("got", c.source)
-                    used.append((c.name, stamp))
-    return now, used
 
 
 def pattern_end(system: System) -> int:

@@ -18,7 +18,7 @@ from typing import Protocol
 
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.plan.operations import Event, Firing, Step
+from hapticlink.orchestrator.plan.operations import Event, Firing, OfFmu, Step
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run.compiled import structures
 
@@ -133,14 +133,14 @@ class Side:
         return hung.name
 
 
-def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
+def find_concurrent(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
     """The FMUs whose steps can be taken beside the haptic loop, with their clocks, and those of
     other clocks than the haptic one that cannot, with the reason."""
     system, able, unable = plan.system, {}, {}
     for clock in system.timeline.clocks[1:]:
         block = plan.block(Event(False, (Firing(clock.name, clock.longest, False),)))
         for fmu in (u for u in system.fmus if u.clock == clock.name):
-            own = [op for op in block if getattr(op, "fmu", None) == fmu.name]
+            own = [op for op in block if isinstance(op, OfFmu) and op.fmu == fmu.name]
             steps = [op for op in own if isinstance(op, Step)]
             if system.coupling.scheme == "iterated":
                 unable[fmu.name] = "its steps may be repeated"
@@ -154,7 +154,7 @@ def beside(plan: Plan) -> tuple[dict[str, str], dict[str, str]]:
 def require_concurrent(plan: Plan) -> dict[str, str]:
     """The FMUs whose steps can be taken beside the haptic loop, with their clocks. Raises
     InputFault where one that cannot is on another computer: the loop would wait for it."""
-    able, unable = beside(plan)
+    able, unable = find_concurrent(plan)
     for fmu in plan.system.fmus:
         if fmu.served and fmu.name not in able:
             why = unable.get(fmu.name, "it is at the haptic rate")

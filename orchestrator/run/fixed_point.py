@@ -11,7 +11,7 @@ from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.plan.operations import Blend, Get, Operation, Repeat
 from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run import jacobians
-from hapticlink.orchestrator.run.jacobians import Through
+from hapticlink.orchestrator.run.jacobians import PartialDerivatives
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.solvers import SOLVERS, Matrix, Newton, Solution, Vector
@@ -20,7 +20,7 @@ from hapticlink.orchestrator.system.ports import companion_outputs
 from hapticlink.orchestrator.system.system import Connection, System
 
 
-def total(counts: Iterable[Iterations]) -> Iterations | None:
+def sum_iterations(counts: Iterable[Iterations]) -> Iterations | None:
     """The counts of all loops of a run together; None where it has none."""
     every = [vars(c) for c in counts]
     if not every:
@@ -64,9 +64,9 @@ class FixedPoint:
         self._places, self._names = [*names], [*names.values()]
         self._solver = SOLVERS[self._settings.method]()
         self._tick = 0
-        self._ways: list[Through] | None = None
+        self._partial: list[PartialDerivatives] | None = None
         if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
-            self._ways = jacobians.ways(simulation, connections, self._places)
+            self._partial = jacobians.find_derivatives(simulation, connections, self._places)
             self._solver.supplied = self._jacobian
 
     def __call__(self, tick: int) -> None:
@@ -106,7 +106,7 @@ class FixedPoint:
     def _jacobian(self) -> Matrix | None:
         """Jacobian of the residual: the FMUs' directional derivatives of a step with respect to its
         held inputs, times the derivatives of these by the guess, in which the holds are linear."""
-        if self._ways is None:
+        if self._partial is None:
             return None
         values, places = self._signals.values, self._places
         before = values.copy()
@@ -121,12 +121,12 @@ class FixedPoint:
         values[:] = before
         tangent = np.stack(responses[1:], axis=1) - responses[0][:, None]
         slopes = np.zeros((len(values), len(places)))
-        for way in self._ways:
-            through = way.of(tangent)
+        for partial in self._partial:
+            through = partial.of(tangent)
             if through is None:
-                self._ways = None
+                self._partial = None
                 return None
-            slopes[list(way.rows)] = through
+            slopes[list(partial.rows)] = through
         return slopes[places] - np.eye(len(places))
 
     def _unconverged(self, solution: Solution, tick: int) -> None:

@@ -90,7 +90,7 @@ def _solve(fmus: LoadedFmus, settled: np.ndarray, first: Vector, sweep: Callable
         agree[places] = np.abs(solution.residual) <= TOLERANCE * (1.0 + np.abs(solution.point))
         before = values.copy()
         before[places] = solution.point
-        _raise_unsettled(fmus, agree, before)
+        _raise_unconverged(fmus, agree, before)
 
 
 def _jacobian(fmus: LoadedFmus, places: list[int]) -> Callable[[], Matrix | None]:
@@ -99,27 +99,27 @@ def _jacobian(fmus: LoadedFmus, places: list[int]) -> Callable[[], Matrix | None
     none."""
     signals = fmus.signals
     moved = [c for c in fmus.system.connections if {*places} & {*signals.sources(c)}]
-    ways = jacobians.ways(fmus, moved, places)
+    every = jacobians.find_derivatives(fmus, moved, places)
     held = [(signals.hold(c.name), signals.sources(c)) for c in moved if c.hold]
 
     def jacobian() -> Matrix | None:
-        if ways is None:
+        if every is None:
             return None
         tangent = np.zeros((len(signals.values), len(places)))
         tangent[places] = np.eye(len(places))
-        for way in ways:
+        for partial in every:
             for taken, sources in held:
                 tangent[taken] = tangent[sources]
-            through = way.of(tangent)
+            through = partial.of(tangent)
             if through is None:
                 return None
-            tangent[list(way.rows)] = through
+            tangent[list(partial.rows)] = through
         return tangent[places] - np.eye(len(places))
 
     return jacobian
 
 
-def _raise_unsettled(fmus: LoadedFmus, agree: np.ndarray, before: Vector) -> None:
+def _raise_unconverged(fmus: LoadedFmus, agree: np.ndarray, before: Vector) -> None:
     signals = fmus.signals
     for fmu in fmus.system.fmus:
         span = signals.fmu(fmu.name)

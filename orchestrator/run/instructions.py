@@ -1,5 +1,5 @@
 """The instructions of a run: the operations of its plan, with what its energy meters take of these
-and where FMUs that step concurrently are waited for.
+and where FMUs that step concurrently are waited for, which are declared as operations are.
 
 Consecutive doSteps of FMUs in processes of their own run concurrently; any other operation is a
 barrier. Steps are started and awaited in the plan's order, so results and faults are those of
@@ -11,49 +11,57 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 
-from hapticlink.orchestrator.plan.operations import Blend, Evaluate, Get, Operation, Set, Step
+from hapticlink.orchestrator.plan.operations import Get, Instruction, Operation, Set, Step
 from hapticlink.orchestrator.run.simulation import Simulation
 
 
 @dataclass(frozen=True)
-class Sample:
+class OfMeter(Instruction):
+    """An operation of the energy meter of a connection."""
+
+    connection: str
+    observes = True
+
+
+@dataclass(frozen=True)
+class Sample(OfMeter):
     """The meter of a connection takes a sample of its source, stamped `ahead` of the tick."""
 
-    connection: str
     ahead: int
+    code, b = "SAMPLE", "ahead"
 
 
 @dataclass(frozen=True)
-class Move:
+class Move(OfMeter):
     """The meter of a connection takes the displacement of its target, `ahead` of the tick."""
 
-    connection: str
     ahead: int
+    code, b = "MOVE", "ahead"
 
 
 @dataclass(frozen=True)
-class Feed:
+class Feed(OfMeter):
     """The meter of a connection takes the effort that its target holds over a `share` of a step."""
 
-    connection: str
     share: float
+    code, x = "FEED", "share"
+    concurrent = True
 
 
 @dataclass(frozen=True)
-class Collect:
+class Collect(Instruction):
     """Take over what the steps beside the loop of a clock's FMUs have left."""
 
     clock: str
+    why_in_python = "its FMUs run beside the loop, in a thread"
 
 
 @dataclass(frozen=True)
-class Finish:
+class Finish(Instruction):
     """Wait until the steps of FMUs in processes of their own have been taken."""
 
     fmus: tuple[str, ...]
-
-
-Instruction = Operation | Sample | Move | Feed | Collect | Finish
+    why_in_python = "the FMU runs in a process of its own"
 
 
 def instructions(operations: Iterable[Operation], simulation: Simulation) -> Iterator[Instruction]:
@@ -91,7 +99,7 @@ def _with_barriers(
     stepping: list[str] = []
     for instruction in instructions:
         match instruction:
-            case Evaluate() | Blend() | Feed():
+            case Instruction(concurrent=True):
                 pass
             case Set(fmu) | Step(fmu) if fmu in isolated and fmu not in stepping:
                 pass

@@ -22,7 +22,7 @@ from hapticlink.orchestrator.system.system import Connection
 
 
 @dataclass(frozen=True)
-class Through:
+class PartialDerivatives:
     """Partial derivatives of one FMU: of the outputs at `rows` of the signal vector with respect to
     the inputs whose sources are at `columns`."""
 
@@ -43,12 +43,12 @@ class Through:
         return through
 
 
-def ways(
+def find_derivatives(
     fmus: LoadedFmus, connections: Sequence[Connection], places: Sequence[int]
-) -> list[Through] | None:
+) -> list[PartialDerivatives] | None:
     """Per FMU on the loop, the partial derivatives of the outputs at `places` with respect to the
     connected inputs, in the system's order; None where an FMU gives none."""
-    partial = []
+    found = []
     signals = fmus.signals
     for fmu in fmus.system.fmus:
         incoming = [c for c in connections if c.target == fmu.name]
@@ -56,7 +56,7 @@ def ways(
         rows = tuple(p for p in places if span.start <= p < span.stop)
         if not incoming or not rows:
             continue
-        through = Through(
+        partial = PartialDerivatives(
             fmus.instances[fmu.name],
             tuple(outputs[p - span.start] for p in rows),
             rows,
@@ -65,7 +65,7 @@ def ways(
         )
         if not fmu.description.gives_directional_derivatives:
             return None
-        if any(s.type not in ("Real", "Float64") for s in (*through.outputs, *through.inputs)):
+        if any(s.type not in ("Real", "Float64") for s in (*partial.outputs, *partial.inputs)):
             return None
-        partial.append(through)
-    return partial
+        found.append(partial)
+    return found

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from hapticlink.orchestrator.plan.operations import (
     Get,
+    Instruction,
     Operation,
     Record,
     Repeat,
@@ -16,7 +17,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
 )
 from hapticlink.orchestrator.run.fixed_point import FixedPoint
-from hapticlink.orchestrator.run.instructions import Collect, Finish, Instruction, instructions
+from hapticlink.orchestrator.run.instructions import Collect, Finish, instructions
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 
 

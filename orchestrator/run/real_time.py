@@ -44,7 +44,7 @@ class RealTimeRun:
         """Context of the run of a simulation, which has no loop yet; threads end with it."""
         self._simulation = simulation
         simulation.pace = self.pace
-        simulation.beside, self._in_loop = concurrent_fmus.beside(plan)
+        simulation.beside, self._in_loop = concurrent_fmus.find_concurrent(plan)
         for clock in dict.fromkeys(simulation.beside.values()):
             fmus = [fmu for fmu in plan.system.fmus if simulation.beside.get(fmu.name) == clock]
             longer = all(fmu.description.varies_step for fmu in fmus)

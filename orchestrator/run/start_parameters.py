@@ -27,7 +27,8 @@ def apply_initial_connections(system: System) -> System:
 
 
 def by_port(system: System) -> dict[str, dict[str, tuple[float, ...]]]:
-    """What those connections carry, by FMU and parameter. Raises FmuFault as `settled` does."""
+    """What those connections carry, by FMU and parameter. Raises FmuFault as
+    `apply_initial_connections` does."""
     carried: dict[str, dict[str, tuple[float, ...]]] = {}
     for name, starts in _carry_starts(system).items():
         ports = carried.setdefault(name, {})

@@ -47,7 +47,7 @@ def with_hold(c: Connection, hold: str | None, delay: float | None) -> Connectio
 def check_change(
     system: System, c: Connection, hold: str | None, delay: float | None
 ) -> Connection:
-    """`held_by`. Raises InputFault where the hold does not fit, or cannot be changed in a run."""
+    """`with_hold`. Raises InputFault where the hold does not fit, or cannot be changed in a run."""
     new = with_hold(c, hold, delay)
     why = why_unsuitable(new.hold or "", new, system.fmu, system.energy.power, False)
     if system.coupling.scheme == "iterated":

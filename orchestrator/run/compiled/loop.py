@@ -19,7 +19,7 @@ from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import fill_generator
 from hapticlink.orchestrator.run.compiled.operation_records import PATIENCE, Machine
 from hapticlink.orchestrator.run.concurrent_fmus import Side
-from hapticlink.orchestrator.run.fixed_point import total
+from hapticlink.orchestrator.run.fixed_point import sum_iterations
 from hapticlink.orchestrator.run.instructions import instructions
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.simulation import Simulation
@@ -165,4 +165,4 @@ class CompiledLoop:
 
     def iterations(self) -> Iterations | None:
         """The counts of all fixed-point iterations together; None where there is none."""
-        return total(loop.counts for loop in self._machine.operations.loops.values())
+        return sum_iterations(loop.counts for loop in self._machine.operations.loops.values())

@@ -12,9 +12,9 @@ from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.plan.operations import (
     Blend,
-    Evaluate,
-    Get,
-    Push,
+    Instruction,
+    OfFmu,
+    OfHold,
     Record,
     Set,
     Step,
@@ -24,17 +24,9 @@ from hapticlink.orchestrator.run.compiled import fmus, structures
 from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.structures import Structure
-from hapticlink.orchestrator.run.instructions import (
-    Collect,
-    Feed,
-    Finish,
-    Instruction,
-    Move,
-    Sample,
-)
+from hapticlink.orchestrator.run.instructions import OfMeter
 from hapticlink.orchestrator.run.python_operations import OperationsInPython
 from hapticlink.orchestrator.run.simulation import Call, Simulation
-from hapticlink.orchestrator.scene.conditions import COMPARISONS
 
 Op: Any = structures.Op
 PATIENCE = 20_000_000
@@ -121,60 +113,48 @@ class Machine:
         return call
 
     def _record(self, instruction: Instruction) -> Structure:
-        record = self._coded(instruction)
-        if not isinstance(record, str):
-            return record
-        first = next(iter(vars(instruction).values()), "")
-        of = f" {first}" if isinstance(first, str) and first else ""
-        self.in_python[f"{type(instruction).__name__.lower()}{of}"] = record
-        return Op(structures.PYTHON)
+        """The record of an operation; of one that is carried out in Python the reason is noted."""
+        on = instruction.why_in_python or self._object(instruction)
+        if isinstance(on, str):
+            first = next(iter(vars(instruction).values()), "")
+            of = f" {first}" if isinstance(first, str) and first else ""
+            self.in_python[f"{type(instruction).__name__.lower()}{of}"] = on
+            return Op(structures.PYTHON)
+        numbers = instruction.numbers(self._simulation.system)
+        if isinstance(instruction, Blend):
+            first = len(self._points)
+            self._points += [(weight, float(ahead)) for weight, ahead in instruction.points]
+            self.loop.fill(points=np.array(self._points))
+            numbers = {"b": first, "c": len(self._points)}
+        return Op(getattr(structures, instruction.code), on, **numbers)
 
-    def _coded(self, instruction: Instruction) -> Structure | str:
-        """The record of an operation; why it is carried out in Python where it is."""
+    def _object(self, instruction: Instruction) -> int | str:
+        """The index of what an operation works on; why the loop cannot work on that."""
         simulation, system = self._simulation, self._simulation.system
         match instruction:
-            case Get(fmu, judged=judged) if (index := self._fmu(fmu)) is not None:
-                return Op(structures.GET, index, judged)
-            case Set(fmu, now) if (index := self._setter(fmu, now)) is not None:
-                return Op(structures.SET, index)
             case Step(fmu) if fmu in simulation.beside:
                 return "the FMU runs beside the loop, in a thread"
-            case Step(fmu, dticks, part, count) if (index := self._fmu(fmu)) is not None:
-                size = float(dticks * (system.timeline.base / count))
-                over = 0 if system.fmu[fmu].sampled and count == 1 else dticks
-                return Op(structures.STEP, index, part * dticks, count, over, size)
-            case Push(connection, ahead):
-                return Op(structures.PUSH, self._hold(connection), ahead)
-            case Evaluate(connection, ahead):
-                return Op(structures.EVALUATE, self._hold(connection), x=float(ahead))
-            case Blend(connection, points):
-                first = len(self._points)
-                self._points += [(weight, float(ahead)) for weight, ahead in points]
-                self.loop.fill(points=np.array(self._points))
-                return Op(structures.BLEND, self._hold(connection), first, len(self._points))
-            case Sample(connection, ahead):
-                return Op(structures.SAMPLE, self._meter(connection), ahead)
-            case Move(connection, ahead):
-                return Op(structures.MOVE, self._meter(connection), ahead)
-            case Feed(connection, share):
-                return Op(structures.FEED, self._meter(connection), x=share)
+            case OfFmu(fmu):
+                if isinstance(instruction, Set):
+                    index = self._setter(fmu, instruction.now)
+                else:
+                    index = self._fmu(fmu)
+                if index is not None:
+                    return index
+                if fmu in simulation.isolated:
+                    return "the FMU runs in a process of its own"
+                return "the FMU has event mode, or its texts are connected"
+            case OfHold(connection):
+                return self._hold(connection)
+            case OfMeter(connection):
+                return self._meter(connection)
             case Record(clock):
-                return Op(structures.RECORD, self._table(clock))
-            case StopWhen():
+                return self._table(clock)
+            case _:
+                assert isinstance(instruction, StopWhen)
                 condition = system.ends_when
                 assert condition is not None
-                place = simulation.signals.scalar(condition.fmu, condition.variable)
-                comparison = [*COMPARISONS].index(condition.comparison)
-                return Op(structures.STOP_WHEN, place, comparison, x=condition.value)
-            case Collect():
-                return "its FMUs run beside the loop, in a thread"
-            case Finish():
-                return "the FMU runs in a process of its own"
-            case Get(fmu) | Set(fmu) | Step(fmu) if fmu in simulation.isolated:
-                return "the FMU runs in a process of its own"
-            case Get(fmu) | Set(fmu) | Step(fmu) if not simulation.instances[fmu].in_c:
-                return "the FMU has event mode, or its texts are connected"
-        return "Python repeats steps, whose operations are in C"
+                return simulation.signals.scalar(condition.fmu, condition.variable)
 
     def _index(self, kind: str, key: Any, make: Callable[[int], object]) -> int:
         """The index of an object of `kind`, made at its first use."""
@@ -250,7 +230,7 @@ class Machine:
             return run(*arguments)
         except SystemError as error:
             instruction = self._instructions[position.op]
-            assert isinstance(instruction, Get | Set | Step)
+            assert isinstance(instruction, OfFmu)
             instance = self._simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
             raise instance.raised(
@@ -277,7 +257,7 @@ class Machine:
                 return
             self.operations(instruction, tick)  # what waits for a time within this step
         else:
-            assert isinstance(instruction, Get | Set | Step)
+            assert isinstance(instruction, OfFmu)
             instance = simulation.instances[instruction.fmu]
             assert isinstance(instance, InProcess)
             if code == structures.FAILED:
@@ -300,9 +280,9 @@ class Machine:
         """Give what an instruction works on what it lacks."""
         simulation = self._simulation
         match instruction:
-            case Push(connection) | Evaluate(connection) | Blend(connection):
+            case OfHold(connection):
                 simulation.holds[connection].serve(code)
-            case Sample(connection) | Move(connection):
+            case OfMeter(connection):
                 simulation.meters.of[connection].grow()
             case _:
                 assert isinstance(instruction, Step)

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Get, Push, Record, Set, Step
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import Delay, delays, pattern_end
+from hapticlink.orchestrator.plan.sample_ages import Delay, delays, pattern_end, uses
 from hapticlink.orchestrator.plan.schemes import SCHEMES
-from hapticlink.orchestrator.plan.stamps import uses
 from hapticlink.orchestrator.system.system import System
 from hapticlink.orchestrator.system.timeline import timeline as timeline_of
 from tests.orchestrator.systems import with_coupling

@@ -15,8 +15,7 @@ from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import delays
-from hapticlink.orchestrator.plan.stamps import uses
+from hapticlink.orchestrator.plan.sample_ages import delays, uses
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.run.fixed_point import Unconverged

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.stamps import uses
+from hapticlink.orchestrator.plan.sample_ages import uses
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.execute_plan import run
 from hapticlink.orchestrator.scene.scene_tables import Latency
