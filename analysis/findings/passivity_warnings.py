@@ -11,7 +11,7 @@ from typing import Any
 from hapticlink.analysis.findings.episodes import Episode
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import of_block
-from hapticlink.components.specs.control import Passivity
+from hapticlink.components.specs.control import PassivityLaw
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     MEASURED_HANDLE_POSE,
@@ -123,12 +123,14 @@ def _find_guarded(scene: Mapping[str, Any]) -> list[str]:
     return [*(block_of_user(CONTROLLER, user) for user in _laws(scene)), *walls]
 
 
-def _laws(scene: Mapping[str, Any]) -> dict[str, Passivity]:
+def _laws(scene: Mapping[str, Any]) -> dict[str, PassivityLaw]:
     """The passivity controllers of the users who have one; the first one's name is empty."""
     own = scene["controller"] or {}
     laws = {"": own} | {name: scene["controllers"].get(name, own) for name in scene["devices"]}
     given = {user: law["passivity"] for user, law in laws.items() if law.get("passivity")}
-    return {user: Passivity() if law is True else Passivity(**law) for user, law in given.items()}
+    return {
+        user: PassivityLaw() if law is True else PassivityLaw(**law) for user, law in given.items()
+    }
 
 
 def _counts(results: Results) -> Iterator[str]:
