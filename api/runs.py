@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from hapticlink.analysis.findings import summary
-from hapticlink.analysis.findings.measures import Measures
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -20,13 +18,8 @@ from hapticlink.orchestrator.network.served_part import NOWHERE, Servers
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders
-from hapticlink.orchestrator.results.read_results import (
-    Results,
-    read_into_memory,
-    without_rows,
-)
 from hapticlink.orchestrator.results.read_results import load as read_tables
-from hapticlink.orchestrator.results.run_record import content
+from hapticlink.orchestrator.results.read_results import read_into_memory, without_rows
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.scene.overrides import Options
@@ -111,19 +104,8 @@ def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
         if not tables:
             return Run(None, ended.run, {})
         results = read_into_memory(ended.results)
-    measures = Measures(results)
-    return _run(None, ended.run | _findings(results, measures), results, measures)
-
-
-def _findings(results: Results, measures: Measures) -> dict[str, Any]:
-    """What run.json says of the results: warnings, and the energy at the user's port."""
-    port = measures.port
-    return {"user_port": port and content(port), "warnings": list(summary.lines(results, measures))}
-
-
-def _run(folder: Path | None, run: dict[str, Any], results: Results, measures: Measures) -> Run:
-    numbers = tuple(summary.numbers(results, measures))
-    return Run(folder, run, without_rows(results), numbers=numbers)
+    found = summary.find(results)
+    return Run(None, ended.run | found.record, without_rows(results), numbers=found.numbers)
 
 
 def _in_folder(simulated: Callable[..., Experiment], folder: Path, figures: bool) -> Run:
@@ -139,36 +121,36 @@ def _describe_run(folder: Path, ended: Experiment, figures: bool) -> Run:
     results = ended.results
     if not ended.outcome.published:
         return Run(None, results.run, results.tables)
-    measures = Measures(results)
-    findings = _findings(results, measures)
-    run = results.run | findings
+    found = summary.find(results)
+    run = results.run | found.record
     try:
-        run = folders.add(folder, (), findings)
-        if ended.outcome.end_time > 0 and ended.outcome.reason != "interrupted":
-            run = folders.add(folder, _write_plan(ended))
-            if figures:
-                from hapticlink.visualization.figures import (
-                    run_figures,  # with casadi, slow to load
-                )
-
-                run = folders.add(folder, figure_axes.write_pngs(run_figures.pngs(results), folder))
+        for names in _write_files(ended, figures):
+            run = folders.add(folder, names, found.record)
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None
     except OSError as error:  # a full disk; the rows are there, and why the run ended is told
         message = "%s has the results of the run, not all of its figures: %s"
         logging.getLogger(__name__).warning(message, folder, error.strerror or error)
-    return _run(folder, run, results, measures)
+    return Run(folder, run, without_rows(results), numbers=found.numbers)
 
 
-def _write_plan(ended: Experiment) -> list[str]:
-    """Writes the plan; returns its file's name. Raises Interrupted and OSError."""
+def _write_files(ended: Experiment, figures: bool) -> Iterator[list[str]]:
+    """Writes the plan of a run that had a step, and its figures; the names of the files, none at
+    first. Raises Interrupted and OSError."""
+    yield []
+    if ended.outcome.end_time <= 0 or ended.outcome.reason == "interrupted":
+        return
     (ended.folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
     with (ended.folder / "plan.txt").open("x", encoding="utf-8") as file:
         for line in explain.explain(Plan(ended.system)):
             interrupt.raise_if_interrupted()
             file.write(f"{line}\n")
-    return ["plan.txt"]
+    yield ["plan.txt"]
+    if figures:
+        from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
+
+        yield figure_axes.write_pngs(run_figures.pngs(ended.results), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

@@ -31,7 +31,7 @@ from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 from hapticlink.visualization.live_page.server_pipe import ChildProcess
-from hapticlink.visualization.live_page.session import Session
+from hapticlink.visualization.live_page.session import LiveSession
 
 SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5
 SERVER = "hapticlink.visualization.live_page.server"
@@ -41,7 +41,7 @@ class Done(Exception):
     """The dragging has ended."""
 
 
-class Measured(Session):
+class Measured(LiveSession):
     """A session that ends with the process of the dragging, and notes when pulls act, and by how
     much wall-clock time is ahead of simulated time."""
 

@@ -52,10 +52,11 @@ called; or a function itself. Its arguments and docstring define the command, an
 exit status."""
 
 GONE = {
+    "advise --draws": "there are eight; --seed N gives eight others",
     "export-results": "a table of a run writes itself in Python: "
-    'hl.load("runs/closed-loop").frame("haptics").to_parquet("haptics.parquet")'
+    'hl.load("runs/closed-loop").frame("haptics").to_parquet("haptics.parquet")',
 }
-"""Commands of earlier versions, with what does their work now."""
+"""Commands and options of earlier versions, with what does their work now."""
 
 Plugin = Annotated[
     list[str] | None,
@@ -88,8 +89,12 @@ def _commands(arguments: Sequence[str]) -> None:
         elif not each.startswith("-"):
             words.append(each)
     plugins.load(filter(None, named))
-    if words and (remedy := GONE.get(words[0])):
-        raise InputFault(f"there is no command {words[0]} any more: {remedy}")
+    options = {each.partition("=")[0] for each in arguments if each.startswith("--")}
+    for gone, remedy in GONE.items():
+        name, *option = gone.split()
+        if words[:1] == [name] and options.issuperset(option):
+            what = "option" if option else "command"
+            raise InputFault(f"there is no {what} {gone} any more: {remedy}")
     if not words or words[0] not in COMMANDS:
         _register_completion()
     if words and words[0] not in COMMANDS:

@@ -9,7 +9,6 @@ from hapticlink.commands import progress
 from hapticlink.commands.options import PRINTED, UNCHANGED, Output, Scene, SceneOptions, title
 from hapticlink.commands.sweep import Jobs
 
-Draws = Annotated[int, Parameter(help="Hands and rates around the scene's own.")]
 Seed = Annotated[int, Parameter(help="Seed of the draws.")]
 
 
@@ -18,13 +17,12 @@ def advise(
     /,
     *,
     changes: SceneOptions = UNCHANGED,
-    draws: Draws = 8,
     seed: Seed = 0,
     jobs: Jobs = None,
     output: Output = PRINTED,
 ) -> int:
-    """Find the hold and the gains that suit a scene: all are run on it, and the best few in draws
-    around it.
+    """Find the hold and the gains that suit a scene: all are run on it, and the best few in
+    eight draws around it.
 
     Prints what to write into the scene, what it costs in error and energy, and what was within the
     spread. Writes advice.json and table.csv to OUT (default advice/SCENE); the same command
@@ -41,9 +39,7 @@ def advise(
     folder = folders.ensure(output.out or changes.folder("advice", scene))
     processes = jobs or os.cpu_count() or 1
     with progress.runs(f"{title(scene)}: methods on it and around it", output.quiet) as tell:
-        advice = find(
-            scene, changes.options, folder, processes=processes, count=draws, seed=seed, tell=tell
-        )
+        advice = find(scene, changes.options, folder, processes=processes, seed=seed, tell=tell)
     write_json(folder / "advice.json", advice.record())
     output.show(f"{title(scene)}:", (*advice.lines(), f"{folder}/"), advice.record())
     return 0

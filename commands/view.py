@@ -116,9 +116,9 @@ def view(
         _show(read.title, host, served_port, token, browser)
         say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
         import hapticlink as hl
-        from hapticlink.visualization.live_page.session import Session
+        from hapticlink.visualization.live_page.session import LiveSession
 
-        session = Session(read, link, root, hl.RealTime)
+        session = LiveSession(read, link, root, hl.RealTime)
         with suppress(Interrupted, hl.RunInterrupted):
             session.run()
     for folder in session.recordings:

@@ -19,11 +19,11 @@ def main() -> None:
         return
     link = Pipe(sys.stdin.buffer, out)
     import hapticlink as hl
-    from hapticlink.visualization.live_page.session import Session
+    from hapticlink.visualization.live_page.session import LiveSession
 
     root, scene, settings = arguments
     with suppress(Fault):  # the page's server has ended
-        Session(unpack_scene(scene), link, Path(root), hl.RealTime, settings, paused=True).run()
+        LiveSession(unpack_scene(scene), link, Path(root), hl.RealTime, settings, paused=True).run()
 
 
 if __name__ == "__main__":

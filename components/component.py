@@ -20,7 +20,7 @@ from typing import Literal
 
 import casadi as ca
 
-from hapticlink.components.ports import Kind, Power, Spring
+from hapticlink.components.ports import Kind, Power, SpringPorts
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
 Timing = Literal["continuous", "sampled"]
@@ -172,7 +172,7 @@ class Component:
     """Replaces `step` in all substeps but the last, and leaves discrete memory as it is; None where
     there is no such memory."""
     documentation: str = ""
-    springs: tuple[Spring, ...] = ()
+    springs: tuple[SpringPorts, ...] = ()
     """Spring-dampers whose set positions are inputs."""
     look_ups: tuple[LookUp, ...] = ()
     """The look-ups of tables that the functions call."""
@@ -235,7 +235,7 @@ class Block:
         memory: Collection[str] = (),
         documentation: str = "",
         state_notes: Mapping[str, str] | None = None,
-        springs: Iterable[Spring] = (),
+        springs: Iterable[SpringPorts] = (),
         shared: bool = False,
         signals: Iterable[TimeSignal] = (),
     ) -> Component:

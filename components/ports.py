@@ -24,7 +24,7 @@ class Power:
 
 
 @dataclass(frozen=True)
-class Spring:
+class SpringPorts:
     """A spring-damper within a block, whose far end is set by inputs:
 
         F = stiffness (set_position - position) + damping (set_velocity - velocity)

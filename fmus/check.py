@@ -76,7 +76,7 @@ def _entries(variable: Any) -> Iterator[Any]:
         yield scalar
 
 
-class Session:
+class FmuSession:
     """An FMU that is extracted to `folder`, by default a new temporary one, and its instances, all
     of which `close` frees. `description` has scalars, also of FMI 3.0."""
 
@@ -136,9 +136,9 @@ class Session:
         shutil.rmtree(self.folder)
 
 
-def session(path: Path | str, folder: Path | None = None) -> closing[Session]:
-    """A Session that is closed at the end of the context."""
-    return closing(Session(path, folder))
+def session(path: Path | str, folder: Path | None = None) -> closing[FmuSession]:
+    """A session that is closed at the end of the context."""
+    return closing(FmuSession(path, folder))
 
 
 def initialize(slave: FMU2Slave) -> None:
@@ -147,7 +147,7 @@ def initialize(slave: FMU2Slave) -> None:
     slave.exitInitializationMode()
 
 
-def run(slave: FMU2Slave, session: Session, first: int = 0, count: int = STEPS) -> Trace:
+def run(slave: FMU2Slave, session: FmuSession, first: int = 0, count: int = STEPS) -> Trace:
     """Set inputs, step, get all reals; steps `first` to `first + count - 1`."""
     references = [v.valueReference for v in session.inputs]
     trace = []
@@ -195,7 +195,7 @@ def _alone(path: Path | str, step_size: float) -> list[str]:
     return [f"alone: not finite from its own start values: {', '.join(bad)}"] if bad else []
 
 
-def _inputs_read_back(session: Session, _: Trace) -> str | None:
+def _inputs_read_back(session: FmuSession, _: Trace) -> str | None:
     slave = session.initialized()
     references = [v.valueReference for v in session.inputs]
     values = [float(v.start or 0.0) + 0.1 * (i + 1) for i, v in enumerate(session.inputs)]
@@ -206,11 +206,11 @@ def _inputs_read_back(session: Session, _: Trace) -> str | None:
     return None if read == values else f"set {values}, read {read}"
 
 
-def _load_again(session: Session, reference: Trace) -> str | None:
+def _load_again(session: FmuSession, reference: Trace) -> str | None:
     return _compare(run(session.initialized(), session), reference)
 
 
-def _reset(session: Session, reference: Trace) -> str | None:
+def _reset(session: FmuSession, reference: Trace) -> str | None:
     slave = session.initialized()
     run(slave, session)
     slave.reset()
@@ -218,7 +218,7 @@ def _reset(session: Session, reference: Trace) -> str | None:
     return _compare(run(slave, session), reference)
 
 
-def _two_instances(session: Session, reference: Trace) -> str | None:
+def _two_instances(session: FmuSession, reference: Trace) -> str | None:
     one, two = session.initialized("one"), session.initialized("two")
     run(one, session, count=1)
     trace = run(two, session)
@@ -226,7 +226,7 @@ def _two_instances(session: Session, reference: Trace) -> str | None:
     return _compare(trace, reference) or _compare(rest, reference[1:])
 
 
-def _save_and_restore(session: Session, reference: Trace) -> str | None:
+def _save_and_restore(session: FmuSession, reference: Trace) -> str | None:
     slave = session.initialized()
     run(slave, session, count=2)
     state = slave.getFMUState()
@@ -238,7 +238,7 @@ def _save_and_restore(session: Session, reference: Trace) -> str | None:
     return _compare(trace, reference[2:]) or _deserialize(session, saved, reference)
 
 
-def _deserialize(session: Session, saved: bytes, reference: Trace) -> str | None:
+def _deserialize(session: FmuSession, saved: bytes, reference: Trace) -> str | None:
     """A state restored into another instance has to continue as the first one did."""
     slave = session.initialized("other")
     state = slave.deSerializeFMUstate(saved)
@@ -249,7 +249,7 @@ def _deserialize(session: Session, saved: bytes, reference: Trace) -> str | None
     return _compare(run(slave, session, first=2, count=STEPS - 2), reference[2:])
 
 
-CHECKS: tuple[Callable[[Session, Trace], str | None], ...] = (
+CHECKS: tuple[Callable[[FmuSession, Trace], str | None], ...] = (
     _inputs_read_back,
     _load_again,
     _reset,

@@ -16,7 +16,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from hapticlink.components.component import Component
-from hapticlink.components.ports import Power, Spring
+from hapticlink.components.ports import Power, SpringPorts
 from hapticlink.fmus.scalar_variables import (
     ScalarVariable,
     initial_dependencies,
@@ -165,5 +165,5 @@ def annotation(component: Component) -> ET.Element:
     return block
 
 
-def _attributes(record: Power | Spring) -> dict[str, str]:
+def _attributes(record: Power | SpringPorts) -> dict[str, str]:
     return {name: str(value) for name, value in asdict(record).items() if value != ""}

@@ -20,7 +20,7 @@ from hapticlink.fmus.description_common import (
     definitions,
     icon,
 )
-from hapticlink.fmus.scalar_variables import Array, arrays
+from hapticlink.fmus.scalar_variables import ArrayVariable, arrays
 
 NOT_IN_FMI3 = ("canInterpolateInputs", "canNotUseMemoryManagementFunctions")
 TIME, SECOND = "time", "s"
@@ -39,7 +39,7 @@ def files(about: Described, token: str, sources: Iterable[str]) -> dict[str, byt
     }
 
 
-def _model_description(about: Described, arrays: Sequence[Array], token: str) -> bytes:
+def _model_description(about: Described, arrays: Sequence[ArrayVariable], token: str) -> bytes:
     root = ET.Element(
         "fmiModelDescription", about.attributes, fmiVersion="3.0", instantiationToken=token
     )
@@ -69,13 +69,15 @@ def _model_description(about: Described, arrays: Sequence[Array], token: str) ->
     return as_text(root)
 
 
-def _units(array: Array) -> list[str]:
+def _units(array: ArrayVariable) -> list[str]:
     """The unit of all entries, or those of each."""
     units = [v.unit for v in array.entries]
     return units if len(set(units)) > 1 else units[:1]
 
 
-def _variable(variables: ET.Element, array: Array, holder: Mapping[str, Array]) -> None:
+def _variable(
+    variables: ET.Element, array: ArrayVariable, holder: Mapping[str, ArrayVariable]
+) -> None:
     first, units = array.entries[0], _units(array)
     name = {"name": array.name, "valueReference": str(array.reference)}
     attributes = name | first.attributes
@@ -97,7 +99,10 @@ def _variable(variables: ET.Element, array: Array, holder: Mapping[str, Array]) 
 
 
 def _model_structure(
-    root: ET.Element, about: Described, arrays: Sequence[Array], holder: Mapping[str, Array]
+    root: ET.Element,
+    about: Described,
+    arrays: Sequence[ArrayVariable],
+    holder: Mapping[str, ArrayVariable],
 ) -> None:
     structure = ET.SubElement(root, "ModelStructure")
     outputs = [a for a in arrays if a.entries[0].kind == "OUTPUT"]
@@ -111,7 +116,7 @@ def _model_structure(
                 element.set("dependencies", " ".join(map(str, known)))
 
 
-def _terminals(arrays: Iterable[Array]) -> bytes:
+def _terminals(arrays: Iterable[ArrayVariable]) -> bytes:
     """terminalsAndIcons.xml: of a scene a terminal for each block, with its inputs and outputs, and
     the extent of the icon."""
     root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")

@@ -122,7 +122,7 @@ def _rows(sparsity: ca.Sparsity) -> list[list[int]]:
 
 
 @dataclass(frozen=True)
-class Array:
+class ArrayVariable:
     """A variable of FMI 3.0, whose entries are scalars, row by row."""
 
     name: str
@@ -132,7 +132,7 @@ class Array:
     entries: tuple[ScalarVariable, ...]
 
 
-def arrays(variables: Sequence[ScalarVariable]) -> Iterator[Array]:
+def arrays(variables: Sequence[ScalarVariable]) -> Iterator[ArrayVariable]:
     """The scalars as variables of FMI 3.0: vectors and matrices whole, but for those of which not
     all entries are there."""
     reference = 0
@@ -140,8 +140,8 @@ def arrays(variables: Sequence[ScalarVariable]) -> Iterator[Array]:
         entries = tuple(group)
         shape = entries[0].shape
         if shape and math.prod(shape) == len(entries):
-            yield Array(name, shape, reference, entries)
+            yield ArrayVariable(name, shape, reference, entries)
         else:
             for i, variable in enumerate(entries, reference):
-                yield Array(variable.name, (), i, (variable,))
+                yield ArrayVariable(variable.name, (), i, (variable,))
         reference += len(entries)

@@ -1,4 +1,4 @@
-"""Resets, changes of holds, delays, rates and gains at random behind a page: `Session` itself,
+"""Resets, changes of holds, delays, rates and gains at random behind a page: `LiveSession` itself,
 whose page is played here, in one process for all cases.
 
 Whatever the page asks for: a reset begins a run anew, a change is described or refused, and what a
@@ -22,7 +22,7 @@ from fuzz.cases import Made, seeded
 from fuzz.processes import own_folder
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.visualization.live_page import messages
-from hapticlink.visualization.live_page.session import Session
+from hapticlink.visualization.live_page.session import LiveSession
 
 ASKED = {"resets": 10, "holds": 100, "anything": 50}
 """What a case of each kind asks for, so often."""
@@ -64,7 +64,7 @@ class Page:
     def _asked(self) -> messages.Message:
         draw = self._draw
         held = draw.choice([control for control in self._controls if "choices" in control])
-        hold = messages.Set("set", held["key"], draw.choice(held["choices"]))
+        hold = messages.SetControl("set", held["key"], draw.choice(held["choices"]))
         reset = messages.Time("time", "reset")
         if self._kind != "anything":
             return reset if self._kind == "resets" else hold
@@ -78,7 +78,7 @@ class Page:
             draw.choice([k for k in keys if k.startswith("gains.")]): draw.uniform(0.5, 2.0),
             "controller.topology": draw.random() < 0.5,
         }
-        sets = [messages.Set("set", key, value) for key, value in values.items()]
+        sets = [messages.SetControl("set", key, value) for key, value in values.items()]
         return draw.choice((reset, hold, *sets))
 
 
@@ -92,7 +92,7 @@ def _left_behind() -> tuple[int, int, int]:
 
 def _case(scene: Any, kind: str, draw: random.Random, folder: Path) -> tuple[str, str]:
     page = Page(kind, draw)
-    session = Session(scene, page, folder / "view", hl.RealTime)  # type: ignore[arg-type]
+    session = LiveSession(scene, page, folder / "view", hl.RealTime)  # type: ignore[arg-type]
     try:
         session.run()
     except Fault as ended:

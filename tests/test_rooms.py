@@ -52,24 +52,6 @@ CAPABILITIES = {
 }
 """Words of a capability: where it lives, and the most files outside of it that name it."""
 
-KNOWN_TWICE = {
-    "Block",
-    "Changes",
-    "Coordinate",
-    "Cost",
-    "Description",
-    "Events",
-    "Frames",
-    "Observer",
-    "Passive",
-    "Passivity",
-    "Scale",
-    "Session",
-    "Set",
-    "Spring",
-}
-"""Classes that still share their name with another."""
-
 PAGES = [
     *(ROOT / "scenes").rglob("*.toml"),
     *(p for folder in ("studies", "benchmarks") for p in (ROOT / folder).rglob("*.py")),
@@ -199,7 +181,7 @@ def test_a_class_has_a_name_of_its_own() -> None:
             if isinstance(node, ast.ClassDef):
                 files.setdefault(node.name, []).append(".".join(module))
     twice = {name: where for name, where in files.items() if len(where) > 1}
-    assert twice.keys() == KNOWN_TWICE, twice
+    assert not twice
 
 
 def test_every_scene_key_is_set_by_a_scene_a_study_or_a_page() -> None:

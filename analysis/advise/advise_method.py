@@ -20,7 +20,7 @@ from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.search.acceptance import (
     PEAK,
     WORK,
-    Limits,
+    AcceptanceLimits,
     energy_share,
     judged_numbers,
 )
@@ -96,7 +96,7 @@ class Advice:
     ties: tuple[Measured, ...]
     others: tuple[Measured, ...]
     screened: Mapping[Method, Row]
-    limits: Limits
+    limits: AcceptanceLimits
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
@@ -161,7 +161,7 @@ def advise(
     read = open_scene.load(scene, options)
     methods = all_methods(read)
     assert read.device is not None  # of a scene with methods
-    limits = Limits.of(read.device)
+    limits = AcceptanceLimits.of(read.device)
     around = list(draws(read, count, seed))
 
     def run(of: Sequence[Method], drawn: Sequence[Sequence[str]]) -> dict[Method, list[Row]]:
@@ -240,7 +240,7 @@ def _distinct(ranked: Sequence[Method], rows: Mapping[Method, Row]) -> list[Meth
     return list(found.values())
 
 
-def _measured(method: Method, rows: Sequence[Row], limits: Limits) -> Measured:
+def _measured(method: Method, rows: Sequence[Row], limits: AcceptanceLimits) -> Measured:
     errors = np.array([float(row.get(METRIC, np.inf)) for row in rows])
     broken = [why for row in rows if (why := limits.why_not(row))]
     return Measured(
@@ -253,7 +253,7 @@ def _measured(method: Method, rows: Sequence[Row], limits: Limits) -> Measured:
 
 
 def _chosen(
-    title: str, ran: Sequence[Measured], screened: Mapping[Method, Row], limits: Limits
+    title: str, ran: Sequence[Measured], screened: Mapping[Method, Row], limits: AcceptanceLimits
 ) -> Advice:
     able = [one for one in ran if one.admitted]
     if not able:

@@ -31,7 +31,7 @@ PRESSED = 1e-4
 """The depth (m) from which on a contact at the start is no rest on an obstacle."""
 
 
-def lines(results: Results) -> Iterator[str]:
+def warn_of_contacts(results: Results) -> Iterator[str]:
     """A line for the deepest contact beyond the middle of a shape, and for the stiffest
     pair that pushes or sticks."""
     record, scene = results.record, results.record.scene
@@ -41,10 +41,10 @@ def lines(results: Results) -> Iterator[str]:
     yield from _warn_of_unrendered(results, table)
     linkage = scene_part(results, "linkage", Linkage)
     contacts = scene_part(results, "contacts", Contacts)
+    mechanism = scene_part(results, "mechanism", Mechanism)
     if JOINT_COORDINATES in table:  # both are recorded
         yield from warn_of_pressed_start(linkage, contacts, table[JOINT_COORDINATES][0])
         yield from _deep(table, linkage, contacts)
-    mechanism = scene_part(results, "mechanism", Mechanism)
     method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
     if method.bounded_by and len(table["time"]) > 1:
         rate = record.fmus[CONTACT_GAP.partition(".")[0]].rate

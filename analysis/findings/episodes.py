@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.findings.forces import largest_torque, torques, touching
 from hapticlink.analysis.findings.tracking import (
     COPY_BRANCH_OK,
+    UserSignals,
     constraint_counts,
     count_constrained,
     of_block,
@@ -96,7 +97,7 @@ def _states(results: Results) -> Iterator[State]:
 
 def _find_saturation(results: Results) -> Iterator[State]:
     for user, device in all_devices(results).items():
-        if driven := torques(results, device, user, largest_torque):
+        if driven := torques(results, device, UserSignals.of(user), largest_torque):
             said = f"{EPISODES['saturated']}: {user}" if user else ""
             times, largest = driven
             yield "saturated", times, largest >= FULL_TORQUE * device.torque_limit, said

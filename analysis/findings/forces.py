@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.tracking import further_users, of_block
+from hapticlink.analysis.findings.tracking import UserSignals, find_users, of_block, of_port
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.signal_names import (
@@ -15,10 +15,7 @@ from hapticlink.orchestrator.base.signal_names import (
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
-    MEASURED_HANDLE_POSE,
-    MOTOR_WRENCH,
     TOPOLOGY_WRENCH,
-    signal_of_user,
 )
 from hapticlink.orchestrator.results.read_results import Results, Vector
 
@@ -34,20 +31,20 @@ WRENCHES = {
 def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
     """Name, times (s), force (N) and moment (N.m) of each wrench that a run has; names of further
     users' wrenches have their point first."""
-    for user in ("", *further_users(results)):
-        for signal, name in WRENCHES.items():
-            signal = signal_of_user(signal, user)
-            if (table := of_block(results, signal, 3)) and len(table["time"]):
+    for user in find_users(results):
+        signals = user.hand, user.drift, user.topology, user.environment
+        for signal, name in zip(signals, WRENCHES.values(), strict=True):
+            if (table := of_port(results, signal)) and len(table["time"]):
                 force, moment = table.by_row(
                     lambda F: np.stack([PLANE.distance(F), F[:, 2]]), signal
                 )
-                yield f"{user}: {name}" if user else name, table["time"], force, moment
+                yield f"{user.name}: {name}" if user.name else name, table["time"], force, moment
 
 
 def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:
     """Times (s), and whether contacts push then; None without contacts. F_env alone does not tell:
     it has other hands and efforts on joints, too."""
-    force, gap = of_block(results, ENVIRONMENT_WRENCH, 3), of_block(results, CONTACT_GAP)
+    force, gap = of_port(results, ENVIRONMENT_WRENCH), of_block(results, CONTACT_GAP)
     if not (force and gap):
         return None
     largest = force.by_row(lambda F: np.abs(F).max(axis=1), ENVIRONMENT_WRENCH)
@@ -57,7 +54,7 @@ def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:
 def torques(
     results: Results,
     device: Device | None,
-    user: str = "",
+    user: UserSignals,
     of_motors: Callable[[Vector], Vector] = np.transpose,
 ) -> tuple[Vector, Vector] | None:
     """Times (s) and torques (N.m) of the four motors of a user's device, (4, n), or what a function
@@ -65,14 +62,13 @@ def torques(
     # casadi, which the terminal's lines, of the same module, can do without
     from hapticlink.components.device.motors_and_encoders import motor_torques
 
-    motor, handle = signal_of_user(MOTOR_WRENCH, user), signal_of_user(MEASURED_HANDLE_POSE, user)
-    table = of_block(results, motor, 3)
-    if device is None or table is None or of_block(results, handle, 3) is not table:
+    table = of_port(results, user.motors)
+    if device is None or table is None or of_port(results, user.measured_handle) is not table:
         return None
     if not len(table["time"]):
         return None
     return table["time"], table.by_row(
-        lambda F, x: of_motors(motor_torques(device, F, x)), motor, handle
+        lambda F, x: of_motors(motor_torques(device, F, x)), user.motors, user.measured_handle
     )
 
 

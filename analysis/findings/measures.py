@@ -11,10 +11,11 @@ import numpy as np
 from hapticlink.analysis.findings.episodes import Episode, saturations
 from hapticlink.analysis.findings.forces import largest_torque, torques, wrenches
 from hapticlink.analysis.findings.tracking import (
+    UserSignals,
     constraint_counts,
     count_constrained,
     count_folded,
-    further_users,
+    find_users,
     has_tracking,
     of_block,
     pose_error,
@@ -70,14 +71,14 @@ class Measures:
     def tracking(self) -> dict[str, TrackingError]:
         """By the users' names; that of the first one is empty."""
         found = {}
-        for user in ("", *further_users(self._results)):
+        for user in find_users(self._results):
             if not has_tracking(self._results, user):
                 continue
             error = pose_error(self._results, user)
             time, mm, rad = (self._within(error.time_s, each) for each in error)
             if len(time):
                 worst = float(mm.max()), float(rms(mm)), float(rad.max()), float(rms(rad))
-                found[user] = TrackingError(*worst, float(time[-1]))
+                found[user.name] = TrackingError(*worst, float(time[-1]))
         return found
 
     @cached_property
@@ -94,7 +95,7 @@ class Measures:
         """The largest motor torque of each user as a share of the torque limit."""
         found = {}
         for user, device in all_devices(self._results).items():
-            if driven := torques(self._results, device, user, largest_torque):
+            if driven := torques(self._results, device, UserSignals.of(user), largest_torque):
                 largest = self._within(*driven).max(initial=0.0)
                 found[user] = float(largest / device.torque_limit)
         return found

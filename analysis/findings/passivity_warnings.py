@@ -10,15 +10,11 @@ from typing import Any
 
 from hapticlink.analysis.findings.episodes import Episode
 from hapticlink.analysis.findings.measures import Measures
-from hapticlink.analysis.findings.tracking import of_block
-from hapticlink.components.specs.control import Passivity
+from hapticlink.analysis.findings.tracking import UserSignals, of_block, of_port
+from hapticlink.components.specs.control import PassivityLaw
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
-    MEASURED_HANDLE_POSE,
-    PASSIVITY_DAMPING,
-    PASSIVITY_ENERGY,
     block_of_user,
-    signal_of_user,
     user_of_block,
 )
 from hapticlink.orchestrator.results.numbers import short
@@ -26,7 +22,7 @@ from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.recorded_scene import all_devices
 
 
-def lines(results: Results, measures: Measures) -> Iterator[str]:
+def warn_of_passivity(results: Results, measures: Measures) -> Iterator[str]:
     """A line for each late force and pose of a passivity controller or of `pspm`, for motors at
     their limit beside a passivity controller, for one that damps counts of encoders, and for energy
     that was generated outside the premises."""
@@ -101,12 +97,11 @@ def _outside(results: Results) -> Iterator[str]:
                 f"where hands put in {short(1e3 * put_in)} mJ: {said}; take a higher rate"
             )
     for user in _laws(record.scene):
-        left = signal_of_user(PASSIVITY_ENERGY, user)
-        table = of_block(results, left)
-        least = float(table[left].min()) if table and len(table["time"]) else 0.0
+        table = of_block(results, user.passivity_energy)
+        least = float(table[user.passivity_energy].min()) if table and len(table["time"]) else 0.0
         if -least > matters:
             yield (
-                f"warning: the motors of {block_of_user(CONTROLLER, user)} gave "
+                f"warning: the motors of {user.controller} gave "
                 f"{short(-1e3 * least)} mJ beyond the budget of its passivity controller, where "
                 f"hands put in {short(1e3 * put_in)} mJ: its damping is at its limit, or acts on "
                 "motion above its noise alone; take a higher rate, or weaker gains"
@@ -120,34 +115,38 @@ def _find_guarded(scene: Mapping[str, Any]) -> list[str]:
         for fmu in scene.get("fmu", ())
         if fmu.get("block") == "virtual_wall" and fmu.get("settings", {}).get("passivity")
     ]
-    return [*(block_of_user(CONTROLLER, user) for user in _laws(scene)), *walls]
+    return [*(user.controller for user in _laws(scene)), *walls]
 
 
-def _laws(scene: Mapping[str, Any]) -> dict[str, Passivity]:
-    """The passivity controllers of the users who have one; the first one's name is empty."""
+def _laws(scene: Mapping[str, Any]) -> dict[UserSignals, PassivityLaw]:
+    """The passivity controllers of the users who have one."""
     own = scene["controller"] or {}
     laws = {"": own} | {name: scene["controllers"].get(name, own) for name in scene["devices"]}
     given = {user: law["passivity"] for user, law in laws.items() if law.get("passivity")}
-    return {user: Passivity() if law is True else Passivity(**law) for user, law in given.items()}
+    return {
+        UserSignals.of(user): PassivityLaw(**({} if law is True else law))
+        for user, law in given.items()
+    }
 
 
 def _counts(results: Results) -> Iterator[str]:
     """A line for each passivity controller that damps single counts of the encoders."""
     from hapticlink.components.device.motors_and_encoders import count_energies  # casadi
 
-    record, devices = results.record, all_devices(results)
-    for user, law in _laws(record.scene).items():
-        handle = signal_of_user(MEASURED_HANDLE_POSE, user)
-        table, device = of_block(results, handle, 3), devices.get(user)
+    record = results.record
+    laws, devices = _laws(record.scene), all_devices(results)
+    for user, law in laws.items():
+        handle = user.measured_handle
+        table, device = of_port(results, handle), devices.get(user.name)
         if table is None or device is None or not len(table["time"]):
             continue
-        damped = of_block(results, damping := signal_of_user(PASSIVITY_DAMPING, user))
-        if damped and not damped[damping].any():
+        damped = of_block(results, user.passivity_damping)
+        if damped and not damped[user.passivity_damping].any():
             continue
         period = record.clocks[record.fmus[handle.partition(".")[0]].rate].longest
         count = float(count_energies(device, table[handle][0], period).max())
         if law.noise < count:
-            key = f"controllers.{user}" if user else "controller"
+            key = f"controllers.{user.name}" if user.name else "controller"
             yield (
                 f"warning: {key}.passivity.noise is {law.noise:g} J, and one count of an encoder "
                 f"in a period {short(count)} J: the passivity controller damps counts, which give "

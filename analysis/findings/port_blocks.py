@@ -31,38 +31,31 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import of_block, poses, table_of
+from hapticlink.analysis.findings.tracking import UserSignals, of_port, table_of
 from hapticlink.analysis.findings.work_of_wrenches import Works
-from hapticlink.orchestrator.base.signal_names import (
-    DRIFT_WRENCH,
-    ENVIRONMENT_WRENCH,
-    MECHANISM,
-    MOTOR_WRENCH,
-    TOPOLOGY_WRENCH,
-    signal_of_user,
-)
 from hapticlink.orchestrator.results.read_results import Results, Vector
 
-WRENCHES = {"drift": DRIFT_WRENCH, "topology": TOPOLOGY_WRENCH, "environment": ENVIRONMENT_WRENCH}
-"""By block, its wrench on the handle."""
+
+def _wrenches(user: UserSignals) -> dict[str, str]:
+    """By block, its wrench on the handle."""
+    return {"drift": user.drift, "topology": user.topology, "environment": user.environment}
 
 
-def needed_signals(results: Results, users: Iterable[str]) -> set[str]:
-    """The signals from which the blocks of these users are found, as far as a run has them; the
-    first user's name is empty."""
+def needed_signals(results: Results, users: Iterable[UserSignals]) -> set[str]:
+    """The signals from which the blocks of these users are found, as far as a run has them."""
     signals: set[str] = set()
     for user in users:
-        own = (signal_of_user(wrench, user) for wrench in (*WRENCHES.values(), MOTOR_WRENCH))
-        signals |= {*poses(user), *own, *(source for source, _ in _sources(results, user))}
+        own = user.point, user.handle, user.motors, *_wrenches(user).values()
+        signals |= {*own, *(source for source, _ in _sources(results, user))}
     return signals
 
 
 def by_block(
-    results: Results, works: Works, stored: Vector, put_in: Mapping[str, Vector]
+    results: Results, works: Works, stored: Vector, put_in: Mapping[UserSignals, Vector]
 ) -> dict[str, Vector]:
     """The energy (J) that each block has generated at the times of the works, those of all users'
     blocks added up. stored: E - E(0) less the work of hands without a device; put_in: the
-    work of each user's hand on the handle, by the user's name."""
+    work of each user's hand on the handle."""
     blocks: dict[str, Vector] = {}
     shaping, mechanism = np.zeros(len(stored)), stored.copy()
 
@@ -70,34 +63,32 @@ def by_block(
         blocks[name] = np.add(blocks.get(name, 0.0), energy, out=energy)
 
     def ideal(signal: str, position: str) -> Vector | None:
-        there = of_block(results, signal, 3) and of_block(results, position, 3)
+        there = of_port(results, signal) and of_port(results, position)
         return works.of(signal, position)[1] if there else None
 
     def made_by_hold(signal: str, position: str) -> Vector | None:
-        there = of_block(results, signal, 3) and of_block(results, position, 3)
+        there = of_port(results, signal) and of_port(results, position)
         return np.subtract(*works.of(signal, position)) if there else None
 
     for user, done in put_in.items():
-        point, handle = poses(user)
         shaping -= done
-        for name, signal in WRENCHES.items():
-            if (energy := ideal(signal_of_user(signal, user), handle)) is not None:
+        for name, signal in _wrenches(user).items():
+            if (energy := ideal(signal, user.handle)) is not None:
                 shaping -= energy
                 add(name, energy)
-        driven = signal_of_user(MOTOR_WRENCH, user)
-        if (energy := made_by_hold(driven, handle)) is not None:
+        if (energy := made_by_hold(user.motors, user.handle)) is not None:
             shaping -= energy
-            add(f"hold of {driven}", energy)
-        if (energy := ideal(signal_of_user(ENVIRONMENT_WRENCH, user), point)) is not None:
+            add(f"hold of {user.motors}", energy)
+        if (energy := ideal(user.environment, user.point)) is not None:
             shaping += energy
             add("environment", np.negative(energy, out=energy))
         for source, target in _sources(results, user):
-            if not (table_of(results, source) and of_block(results, point, 3)):
+            if not (table_of(results, source) and of_port(results, user.point)):
                 continue
             sign = -1.0 if target.endswith("F_drift") else 1.0
-            held, energy = works.of(source, point, sign, f"{source} -> {target}")
+            held, energy = works.of(source, user.point, sign, f"{source} -> {target}")
             mechanism -= held
-            if source == signal_of_user(DRIFT_WRENCH, user):
+            if source == user.drift:
                 held -= energy
                 add("drift", energy)
                 add(f"hold of {source} on the mechanism", held)
@@ -106,9 +97,9 @@ def by_block(
     return {"shaping": shaping, **blocks, "mechanism": mechanism}
 
 
-def _sources(results: Results, user: str) -> Iterator[tuple[str, str]]:
+def _sources(results: Results, user: UserSignals) -> Iterator[tuple[str, str]]:
     """Where F_hand and F_drift of the mechanism at a user's point come from, and that input."""
-    inputs = signal_of_user(f"{MECHANISM}.", user)
+    inputs = user.point.removesuffix("x")
     for name in results.record.meters:
         source, _, target = name.partition(" -> ")
         if target in (f"{inputs}F_hand", f"{inputs}F_drift"):

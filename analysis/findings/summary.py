@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby, islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hapticlink.analysis.findings import friction_speed
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
-from hapticlink.analysis.findings.tracking import of_block
+from hapticlink.analysis.findings.tracking import UserSignals, of_block, of_port
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
@@ -37,9 +37,25 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import TABLES, Results
-from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
+from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors, content
 from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 from hapticlink.orchestrator.system.system import Replacement
+
+
+class Findings(NamedTuple):
+    """What run.json says of the results, warnings and the energy at the user's port, and the lines
+    of their numbers."""
+
+    record: dict[str, Any]
+    numbers: tuple[str, ...]
+
+
+def find(results: Results) -> Findings:
+    """What the tables of a run show."""
+    measures = Measures(results)
+    port, warned = measures.port, list(lines(results, measures))
+    record = {"user_port": port and content(port), "warnings": warned}
+    return Findings(record, tuple(numbers(results, measures)))
 
 
 def ending(results: Results) -> str:
@@ -97,7 +113,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
     measures = measures or Measures(results)
     for user, error in measures.tracking.items():
         yield _tracking(user, error)
-        if user and _left(results, signal_of_user(WORKSPACE_MARGIN, user)):
+        if user and _left(results, UserSignals.of(user).margin):
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
     if measures.forces:
         peaks = (f"{name} {short(force)} N" for name, force in measures.forces.items())
@@ -228,7 +244,7 @@ def _passivity(results: Results, measures: Measures) -> Iterator[str]:
     # casadi, for the torques of motors, which most of the terminal's lines can do without
     from hapticlink.analysis.findings import passivity_warnings
 
-    yield from passivity_warnings.lines(results, measures)
+    yield from passivity_warnings.warn_of_passivity(results, measures)
 
 
 def _describe_stops(results: Results) -> Iterator[str]:
@@ -252,7 +268,7 @@ def _contacts(results: Results) -> Iterator[str]:
     if results.record.scene["contacts"]:
         from hapticlink.analysis.findings import contact_warnings
 
-        yield from contact_warnings.lines(results)
+        yield from contact_warnings.warn_of_contacts(results)
 
 
 def _real_time(report: Mapping[str, Any]) -> Iterator[str]:
@@ -395,13 +411,13 @@ def _start(results: Results) -> Iterator[str]:
     device = of_block(results, WORKSPACE_MARGIN)
     if (
         device
-        and of_block(results, HANDLE_POSE, 3)
+        and of_port(results, HANDLE_POSE)
         and len(device["time"])
         and device[WORKSPACE_MARGIN][0] < 0
     ):
         start, margin = device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0]
         yield f"warning: {describe_start_outside(start, margin)}"
-    pulls = of_block(results, HAND_WRENCH, 3)
+    pulls = of_port(results, HAND_WRENCH)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
         pull = float(PLANE.distance(pulls[HAND_WRENCH][0])) if len(pulls["time"]) else 0.0
         if pull > PULL:

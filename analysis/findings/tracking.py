@@ -3,6 +3,7 @@ graphics copy is folded."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,17 @@ from hapticlink.orchestrator.base.signal_names import (
     CONSTRAINT_COUNTS,
     COPY_BRANCH_OK,
     DEVICE,
+    DRIFT_WRENCH,
+    ENVIRONMENT_WRENCH,
+    HAND_WRENCH,
     HANDLE_POSE,
+    MEASURED_HANDLE_POSE,
+    MOTOR_WRENCH,
+    PASSIVITY_DAMPING,
+    PASSIVITY_ENERGY,
     POINT_POSE,
+    TOPOLOGY_WRENCH,
+    WORKSPACE_MARGIN,
     signal_of_user,
     user_of_block,
 )
@@ -28,15 +38,56 @@ class Tracking(NamedTuple):
     angle_rad: Vector
 
 
-def further_users(results: Results) -> list[str]:
-    """The points at which users beside the first one hold a device."""
-    users = [u for name in results.record.fmus if (u := user_of_block(name, DEVICE))]
-    return [u for u in users if has_tracking(results, u)]
+@dataclass(frozen=True)
+class UserSignals:
+    """The signals of a user, whose name is that of the point with the device, empty for the first
+    user: poses of point, handle and encoders, wrenches, and what device and controller tell."""
+
+    name: str
+    point: str
+    handle: str
+    measured_handle: str
+    hand: str
+    drift: str
+    topology: str
+    environment: str
+    motors: str
+    margin: str
+    passivity_damping: str
+    passivity_energy: str
+
+    @classmethod
+    def of(cls, name: str) -> UserSignals:
+        """Those of a user with a name."""
+        return cls(name, *(signal_of_user(signal, name) for signal in SIGNALS))
+
+    @property
+    def controller(self) -> str:
+        return self.motors.partition(".")[0]
 
 
-def poses(user: str = "") -> tuple[str, str]:
-    """The poses of a user's point and handle; the first user's name is empty."""
-    return signal_of_user(POINT_POSE, user), signal_of_user(HANDLE_POSE, user)
+SIGNALS = (
+    POINT_POSE,
+    HANDLE_POSE,
+    MEASURED_HANDLE_POSE,
+    HAND_WRENCH,
+    DRIFT_WRENCH,
+    TOPOLOGY_WRENCH,
+    ENVIRONMENT_WRENCH,
+    MOTOR_WRENCH,
+    WORKSPACE_MARGIN,
+    PASSIVITY_DAMPING,
+    PASSIVITY_ENERGY,
+)
+"""Those of the first user, in the order of `UserSignals`."""
+FIRST = UserSignals.of("")
+
+
+def find_users(results: Results) -> list[UserSignals]:
+    """The first user, and those beside it whose handle and point are recorded."""
+    names = (name for fmu in results.record.fmus if (name := user_of_block(fmu, DEVICE)))
+    further = (UserSignals.of(name) for name in names)
+    return [FIRST, *(user for user in further if has_tracking(results, user))]
 
 
 def table_of(results: Results, signal: str) -> Table | None:
@@ -50,6 +101,11 @@ def of_block(results: Results, signal: str, *shape: int) -> Table | None:
     return table if table and table.shape(signal) == shape else None
 
 
+def of_port(results: Results, signal: str) -> Table | None:
+    """As `of_any_shape`, of a pose or a wrench."""
+    return of_block(results, signal, PLANE.size)
+
+
 def of_any_shape(results: Results, signal: str) -> Table | None:
     """The table that contains a signal of a block of the haptic loop, or of the FMU in its place;
     None for an FMU of others that only has the same name, of whose ports nothing is known."""
@@ -60,16 +116,16 @@ def of_any_shape(results: Results, signal: str) -> Table | None:
     return table_of(results, signal)
 
 
-def has_tracking(results: Results, user: str = "") -> bool:
+def has_tracking(results: Results, user: UserSignals = FIRST) -> bool:
     """Whether there are the poses of a user's point and handle."""
-    return all(of_block(results, signal, 3) for signal in poses(user))
+    return all(of_port(results, signal) for signal in (user.point, user.handle))
 
 
-def pose_error(results: Results, user: str = "") -> Tracking:
+def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
     """Tracking error of a user at the mechanism's samples up to the device's last one; the handle's
     pose is interpolated linearly where its clock differs. Raises KeyError without these signals."""
-    point, handle = poses(user)
-    mechanism, device = of_block(results, point, 3), of_block(results, handle, 3)
+    point, handle = user.point, user.handle
+    mechanism, device = of_port(results, point), of_port(results, handle)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {point} and {handle}")
     if not len(device["time"]):  # a fault before the first row

@@ -25,8 +25,11 @@ import numpy as np
 
 from hapticlink.analysis.findings.port_blocks import by_block, needed_signals
 from hapticlink.analysis.findings.tracking import (
-    further_users,
+    FIRST,
+    UserSignals,
+    find_users,
     of_block,
+    of_port,
     rows_until,
     table_of,
 )
@@ -40,7 +43,6 @@ from hapticlink.analysis.findings.work_of_wrenches import (
 from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
-    DEVICE,
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
@@ -49,11 +51,7 @@ from hapticlink.orchestrator.base.signal_names import (
     MECHANISM,
     MECHANISM_ENERGY,
     MOBILITIES,
-    MOTOR_WRENCH,
     POINT_POSE,
-    TOPOLOGY_WRENCH,
-    block_of_user,
-    signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
@@ -112,11 +110,10 @@ def hand_work(results: Results) -> float:
     """The work (J) of the hands on their handles, its absolute values summed; none of a user whose
     pose or wrench is missing, or has another rate."""
     total = 0.0
-    for user in ("", *further_users(results)):
-        pose, wrench = signal_of_user(HANDLE_POSE, user), signal_of_user(HAND_WRENCH, user)
-        moved = of_block(results, pose, 3)
-        if moved and wrench in moved:
-            total += absolute_work(results, wrench, pose)
+    for user in find_users(results):
+        moved = of_port(results, user.handle)
+        if moved and user.hand in moved:
+            total += absolute_work(results, user.hand, user.handle)
     return total
 
 
@@ -130,31 +127,30 @@ def user_port(results: Results) -> UserPort | None:
     """The energy at the user's port; None without hand, handle and mechanism, where something else
     than its hand pushes a handle, or where the work of another hand is not recorded. Without all
     signals that its blocks need there are none."""
-    mechanism, device = of_block(results, MECHANISM_ENERGY), of_block(results, HANDLE_POSE, 3)
-    if mechanism is None or device is None or of_block(results, HAND_WRENCH, 3) is None:
+    mechanism, device = of_block(results, MECHANISM_ENERGY), of_port(results, HANDLE_POSE)
+    if mechanism is None or device is None or of_port(results, HAND_WRENCH) is None:
         return None
     if find_other_pushes(results) or not (len(device["time"]) and len(mechanism["time"])):
         return None
     rows = rows_until(mechanism, device["time"][-1])
     time = mechanism["time"][rows]
     works = Works(results, time)
-    put_in = {"": works.of(HAND_WRENCH, HANDLE_POSE)[0]}
+    put_in = {FIRST: works.of(HAND_WRENCH, HANDLE_POSE)[0]}
     further: Vector | float = 0.0
     for name in results.record.connections:
         hand, _, target = name.partition(" -> ")
         point = target.removesuffix(".F_hand").removeprefix(f"{MECHANISM}.")
         if target != f"{MECHANISM}.{point}.F_hand":
             continue
-        if with_device := block_of_user(DEVICE, point) in results.record.fmus:
-            hand, position = signal_of_user(HAND_WRENCH, point), signal_of_user(HANDLE_POSE, point)
-        else:
-            position = f"{MECHANISM}.{point}.x"
-        moved, pushing = of_block(results, position, 3), table_of(results, hand)
+        user, position = UserSignals.of(point), f"{MECHANISM}.{point}.x"
+        if with_device := user.handle.partition(".")[0] in results.record.fmus:
+            hand, position = user.hand, user.handle
+        moved, pushing = of_port(results, position), table_of(results, hand)
         if moved is None or pushing is None or pushing.shape(hand) != PLANE.pose.shape:
             return None
         done = works.of(hand, position)[0]
         if with_device:
-            put_in[point] = done
+            put_in[user] = done
         else:
             further = further + done
     stored = mechanism[MECHANISM_ENERGY]
@@ -172,29 +168,27 @@ def find_other_pushes(results: Results) -> list[str]:
     return [
         name
         for name in results.record.connections
-        for user in ("", *further_users(results))
-        if name.endswith(f" -> {signal_of_user(HANDLE_POSE, user).partition('.')[0]}.F_hand")
-        and not name.startswith(f"{signal_of_user(HAND_WRENCH, user)} ")
+        for user in find_users(results)
+        if name.endswith(f" -> {user.handle.partition('.')[0]}.F_hand")
+        and not name.startswith(f"{user.hand} ")
     ]
 
 
 def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[str, float]:
     """The works (J) of single wrenches on the handles at the last of some times, those of further
     users named by their points, and of contacts on the mechanism."""
-    signals = {
-        "hand": HAND_WRENCH,
-        "motors": MOTOR_WRENCH,
-        "F_T": TOPOLOGY_WRENCH,
-        "F_env": ENVIRONMENT_WRENCH,
-    }
     found = {
-        f"{user}: {name}" if user else name: works.last(signal_name, handle)
-        for user in ("", *further_users(results))
-        for name, signal in signals.items()
-        if of_block(results, signal_name := signal_of_user(signal, user), 3)
-        and of_block(results, handle := signal_of_user(HANDLE_POSE, user), 3)
+        f"{user.name}: {name}" if user.name else name: works.last(signal, user.handle)
+        for user in find_users(results)
+        for name, signal in {
+            "hand": user.hand,
+            "motors": user.motors,
+            "F_T": user.topology,
+            "F_env": user.environment,
+        }.items()
+        if of_port(results, signal) and of_port(results, user.handle)
     }
-    if contact := of_block(results, ENVIRONMENT_WRENCH, 3):
+    if contact := of_port(results, ENVIRONMENT_WRENCH):
         done = work_of_source(time, contact, ENVIRONMENT_WRENCH, contact, POINT_POSE)
         found["F_env on the mechanism"] = last(done)
     if (added := _hold_mobility(results, device)) is not None:
@@ -206,7 +200,7 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
 def _hold_mobility(results: Results, device: Table) -> Vector | None:
     """What holding the mobility adds to the motors' wrench, (n, 3) at the device's samples; None
     where it is not held, or not by zoh, or the mechanism's own is not put out."""
-    held, own = (of_block(results, signal, 3, 3) for signal in MOBILITIES)
+    held, own = (of_block(results, signal, *PLANE.mobility.shape) for signal in MOBILITIES)
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
     if not held or own is not device or results.record.holds.get(crossing) != "zoh":
         return None

@@ -40,7 +40,7 @@ ENDS = ("duration", "stop_when")
 
 
 def judged_numbers(run: Results) -> Row:
-    """The numbers of a run, with all that `Limits` judge."""
+    """The numbers of a run, with all that `AcceptanceLimits` judge."""
     return of_results(run) | {WORK: hand_work(run)}
 
 
@@ -49,11 +49,11 @@ def broken_limit(read: Scene, run: Results) -> str:
     follows a point."""
     if read.device is None or METRIC not in (row := judged_numbers(run)):
         return ""
-    return Limits.of(read.device).why_not(row)
+    return AcceptanceLimits.of(read.device).why_not(row)
 
 
 @dataclass(frozen=True)
-class Limits:
+class AcceptanceLimits:
     """Largest tracking error (mm, rad), and the least time (s) that a run lasts, infinite for the
     duration of its scene."""
 
@@ -62,11 +62,11 @@ class Limits:
     lasts_s: float = math.inf
 
     @classmethod
-    def of(cls, device: Device) -> Limits:
+    def of(cls, device: Device) -> AcceptanceLimits:
         """The absolute ones of a device."""
         return cls(1e3 * DISTANCE * _smaller_side(device))
 
-    def beside(self, row: Row) -> tuple[Limits, str]:
+    def beside(self, row: Row) -> tuple[AcceptanceLimits, str]:
         """These with those relative to a run, which may end early in good order; or these alone,
         and which of them that run breaks."""
         if broken := replace(self, lasts_s=0.0).why_not(row):

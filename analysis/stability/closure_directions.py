@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from hapticlink.analysis.stability.state_vector import Coordinate
+from hapticlink.analysis.stability.state_vector import StateEntry
 from hapticlink.components.dynamics.linkage_values import closure_jacobian
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
@@ -33,7 +33,7 @@ class Closures:
     linkage: Linkage | None
 
     def directions(
-        self, coordinates: Sequence[Coordinate], free: NDArray[np.intp], point: Vector
+        self, coordinates: Sequence[StateEntry], free: NDArray[np.intp], point: Vector
     ) -> Iterator[Vector]:
         """Orthonormal directions (n,) that span the coordinates `free`, within the closures."""
         bound: set[int] = set()

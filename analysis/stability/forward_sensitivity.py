@@ -33,7 +33,7 @@ from hapticlink.analysis.stability.frozen_nonlinearities import discrete
 from hapticlink.analysis.stability.graph_slopes import GraphSlopes, graph_slopes
 from hapticlink.analysis.stability.state_vector import (
     SIGNALS,
-    Coordinate,
+    StateEntry,
     StateVector,
     Template,
     ages,
@@ -115,7 +115,7 @@ class ForwardSensitivity:
         self._reach: dict[Instruction, Reach | None] = {}
         self._known: dict[Any, list[Slopes]] = {}
         self._graphs: dict[str, GraphSlopes | None] = {}
-        self._named: dict[Any, list[Coordinate]] = {}
+        self._named: dict[Any, list[StateEntry]] = {}
 
     def forget(self, fmus: Container[str]) -> None:
         """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
@@ -307,7 +307,7 @@ class ForwardSensitivity:
         rows = np.concatenate([np.arange(len(J)), graph.n_u + ranks])
         return images[:, rows], J[rows]
 
-    def _coordinates(self, key: Any, state: StateVector, template: Any) -> list[Coordinate]:
+    def _coordinates(self, key: Any, state: StateVector, template: Any) -> list[StateEntry]:
         if key not in self._named:
             self._named[key] = state.coordinates(template)
         return self._named[key]

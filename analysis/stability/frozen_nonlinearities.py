@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from hapticlink.analysis.stability.state_vector import Coordinate
+from hapticlink.analysis.stability.state_vector import StateEntry
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, MECHANISM
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
@@ -95,7 +95,7 @@ def describe_switches(system: System) -> list[str]:
     return [f"{line}, as at the equilibrium" for line in lines]
 
 
-def discrete(coordinate: Coordinate) -> bool:
+def discrete(coordinate: StateEntry) -> bool:
     """Whether a coordinate is a switch or belongs to what is taken out."""
     variable = coordinate.variable.partition("[")[0].rpartition(".")[2]  # left.n_constrained
     return (coordinate.kind, variable) in DISCRETE

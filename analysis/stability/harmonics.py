@@ -57,7 +57,7 @@ class Hybrid:
         return Hybrid(self.Y[i, i], self.there[i, j], self.back[j, i], self.own[j, j], self.r)
 
 
-class Scale:
+class MotionScale:
     """Rotations are scaled by the length (m) at which the device has as much impedance in both;
     `turns` is its square, 0 without rotations. moving: orthonormal directions in which the handle
     moves, `free` those of the device alone. A rendered constraint lets the handle move in fewer:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
-from hapticlink.analysis.stability.state_vector import Coordinate, StateVector
+from hapticlink.analysis.stability.state_vector import StateEntry, StateVector
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
@@ -91,7 +91,7 @@ class LiftedMap:
         self._moments = [m for m in moments if first <= m.tick < first + length]
         self.events = len(self._moments)
         self._template = self._state.save()
-        self.coordinates: Sequence[Coordinate] = self._state.coordinates(self._template)
+        self.coordinates: Sequence[StateEntry] = self._state.coordinates(self._template)
         self.start = self._state.numbers(self._template)
         free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
         self._free = np.array(free, dtype=np.intp)

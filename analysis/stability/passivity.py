@@ -35,7 +35,7 @@ import numpy as np
 
 from hapticlink.analysis.stability import two_port
 from hapticlink.analysis.stability.absolute_stability import damping_shortage, least
-from hapticlink.analysis.stability.harmonics import Hybrid, Scale, hertz, with_worst
+from hapticlink.analysis.stability.harmonics import Hybrid, MotionScale, hertz, with_worst
 from hapticlink.analysis.stability.lifted_map import long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.port_response import (
@@ -209,7 +209,7 @@ class _UserPort:
 
     def __init__(self, whole: Response, device: Response, T: float, P: float) -> None:
         self._whole, self._device, self._P = whole, device, P
-        self.N, self.scale = whole.forces // whole.m, Scale(device, whole, T)
+        self.N, self.scale = whole.forces // whole.m, MotionScale(device, whole, T)
         self._moving_of_free = self.scale.free.T @ self.scale.moving
 
     def _impedances(self, angle: float) -> tuple[Hybrid, Complex]:

@@ -24,7 +24,7 @@ SIGNALS = "signals"
 
 
 @dataclass(frozen=True)
-class Coordinate:
+class StateEntry:
     """An entry of the state: of an FMU, of the signals ("signal") or of a connection's hold
     ("hold"); `variable` is its name there. inert: an output of an FMU, which its steps write and do
     not read."""
@@ -132,11 +132,11 @@ class StateVector:
         parts.append(template.signals)
         return [*parts, *(saved.numbers for saved in template.holds)]
 
-    def coordinates(self, template: Template) -> list[Coordinate]:
+    def coordinates(self, template: Template) -> list[StateEntry]:
         simulation = self._simulation
         system, signals = simulation.system, simulation.signals
         coordinates = [
-            Coordinate(u.name, name, "fmu", inert)
+            StateEntry(u.name, name, "fmu", inert)
             for u in self._fmus
             for _, name, inert in _entries(u)
         ]
@@ -145,10 +145,10 @@ class StateVector:
         ]
         outputs = [_signal(name) for name in columns]
         further = range(len(outputs), len(template.signals))
-        coordinates += outputs + [Coordinate("held values", f"[{i}]", "signal") for i in further]
+        coordinates += outputs + [StateEntry("held values", f"[{i}]", "signal") for i in further]
         for owner, saved in zip(self._holds, template.holds, strict=True):
             names = self._holds[owner].names(saved)
-            coordinates += [Coordinate(owner, name, "hold") for name in names]
+            coordinates += [StateEntry(owner, name, "hold") for name in names]
         return coordinates
 
 
@@ -179,9 +179,9 @@ def size(system: System) -> int:
 
 
 @lru_cache(4096)
-def _signal(column: str) -> Coordinate:
+def _signal(column: str) -> StateEntry:
     fmu, _, variable = column.partition(".")
-    return Coordinate(fmu, variable, "signal")
+    return StateEntry(fmu, variable, "signal")
 
 
 def require_layout(fmu: Fmu) -> None:

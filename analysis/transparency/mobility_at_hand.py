@@ -218,7 +218,7 @@ def _direction(along: Vector, column: Complex, i: int, inertia: float) -> Direct
 
 
 @dataclass(frozen=True)
-class Cost:
+class ChangeCost:
     """How a scene feels with a change, and `times`, the factor on its stiffnesses (dampings by its
     root) up to which it is stable in spring hands, with `stiffest`, how it feels there; None
     without gains or where it is not stable with any."""
@@ -245,7 +245,7 @@ class Cost:
 
 def costs(
     scene: str | Path | Scene, options: Sequence[str], tell: Callable[[str], object]
-) -> list[Cost]:
+) -> list[ChangeCost]:
     """How the scene feels at its start with other rates, delays and holds, and how stiff it can be
     made."""
     read = open_scene.load(scene, options)
@@ -274,19 +274,19 @@ def costs(
     return found
 
 
-def _cost(read: Scene, place: RestingScene, change: str) -> Cost:
+def _cost(read: Scene, place: RestingScene, change: str) -> ChangeCost:
     felt = _measure_felt(read, place, change, {})
     try:
         judge = Judge({change: place})
         times = judge.margin({})
-        return Cost(
+        return ChangeCost(
             change,
             felt,
             times,
             _measure_felt(read, place, change, dict.fromkeys(judge.laws, times)),
         )
     except (InputFault, FmuFault):
-        return Cost(change, felt, None, None)
+        return ChangeCost(change, felt, None, None)
 
 
 HEADS = (
@@ -295,7 +295,7 @@ HEADS = (
 )  # fmt: skip
 
 
-def cost_lines(found: Sequence[Cost]) -> Iterator[str]:
+def cost_lines(found: Sequence[ChangeCost]) -> Iterator[str]:
     """The costs as a table; what changes nothing in one row."""
     rows: dict[tuple[str, ...], list[str]] = {}
     for cost in found:

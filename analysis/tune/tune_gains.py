@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hapticlink.analysis.search.acceptance import METRIC, PEAK, Limits, judged_numbers
+from hapticlink.analysis.search.acceptance import METRIC, PEAK, AcceptanceLimits, judged_numbers
 from hapticlink.analysis.search.search import COARSE, FINE, raise_laws
 from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.poses import (
@@ -104,7 +104,7 @@ class _Tuning:
     ) -> None:
         self._read, self._margin, self._tell, self._keep = read, margin, tell, keep
         self._linkage, device = required(read)
-        self._limits = Limits.of(device)
+        self._limits = AcceptanceLimits.of(device)
 
     def search(self) -> Scales:
         """The scales of the largest gains with which margin and run hold, with frames of whole

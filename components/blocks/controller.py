@@ -26,10 +26,10 @@ import casadi as ca
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
 from hapticlink.components.port_space import PortSpace
-from hapticlink.components.ports import Spring
-from hapticlink.components.specs.control import Controller, Passivity, Topology
+from hapticlink.components.ports import SpringPorts
+from hapticlink.components.specs.control import Controller, PassivityLaw, Topology
 
-_DRIFT = Spring("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")
+_DRIFT = SpringPorts("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")
 """F_drift between the operational point and the handle."""
 
 
@@ -110,7 +110,7 @@ def controller(spec: Controller, space: PortSpace, length_scale: float) -> Compo
             "is false: turn impedance on, or take bias = 'none'"
         )
     law = Topology() if spec.topology is True else (spec.topology or None)
-    guard = Passivity() if spec.passivity is True else (spec.passivity or None)
+    guard = PassivityLaw() if spec.passivity is True else (spec.passivity or None)
     outputs, parameters = _outputs(spec, space, law), _gains(spec, space, law, length_scale)
     states: list[Variable] = []
     if guard:

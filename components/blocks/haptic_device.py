@@ -20,7 +20,7 @@ from hapticlink.components import integrators
 from hapticlink.components.component import Block, Component, Variability, Variable
 from hapticlink.components.device import pantograph
 from hapticlink.components.device.motors_and_encoders import quantised
-from hapticlink.components.device.observer import Observer, State
+from hapticlink.components.device.observer import ForceObserver, State
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.device import Device
@@ -136,7 +136,7 @@ class _Encoders:
 
     def __init__(self, block: Block, rule: str) -> None:
         self._p, self._h, x = block.p, block.h, block.x
-        self._observer = Observer(rule, block.p["omega_n"], block.p["k_D"])
+        self._observer = ForceObserver(rule, block.p["omega_n"], block.p["k_D"])
         self._state = State(x["x_observer"], x["v_observer"])
         self.pose = x["x_measured"]
         self._M, self._C = pantograph.dynamics(self.pose, self._state.x2, block.p)

@@ -22,7 +22,7 @@ from hapticlink.components.component import STEP_SIZE, Block, Component, Variabl
 from hapticlink.components.control import passivity as observer
 from hapticlink.components.device.motors_and_encoders import quantised
 from hapticlink.components.port_space import LINE
-from hapticlink.components.specs.control import Passivity
+from hapticlink.components.specs.control import PassivityLaw
 
 PERIOD = 1e-3
 """Where `step_size` (s) starts, which a run sets."""
@@ -72,8 +72,8 @@ def virtual_wall(
     if passivity is not None:
         text = "m of the device, for its passivity controller"
         parameters += [Variable("mass", (), "kg", passivity, text)]
-        parameters += observer.parameters(Passivity())
-        states += observer.states(Passivity(), LINE)
+        parameters += observer.parameters(PassivityLaw())
+        states += observer.states(PassivityLaw(), LINE)
         outputs += observer.OUTPUTS
     block = Block(inputs=inputs, parameters=parameters, states=states, outputs=outputs)
     return _component(block, unilateral)

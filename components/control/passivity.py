@@ -26,12 +26,12 @@ import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Signals, Variable
 from hapticlink.components.port_space import PortSpace
-from hapticlink.components.specs.control import Passivity
+from hapticlink.components.specs.control import PassivityLaw
 
 PERIOD = Variable(STEP_SIZE, (), "s", 1e-3, "period T", "fixed")
 
 
-def parameters(spec: Passivity) -> list[Variable]:
+def parameters(spec: PassivityLaw) -> list[Variable]:
     """The budget, the limit, the noise, and the time after which a free handle is a new start."""
     variables = [
         Variable("passivity_energy", (), "J", spec.energy, "energy that the motors may give"),
@@ -44,7 +44,7 @@ def parameters(spec: Passivity) -> list[Variable]:
     return variables
 
 
-def states(spec: Passivity, space: PortSpace) -> list[Variable]:
+def states(spec: PassivityLaw, space: PortSpace) -> list[Variable]:
     """The observer's memory, of a port."""
     variables = [
         Variable("E_before", (), "J", description="energy left at the last sample"),

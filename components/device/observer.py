@@ -31,7 +31,7 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Observer:
+class ForceObserver:
     """The observer with gains omega_n (rad/s) and k_D (1/s), stepped by a rule of
     `discretisation`."""
 

@@ -33,7 +33,7 @@ STABLE = 2.0  # |pole| h up to which the explicit methods are stable
 
 
 @dataclass(frozen=True)
-class Scale:
+class JointFriction:
     """A joint with friction: its mobility with closed loops, A, and N."""
 
     name: str
@@ -68,12 +68,12 @@ class Scale:
         return values
 
 
-def scales(linkage: Linkage) -> list[Scale]:
+def scales(linkage: Linkage) -> list[JointFriction]:
     """The joints and cut joints with friction."""
     if not (rubs := rubbing(linkage)):
         return []
     return [
-        Scale(j.name, j.joint, closed, max(closed, OPEN_SHARE * opened), len(rubs))
+        JointFriction(j.name, j.joint, closed, max(closed, OPEN_SHARE * opened), len(rubs))
         for j, (closed, opened) in zip(rubs, _mobilities(linkage, rubs), strict=True)
     ]
 
@@ -88,13 +88,13 @@ def speeds(linkage: Linkage, h: float) -> dict[str, float]:
     return speeds
 
 
-def longest_step(scales: Iterable[Scale]) -> float:
+def longest_step(scales: Iterable[JointFriction]) -> float:
     """The longest step (s) in which explicit methods are stable with the values that are given."""
     fastest = max((pole for scale in scales for _, pole in scale.poles), default=0.0)
     return STABLE / fastest if fastest else math.inf
 
 
-def require_slow(scales: Iterable[Scale], h: float) -> None:
+def require_slow(scales: Iterable[JointFriction], h: float) -> None:
     """Raises ValueError for given values that are too stiff for steps of h (s) of explicit
     methods."""
     for what, pole in (named_pole for scale in scales for named_pole in scale.poles):

@@ -30,7 +30,7 @@ class Teleoperation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Passivity:
+class PassivityLaw:
     """Time-domain passivity observer and controller (Hannaford and Ryu 2002): what the motors give
     beyond a budget is taken out by damping ([energy](energy.md#passivity-controller))."""
 
@@ -69,5 +69,5 @@ class Controller:
     contact: bool = False
     """Whether contacts are felt: F_env enters the impedance law. Needs [contacts]. With further
     hands or efforts on joints it always does, with all that acts beside the hand."""
-    passivity: Passivity | bool = False
+    passivity: PassivityLaw | bool = False
     """Passivity controller at the motors; true for its defaults."""

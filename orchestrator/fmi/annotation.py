@@ -25,7 +25,7 @@ from dataclasses import replace
 from typing import Any, get_args
 from xml.etree.ElementTree import Element
 
-from hapticlink.components.ports import Kind, Power, Spring
+from hapticlink.components.ports import Kind, Power, SpringPorts
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.units import Unit, why_unsuitable
 from hapticlink.orchestrator.fmi.variables import Scalar
@@ -73,7 +73,7 @@ def read_annotation(
     ports = _Ports(scalars, units)
     kinds: dict[str, Kind] = {}
     power: dict[str, Power] = {}
-    springs: list[Spring] = []
+    springs: list[SpringPorts] = []
     states: tuple[str, ...] | None = None
     for element in declared:
         _one_of(element.tag, "element", ("Port", "Spring", "States"))
@@ -116,9 +116,9 @@ class _Ports:
             raise ValueError(f"{given['name']}: sign {sign:g} is neither 1 nor -1")
         return Power(given["displacement"], sign)
 
-    def spring(self, element: Element) -> Spring:
+    def spring(self, element: Element) -> SpringPorts:
         needed = "set_position position stiffness"
-        spring = Spring(**_attributes(element, needed, "damping set_velocity velocity force"))
+        spring = SpringPorts(**_attributes(element, needed, "damping set_velocity velocity force"))
         size = len(self._entries(spring.set_position, "input"))
         gains = dict.fromkeys(("stiffness", "damping"), ("parameter",))
         for name, causalities in (SPRING_ENDS | gains).items():

@@ -25,7 +25,7 @@ from hapticlink.orchestrator.fmi import load_library, messages, process_cache
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.load_library import load_slave
-from hapticlink.orchestrator.fmi.saved_state import Saved
+from hapticlink.orchestrator.fmi.saved_state import SavedFmuState
 from hapticlink.orchestrator.fmi.setter import Setter, Setting
 from hapticlink.orchestrator.fmi.status import (
     DISCARD,
@@ -52,7 +52,7 @@ class InProcess(Instance):
         super().__init__(*arguments)
         self.slave: Any = None
         self._status = 0
-        self._saved: dict[int, Saved] = {}
+        self._saved: dict[int, SavedFmuState] = {}
         self._saved_time: dict[int, float] = {}
         self._initialized = False
         self._setters = 0
@@ -252,10 +252,10 @@ class InProcess(Instance):
             raise self.failed(f"fmi{self.description.fmi}GetFMUstate", status)
         self._saved_time[slot] = self.time
 
-    def slot(self, slot: int) -> Saved:
+    def slot(self, slot: int) -> SavedFmuState:
         """The storage of a slot, which may not have been saved to."""
         if slot not in self._saved:
-            self._saved[slot] = Saved(self.slave, self.description.fmi, self.place)
+            self._saved[slot] = SavedFmuState(self.slave, self.description.fmi, self.place)
         return self._saved[slot]
 
     def rollback(self, slot: int = 0) -> None:

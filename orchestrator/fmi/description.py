@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
-from hapticlink.components.ports import Kind, Power, Spring
+from hapticlink.components.ports import Kind, Power, SpringPorts
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import annotation, clocks
 from hapticlink.orchestrator.fmi.archive import open_archive, read_xml, require_whole
@@ -71,7 +71,7 @@ class Description:
     """By output: the output that is its derivative with respect to time."""
     kinds: Mapping[str, Kind] = field(default_factory=dict)
     power: Mapping[str, Power] = field(default_factory=dict)
-    springs: tuple[Spring, ...] = ()
+    springs: tuple[SpringPorts, ...] = ()
     """What the FMU declares of its ports, by port (`annotation`)."""
     states: tuple[str, ...] | None = None
     """The states that its serialised FMU state ends with; None where that is not declared."""

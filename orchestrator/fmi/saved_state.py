@@ -9,7 +9,7 @@ from hapticlink.orchestrator.fmi import load_library
 from hapticlink.orchestrator.fmi.instance import StepState
 
 
-class Saved:
+class SavedFmuState:
     """Storage for one FMU state. save and restore return the status of the call; `place` counts
     them, and forgets which inputs the FMU has. overwrites: pythonfmu forgets a state that is saved
     over (FMI 2.0.5 section 2.1.8 has it reused), so that it is freed before."""

@@ -88,6 +88,7 @@ def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) ->
         (["build", "five-bar", "--all-platforms", "--out", "none"], "--set packaging=native"),
         (["new", "nowhere/crane"], "nowhere"),
         (["export-results", "runs/a", "--to", "mcap"], '.frame("haptics").to_parquet('),
+        (["advise", "closed-loop", "--draws=3"], "there are eight; --seed N gives eight others"),
     ],
 )
 def test_bad_input_is_status_2(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hapticlink.fmus.build_fmu import build, build_native
-from hapticlink.fmus.check import Session, session
+from hapticlink.fmus.check import FmuSession, session
 from tests.fmus import sample_components
 
 
@@ -46,7 +46,7 @@ def native_fmus_3(tmp_path_factory: pytest.TempPathFactory) -> Built:
 
 
 @pytest.fixture
-def opened(fmus: dict[str, Path]) -> Iterator[Callable[[str], Session]]:
+def opened(fmus: dict[str, Path]) -> Iterator[Callable[[str], FmuSession]]:
     """name -> Session; closed at the end of the test."""
     with ExitStack() as stack:
         yield lambda name: stack.enter_context(session(fmus[name]))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from fmpy.fmi2 import FMU2Slave
 
-from hapticlink.fmus.check import Session
+from hapticlink.fmus.check import FmuSession
 
 
 class Named:
     """One instance of an opened FMU."""
 
-    def __init__(self, at: Session, name: str = "instance") -> None:
+    def __init__(self, at: FmuSession, name: str = "instance") -> None:
         self.at = at
         self.slave: FMU2Slave = at.instance(name)
         self.references = {v.name: v.valueReference for v in at.description.modelVariables}

@@ -13,7 +13,7 @@ from fmpy.fmi1 import FMICallException
 
 from hapticlink.components.component import Block, Variable
 from hapticlink.fmus.build_fmu import build, build_native
-from hapticlink.fmus.check import Session, check_fmu, session
+from hapticlink.fmus.check import FmuSession, check_fmu, session
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
 
@@ -36,7 +36,7 @@ def files(request: pytest.FixtureRequest, packaging: str) -> dict:
 
 
 @pytest.fixture
-def opened(files: dict) -> Iterator[Callable[[str], Session]]:
+def opened(files: dict) -> Iterator[Callable[[str], FmuSession]]:
     """name -> Session; closed at the end of the test."""
     with ExitStack() as stack:
         yield lambda name: stack.enter_context(session(files[name]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
-from hapticlink.analysis.findings.tracking import of_block
+from hapticlink.analysis.findings.tracking import of_port
 from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.base.terminal_output import align_columns
@@ -151,7 +151,7 @@ def _timing(run: Results) -> Numbers:
 def _point_distances(runs: Sequence[Results]) -> list[Row]:
     """The largest distance (mm) of the operational point from that of the first run at the same
     times, until the first end; none where a run has no such point, or another mechanism."""
-    tables = [table for run in runs if (table := of_block(run, POINT_POSE, 3))]
+    tables = [table for run in runs if (table := of_port(run, POINT_POSE))]
     comparable = len(tables) == len(runs) > 1 and one_mechanism(runs)
     if not comparable or not all(len(table["time"]) for table in tables):
         return []

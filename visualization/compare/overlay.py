@@ -11,7 +11,7 @@ from hapticlink.analysis.findings.forces import wrenches
 from hapticlink.analysis.findings.tracking import (
     count_constrained,
     has_tracking,
-    of_block,
+    of_port,
     pose_error,
 )
 from hapticlink.analysis.findings.user_port import user_port
@@ -64,7 +64,7 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
     paths: Curves = {
         name: (table[POINT_POSE][:, 0] * 1e3, table[POINT_POSE][:, 1] * 1e3)
         for name, run in runs.items()
-        if (table := of_block(run, POINT_POSE, 3))
+        if (table := of_port(run, POINT_POSE))
     }
     if paths:
         figure = _figure("Paths of the operational point", "x (mm)", "y (mm)", paths)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hapticlink.analysis.findings.forces import WRENCHES, torques, wrenches
-from hapticlink.analysis.findings.tracking import further_users
+from hapticlink.analysis.findings.tracking import UserSignals, find_users
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
@@ -29,7 +29,7 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     driven = {
         user: curve(time, *tau)
         for user, device in devices.items()
-        for time, tau in [torques(results, device, user) or (None, ())]
+        for time, tau in [torques(results, device, UserSignals.of(user)) or (None, ())]
         if time is not None
     }
     largest, (_, force, _) = max(drawn.items(), key=lambda item: item[1][1].max())
@@ -40,7 +40,7 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
         share = 100 * max(np.abs(tau).max() / limits[user] for user, (_, *tau) in driven.items())
         title += f"; motors reach {short(share)} % of their torque limit"
     figure, axes = titled_axes(results, title, "time (s)", *labels)
-    styles = dict(zip(["", *further_users(results)], cycle(STYLES)))
+    styles = dict(zip([user.name for user in find_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
     for name, (time, force, moment) in drawn.items():
         user, _, kind = name.rpartition(": ")

@@ -13,6 +13,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.analysis.findings import labels, summary
 from hapticlink.analysis.findings.episodes import Episode, episodes
@@ -20,8 +21,9 @@ from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
 from hapticlink.analysis.findings.tracking import (
     constraint_counts,
     count_constrained,
-    further_users,
+    find_users,
     of_block,
+    of_port,
     pose_error,
 )
 from hapticlink.analysis.findings.user_port import UserPort, allowance, tolerated_energy, user_port
@@ -76,30 +78,30 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         return drawn_by
     with_rows = {name: table for name, table in results.tables.items() if len(table.rows)}
     results = with_record(replace(results, tables=with_rows), results.record)
-    linkage = scene_part(
-        results, "linkage", Linkage
-    )  # an SSP has the block, but not its description
-    size = len(linkage.coordinate_units) if linkage else 0
-    port = (whole := user_port(results)) and port_curve(whole)
+    whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
+    counted, generated = count_constrained(results), _generated_energies(results)
+    # an SSP has the block, but not its description
+    linkage, devices = scene_part(results, "linkage", Linkage), all_devices(results)
+    size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
     if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
         q = table[JOINT_COORDINATES]
         if len(finite := np.flatnonzero(np.isfinite(q).all(axis=1))):
             ends = q[finite[[0, -1]]]
             drawn_by["mechanism"] = partial(_mechanism, results, linkage, ends, port)
-    if of_block(results, POINT_POSE, 3):
+    if of_port(results, POINT_POSE):
         if "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
-        if of_block(results, HANDLE_POSE, 3):
+        if of_port(results, HANDLE_POSE):
             drawn_by["distance"] = partial(_distance, results)
-    if any(True for _ in wrenches(results)):
-        drawn_by["forces"] = partial(forces, results, all_devices(results))
-    if touching(results):
-        drawn_by["contact"] = partial(_contact, results)
-    if count_constrained(results):
-        drawn_by["constraints"] = partial(_constraints, results)
+    if forced:
+        drawn_by["forces"] = partial(forces, results, devices)
+    if touched:
+        drawn_by["contact"] = partial(_contact, results, *touched)
+    if counted:
+        drawn_by["constraints"] = partial(_constraints, results, *counted)
     if port:
         drawn_by["user_port"] = partial(_port, results, port)
-    if generated := _generated_energies(results):
+    if generated:
         drawn_by["energies"] = partial(_energies, results, generated)
     if (paced := results.record.real_time) and paced["ticks"]:
         drawn_by["real_time"] = partial(real_time, results)
@@ -145,7 +147,7 @@ def _finding(results: Results, marked: Sequence[Episode], port: UserPort | None)
     """How far the operational point was led, how far the handle was from it, where the linkage gave
     way in fewer directions, and what the rendering gave back."""
     parts = [f"The operational point was led up to {_with('mm', _reach(results))} from its start"]
-    if of_block(results, HANDLE_POSE, 3):
+    if of_port(results, HANDLE_POSE):
         time, apart, _ = pose_error(results)
         at = _with("s", float(time[apart.argmax()]))
         parts.append(f"the handle was at most {_with('mm', apart.max())} off it, at {at}")
@@ -160,7 +162,7 @@ def _finding(results: Results, marked: Sequence[Episode], port: UserPort | None)
 
 def _reach(results: Results) -> float:
     """How far (mm) the operational point, or the handle without it, was from its start."""
-    signal = POINT_POSE if of_block(results, POINT_POSE, 3) else HANDLE_POSE
+    signal = POINT_POSE if of_port(results, POINT_POSE) else HANDLE_POSE
     _, path = _place(results, signal)
     return float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0))
 
@@ -185,8 +187,8 @@ def _arrow(results: Results, axes: Axes) -> None:
 
 def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
     """The largest force of the hand (N), when (s), its components and where it acted (m)."""
-    force, handle = of_block(results, HAND_WRENCH, 3), of_block(results, HANDLE_POSE, 3)
-    handle = handle or of_block(results, POINT_POSE, 3)
+    force, handle = of_port(results, HAND_WRENCH), of_port(results, HANDLE_POSE)
+    handle = handle or of_port(results, POINT_POSE)
     if not (force and handle):
         return None
     F, times = force[HAND_WRENCH][:, :2], force["time"]
@@ -199,7 +201,7 @@ def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
 
 def _mark(results: Results, marked: Sequence[Episode], axes: Axes) -> None:
     """The episodes of a run, along the path of the operational point."""
-    if of_block(results, POINT_POSE, 3) is None:
+    if of_port(results, POINT_POSE) is None:
         return
     time, path = curve(*_place(results, POINT_POSE))
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
@@ -215,7 +217,7 @@ def _mark(results: Results, marked: Sequence[Episode], axes: Axes) -> None:
 
 def _place(results: Results, signal: str) -> tuple[Vector, Vector]:
     """Times (s) and places (mm) of a pose."""
-    table = of_block(results, signal, 3)
+    table = of_port(results, signal)
     assert table is not None
     return table["time"], table[signal][:, :2] * 1e3
 
@@ -234,13 +236,13 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
             (HANDLE_POSE, "handle x_D", "--"),
             *further,
         )
-        if of_block(results, signal, 3)
+        if of_port(results, signal)
     ]
 
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if of_block(results, HANDLE_POSE, 3):
+    if of_port(results, HANDLE_POSE):
         apart = short(pose_error(results).distance_mm.max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:
@@ -257,7 +259,7 @@ def _trajectories(results: Results) -> Figure:
 
 
 def _distance(results: Results) -> Figure:
-    users = {user: curve(*pose_error(results, user)) for user in ("", *further_users(results))}
+    users = {u.name: curve(*pose_error(results, u)) for u in find_users(results)}
     largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
     at = int(gap.argmax())
     title = (
@@ -276,14 +278,12 @@ def _point(user: str) -> str:
     return f"point {user}" if user else "operational point"
 
 
-def _contact(results: Results) -> Figure:
-    table, touched = of_block(results, ENVIRONMENT_WRENCH, 3), touching(results)
+def _contact(results: Results, times: Vector, pushes: NDArray[np.bool_]) -> Figure:
+    table = of_port(results, ENVIRONMENT_WRENCH)
     assert table is not None
-    assert touched is not None
-    pushes = touched[1]
     share = 100 * float(pushes.sum() / len(pushes))
     size = table.by_row(lambda F: np.linalg.norm(F[:, :2], axis=1), ENVIRONMENT_WRENCH)
-    time, force, pushing = curve(touched[0], size, pushes)
+    time, force, pushing = curve(times, size, pushes)
     most = short(force[pushing].max(initial=0.0))
     title = f"Contacts push in {short(share)} % of the samples, with |F_env| of at most {most} N"
     figure, axes = titled_axes(
@@ -293,11 +293,9 @@ def _contact(results: Results) -> Figure:
     return figure
 
 
-def _constraints(results: Results) -> Figure:
-    counted = count_constrained(results)
-    assert counted is not None
-    samples = constraint_counts(counted[1])
-    time, count = curve(*counted)
+def _constraints(results: Results, times: Vector, numbers: Vector) -> Figure:
+    samples = constraint_counts(numbers)
+    time, count = curve(times, numbers)
     most = int(count.max())
     share = 100 * (samples[max(samples)] / sum(samples.values()))
     title = f"{most} constrained directions in {share:.3g} % of the samples"

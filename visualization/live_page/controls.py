@@ -44,7 +44,7 @@ class Controls:
         """The controls, as JSON has them."""
         return self._offered.described(self._settings)
 
-    def apply(self, message: messages.Hand | messages.Set) -> None:
+    def apply(self, message: messages.Hand | messages.SetControl) -> None:
         """Change the run. Raises InputFault where the message does not fit this scene; nothing is
         changed then."""
         if isinstance(message, messages.Hand):
@@ -71,7 +71,7 @@ class Controls:
             for gain in self._offered.topology if key == RENDERED else [name]:
                 self._set(gain)
 
-    def begins_with(self, message: messages.Set) -> bool:
+    def begins_with(self, message: messages.SetControl) -> bool:
         """Whether it sets a hold that the connection can have in a run that begins with it."""
         return message.value in self._offered.holds.get(message.key.removeprefix("holds."), ())
 

@@ -31,7 +31,7 @@ class Hand:
 
 
 @dataclass(frozen=True)
-class Set:
+class SetControl:
     """A control of the run, or of the second of two (`b`), is given a value."""
 
     __pydantic_config__ = STRICT
@@ -71,7 +71,7 @@ class Compare:
     on: bool
 
 
-Message = Hand | Set | Time | Compare
+Message = Hand | SetControl | Time | Compare
 _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Discriminator("type")])
 
 

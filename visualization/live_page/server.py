@@ -184,10 +184,10 @@ class Pages:
 
     def _tell(self, message: messages.Message) -> None:
         """Tell the run that a change is of, or both of a hand and a button."""
-        of_second = isinstance(message, messages.Set) and message.b and self._second
+        of_second = isinstance(message, messages.SetControl) and message.b and self._second
         if not of_second:
             write_message(self._out, message)
-        if self._second and (of_second or not isinstance(message, messages.Set)):
+        if self._second and (of_second or not isinstance(message, messages.SetControl)):
             self._second.send(message)
 
 

@@ -47,7 +47,7 @@ class Building(logging.Handler):
         self._link.send({"type": "building", "said": record.getMessage(), "took": self._took})
 
 
-class Session:
+class LiveSession:
     """The runs of a scene behind a page. `recordings` get folders `<root>-1`, `<root>-2`, ...
 
     real_time: `hl.RealTime`, which runs a scene and writes its folder as `hl.run` does. settings:
@@ -120,7 +120,7 @@ class Session:
             if isinstance(message, messages.Time):
                 self._time(message.do)
                 continue
-            assert isinstance(message, messages.Hand | messages.Set)
+            assert isinstance(message, messages.Hand | messages.SetControl)
             try:
                 self._controls.apply(message)
             except InputFault as fault:
@@ -137,7 +137,7 @@ class Session:
         """Say why; a hold that only a run that begins with it can have begins anew with it."""
         self._say("refused", why=str(fault))
         assert self._controls
-        if isinstance(message, messages.Set) and self._controls.begins_with(message):
+        if isinstance(message, messages.SetControl) and self._controls.begins_with(message):
             connection, hold = message.key.removeprefix("holds."), message.value
             self._scene = open_scene.load(self._scene, {f'holds."{connection}"': hold})
             self._say("refused", why=f"{hold} begins at t = 0: it runs in Python")

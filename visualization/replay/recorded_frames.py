@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.episodes import episodes
-from hapticlink.analysis.findings.tracking import further_users, of_any_shape, of_block, table_of
+from hapticlink.analysis.findings.tracking import find_users, of_any_shape, of_block, table_of
 from hapticlink.analysis.findings.user_port import tolerated_in_run, user_port
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
@@ -72,7 +72,7 @@ class Recorded:
         if not drawn.any():
             raise InputFault(f"{folder}: the run has no pose that is finite")
         self.times, self.left_out = self.times[drawn], int((~drawn).sum())
-        self.users = further_users(results)
+        self.users = [user.name for user in find_users(results)[1:]]
         others = scene_part(results, "devices", Mapping[str, Device]) if self.users else {}
         devices = by_user(device if "handle" in self.signals else None, others or {})
         self.picture = Picture(linkage, devices, self.contacts)
@@ -149,8 +149,8 @@ def _choose_signals(results: Results) -> tuple[dict[str, str], list[str]]:
     left_out = results.record.not_recorded
     signals, missing = dict[str, str](), list[str]()
     asked = candidates()
-    for user in further_users(results):
-        asked |= {f"{user}.{key}": names for key, names in candidates(user).items()}
+    for user in find_users(results)[1:]:
+        asked |= {f"{user.name}.{key}": names for key, names in candidates(user.name).items()}
     for key, names in asked.items():
         for name in names:
             if name in left_out:

@@ -11,11 +11,11 @@ import hapticlink as hl
 from hapticlink.analysis.advise import advise_method as advise
 from hapticlink.analysis.advise.advise_method import Measured, Method
 from hapticlink.analysis.advise.draws import FACTOR, draws
-from hapticlink.analysis.search.acceptance import Limits
+from hapticlink.analysis.search.acceptance import AcceptanceLimits
 from hapticlink.orchestrator import open_scene
 from tests.analysis.search.test_acceptance import row
 
-LIMITS = Limits(42.0)
+LIMITS = AcceptanceLimits(42.0)
 
 
 def test_the_smallest_error_within_the_limits_of_all_draws_is_advised() -> None:

@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hapticlink as hl
-from hapticlink.analysis.search.acceptance import Limits, energy_share, judged_numbers
+from hapticlink.analysis.search.acceptance import AcceptanceLimits, energy_share, judged_numbers
 from hapticlink.analysis.search.search import COARSE, DOUBLINGS, largest_count, raise_laws
 from hapticlink.analysis.stability.hands import FIRM, spring
 from hapticlink.analysis.stability.poses import LIGHT, Pose, simulate_scene
@@ -182,8 +182,8 @@ def test_a_wild_run_is_no_measure_of_the_gains_that_are_found(
     assert energy_share(found) <= 1.0
     device = open_scene.load(scene).device
     assert device is not None
-    assert not Limits.of(device).why_not(found)
-    assert tuned.own_run_breaks == Limits.of(device).why_not(own)
+    assert not AcceptanceLimits.of(device).why_not(found)
+    assert tuned.own_run_breaks == AcceptanceLimits.of(device).why_not(own)
     assert any(tuned.own_run_breaks in line for line in tuned.lines())
 
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.linalg import expm
 
 from hapticlink.components.device import discretisation
-from hapticlink.components.device.observer import Observer, State
+from hapticlink.components.device.observer import ForceObserver, State
 
 MASS, OMEGA_N, K_D = 0.3, 50.0, 100.0
 
@@ -16,7 +16,7 @@ def observer_function(rule, n=1):
     M, C = ca.SX.sym("M", n, n), ca.SX.sym("C", n, n)
     omega_n, k_D, period = (ca.SX.sym("gain") for _ in range(3))
     arguments = pose, pose_next, F_motor, M, C, period
-    state = Observer(rule, omega_n, k_D).step(State(x1, x2), *arguments)
+    state = ForceObserver(rule, omega_n, k_D).step(State(x1, x2), *arguments)
     symbols = [x1, x2, pose, pose_next, F_motor, M, C, omega_n, k_D, period]
     return ca.Function("observer", symbols, list(state))
 
@@ -63,7 +63,7 @@ def test_unity_gain_at_dc(rule, period):
     x1, x2 = ca.DM(0), ca.DM(0)
     for _ in range(1000):
         x1, x2 = f(x1, x2, 0, 0, -F, MASS, 0, OMEGA_N, K_D, period)
-    observer, state = Observer(rule, ca.SX(OMEGA_N), ca.SX(K_D)), State(ca.SX(x1), ca.SX(x2))
+    observer, state = ForceObserver(rule, ca.SX(OMEGA_N), ca.SX(K_D)), State(ca.SX(x1), ca.SX(x2))
     force = float(ca.DM(observer.force(state, ca.SX(0), ca.SX(MASS))))
     velocity = float(ca.DM(observer.velocity(state, ca.SX(0))))
     assert force == pytest.approx(F, rel=1e-9)

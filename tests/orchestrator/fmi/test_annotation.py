@@ -7,14 +7,14 @@ import casadi as ca
 import pytest
 
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.ports import Power, Spring
+from hapticlink.components.ports import Power, SpringPorts
 from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import describe
 from tests.little_fmus import edited, python_fmu
 
-SPRING = Spring("far", "x", stiffness="K", damping="B", set_velocity="rate")
+SPRING = SpringPorts("far", "x", stiffness="K", damping="B", set_velocity="rate")
 
 
 def declaring(**replaced: Variable) -> Component:

@@ -15,7 +15,7 @@ from hapticlink.components.blocks.controller import controller
 from hapticlink.components.device.motors_and_encoders import count_energies, numbers
 from hapticlink.components.device.pantograph import base_angles, dynamics
 from hapticlink.components.port_space import PLANE
-from hapticlink.components.specs.control import Controller, Passivity
+from hapticlink.components.specs.control import Controller, PassivityLaw
 from hapticlink.components.specs.device import Device
 from tests.analysis.stability.own_hand import own_hand
 from tests.blocks import Running
@@ -104,7 +104,7 @@ def test_the_lifted_map_is_that_of_the_loop_without_it():
 
 def block(**spec: Any) -> Running:
     """A controller that holds a spring of 1000 N/m, with the passivity controller `spec`."""
-    law = Controller(**TWO_SIDED, stiffness=(1000.0, 1000.0, 5.0), passivity=Passivity(**spec))
+    law = Controller(**TWO_SIDED, stiffness=(1000.0, 1000.0, 5.0), passivity=PassivityLaw(**spec))
     return Running(controller(law, PLANE, 0.04), {"M": M}, {"step_size": T})
 
 

@@ -7,7 +7,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.visualization.live_and_standalone.offered_controls import RATE, Settings
 from hapticlink.visualization.live_page.controls import Controls
-from hapticlink.visualization.live_page.messages import Hand, Set, Time, newest, parse
+from hapticlink.visualization.live_page.messages import Hand, SetControl, Time, newest, parse
 from tests.api.test_real_time import ENERGY, ran
 
 
@@ -35,7 +35,7 @@ def test_the_rate_of_the_scene_without_jitter_is_no_change() -> None:
     def turn(live: hl.RealTime) -> None:
         controls = Controls(live, settings)
         for value in (64.0, 30.0):
-            controls.apply(Set("set", RATE, value))
+            controls.apply(SetControl("set", RATE, value))
             rates.append(settings.get(RATE))
         live.stop()
 
@@ -50,7 +50,7 @@ def test_a_change_that_is_refused_is_not_kept() -> None:
     def turn(live: hl.RealTime) -> None:
         controls = Controls(live, settings)
         key = next(c["key"] for c in controls.described() if "choices" in c)
-        for message in (Set("set", key, "none"), Set("set", "holds.x", "zoh")):
+        for message in (SetControl("set", key, "none"), SetControl("set", "holds.x", "zoh")):
             with pytest.raises(hl.InputFault, match=r"^no hold 'none'|^no control"):
                 controls.apply(message)
         live.stop()
@@ -64,7 +64,7 @@ def test_a_pull_is_read() -> None:
     other = '{"type": "hand", "at": null, "user": "left"}'
     assert parse(other) == Hand("hand", None, "left")
     rate = '{"type": "set", "key": "graphics.rate", "value": 10, "b": true}'
-    assert parse(rate) == Set("set", "graphics.rate", 10.0, b=True)
+    assert parse(rate) == SetControl("set", "graphics.rate", 10.0, b=True)
     assert parse('{"type": "set", "key": "controller.topology", "value": true}').value is True
 
 
@@ -113,7 +113,7 @@ def test_what_is_no_message_is_refused(text: str | bytes) -> None:
 
 
 def test_of_many_messages_the_newest_of_each_control_is_kept() -> None:
-    gain = [Set("set", f"gains.{name}", float(i)) for i in range(5) for name in "ab"]
+    gain = [SetControl("set", f"gains.{name}", float(i)) for i in range(5) for name in "ab"]
     step = [Time("time", "step")] * 2
     pulls = [Hand("hand", at, user) for user in ("", "left") for at in ((0.0, 0.0), None)]
     found = newest([*gain, *step, *pulls])
