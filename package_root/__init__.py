@@ -28,6 +28,10 @@ _MODULES = {
     for name in line.names
 }
 """By public name, the module that defines it."""
+_GONE = {
+    "export_results": 'a table writes itself: r.frame("haptics").to_parquet("haptics.parquet")',
+}
+"""Names of earlier versions, with what does their work now."""
 __all__ = sorted([*_MODULES, "__version__"])
 
 
@@ -38,7 +42,8 @@ def __getattr__(name: str) -> Any:
 
         return version("hapticlink")
     if name not in _MODULES:
-        raise AttributeError(f"module 'hapticlink' has no attribute {name!r}")
+        remedy = f" any more: {_GONE[name]}" if name in _GONE else ""
+        raise AttributeError(f"module 'hapticlink' has no attribute {name!r}{remedy}")
     return getattr(import_module(_MODULES[name]), name)
 
 

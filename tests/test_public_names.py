@@ -27,6 +27,8 @@ def test_names_are_there_for_people_type_checkers_and_help() -> None:
     assert f"VERSION\n    {hl.__version__}" in said
     with pytest.raises(AttributeError, match="no attribute 'simulate'"):
         hl.simulate  # type: ignore[attr-defined]  # noqa: B018
+    with pytest.raises(AttributeError, match=r"'export_results' any more: .*to_parquet"):
+        hl.export_results  # type: ignore[attr-defined]  # noqa: B018
 
 
 def test_names_load_what_is_behind_them_when_they_are_used() -> None:

@@ -1,6 +1,6 @@
 """Defaults of the virtual mechanism that depend on step sizes, as expressions of the parameters
-`step_size` and `frame_size`: Baumgarte's alpha (baumgarte_gains.py), and the scales of friction
-(friction_scale.py, and tau of dry_friction.py for contacts)."""
+`step_size` and `frame_size`: Baumgarte's alpha (integrators/base.py), and the scales of friction
+(friction_scale.py, and tau of forces/friction.py for contacts)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import math
 
 from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Signals, Variable
 from hapticlink.components.contact import contact_forces
-from hapticlink.components.dynamics import baumgarte_gains, friction_scale
-from hapticlink.components.integrators import METHODS
+from hapticlink.components.dynamics import friction_scale
+from hapticlink.components.integrators import METHODS, base
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 
@@ -40,7 +40,7 @@ class StepDefaults:
             longest = friction_scale.longest_step(self._scales) * mechanism.substeps
         start = min(NOMINAL, longest) if step_s is None else step_s
         bound = longest if math.isfinite(longest) else None
-        self.baumgarte = baumgarte_gains.HELD if frame_s else method.baumgarte
+        self.baumgarte = base.HELD_MODEL if frame_s else method.baumgarte
         stabilised = mechanism.stabilization == "baumgarte" and linkage.closed
         self._alpha = stabilised and mechanism.alpha is None
         self._held = bool(self._alpha and frame_s)

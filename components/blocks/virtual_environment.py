@@ -18,7 +18,7 @@ from hapticlink.components.contact import contact_forces
 from hapticlink.components.dynamics import follow_mechanism, further_points
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
-from hapticlink.components.dynamics.massless_bodies import require_inertia
+from hapticlink.components.dynamics.light_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import (
     direction_outputs,

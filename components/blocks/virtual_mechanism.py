@@ -34,7 +34,7 @@ from hapticlink.components.dynamics import (
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.constrained_directions import ConstrainedDirections
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
-from hapticlink.components.dynamics.massless_bodies import notes, refuse_jumps, require_inertia
+from hapticlink.components.dynamics.light_bodies import notes, refuse_jumps, require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import (
     direction_outputs,

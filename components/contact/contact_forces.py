@@ -8,8 +8,8 @@ F acts on the point of the body's surface that has the velocity v relative to th
 the ground, on which -F acts at the same point of the world: between bodies, momentum and angular
 momentum are conserved.
 
-With a coefficient of friction mu, F also has the tangential part -k e of dry_friction.py, with the
-rate of the body's surface along the plane, the spring of stiffness k with its deflection z as a
+With a coefficient of friction mu, F also has the tangential part -k e of forces/friction.py, with
+the rate of the body's surface along the plane, the spring of stiffness k with its deflection z as a
 state, and a limit k d = mu n . F.
 """
 
@@ -27,7 +27,7 @@ from hapticlink.components.contact.detection import (
     touches,
 )
 from hapticlink.components.contact.one_sided_spring import OneSidedForces, Unilateral
-from hapticlink.components.forces import dry_friction
+from hapticlink.components.forces import friction
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
@@ -63,7 +63,7 @@ def contact_parameters(linkage: Linkage, contacts: Contacts) -> list[Variable]:
 
 def lag(h: ca.SX) -> ca.SX:
     """tau (s), damping over stiffness of a contact that sticks, for integration steps of h."""
-    return dry_friction.LAG * h
+    return friction.LAG * h
 
 
 def states(linkage: Linkage, contacts: Contacts) -> list[Variable]:
@@ -173,7 +173,7 @@ class ContactForces(OneSidedForces):
         pushes, rubs = self._pushes(laws), ca.SX(len(self.sides), 1)
         if self._z is not None:
             breaks, tau = self._breaks(pushes), self._p["tau_contact"]
-            rubs = -self._p["k_contact"] * dry_friction.friction_effort(
+            rubs = -self._p["k_contact"] * friction.friction_effort(
                 self._z, self._slides, breaks, tau
             )
         wrenches: dict[str, ca.SX] = {}
@@ -192,7 +192,7 @@ class ContactForces(OneSidedForces):
         if self._z is None:
             return ca.SX(0, 1)
         breaks, tau = self._breaks(self._pushes(laws)), self._p["tau_contact"]
-        return dry_friction.deflection_rate(self._z, self._slides, breaks, tau)
+        return friction.deflection_rate(self._z, self._slides, breaks, tau)
 
 
 def _along(touch: Touch) -> ca.SX:

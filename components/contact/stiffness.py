@@ -16,7 +16,7 @@ import numpy as np
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.dynamics.linkage_values import start_mobility
-from hapticlink.components.forces import dry_friction
+from hapticlink.components.forces import friction
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts, Pair
 from hapticlink.components.specs.linkage import Linkage
@@ -34,7 +34,7 @@ def sticking_poles(linkage: Linkage, contacts: Contacts, h: float) -> Iterator[t
     """The same along the surface for contacts that stick, at steps of h (s); none without
     friction."""
     if contacts.friction:
-        damping = contacts.stiffness * dry_friction.LAG * h
+        damping = contacts.stiffness * friction.LAG * h
         yield from _poles(linkage, contacts, damping, True)
 
 

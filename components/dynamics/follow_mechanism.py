@@ -31,14 +31,13 @@ from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 
 def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     """The copy's inputs from the mechanism; q_ref also where it only serves to compare branches."""
-    units = linkage.coordinate_units
-    n, rates = len(units), tuple(f"{u}/s" for u in units)
-    space, pose = linkage.space, "pose of the mechanism's operational point"
+    units, space = linkage.coordinate_units, linkage.space
+    pose, n = "pose of the mechanism's operational point", (len(units),)
     x_ref = Variable("x_ref", *space.pose, description=pose)
     v_ref = Variable("v_ref", *space.twist, description="its velocity")
     start = tuple(coordinates(linkage, linkage.start))
-    q_ref = Variable("q_ref", (n,), units, start, "the mechanism's coordinates")
-    qd_ref = Variable("qd_ref", (n,), rates, description="the mechanism's joint rates")
+    q_ref = Variable("q_ref", n, units, start, "the mechanism's coordinates")
+    qd_ref = Variable("qd_ref", n, linkage.rate_units, description="the mechanism's joint rates")
     if copy.sync == "operational":
         return [x_ref, v_ref, *([q_ref] if linkage.closed else [])]
     return [q_ref, qd_ref]

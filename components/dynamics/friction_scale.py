@@ -22,8 +22,7 @@ from typing import Any
 import casadi as ca
 
 from hapticlink.components.dynamics.linkage_values import start_mobility
-from hapticlink.components.forces.dry_friction import LAG
-from hapticlink.components.forces.friction import rubbing
+from hapticlink.components.forces.friction import LAG, rubbing
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate
 from hapticlink.components.specs.linkage import Linkage
 

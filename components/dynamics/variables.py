@@ -37,13 +37,12 @@ def mechanism_parameters(
 def start_parameters(linkage: Linkage) -> list[Variable]:
     """Parameters for the start pose before assembly and the start velocity before projection."""
     units = linkage.coordinate_units
-    rates = tuple(f"{u}/s" for u in units)
     q, qd = (tuple(coordinates(linkage, s)) for s in (linkage.start, linkage.start_velocity))
     n = (len(units),)
     text = "joint rates before assembly; those that the scene gives are kept"
     return [
         Variable("q_start", n, units, q, "joint coordinates before assembly", "fixed"),
-        Variable("qd_start", n, rates, qd, text, "fixed"),
+        Variable("qd_start", n, linkage.rate_units, qd, text, "fixed"),
     ]
 
 
@@ -67,19 +66,19 @@ def direction_parameters(directions: Directions) -> list[Variable]:
 def states(linkage: Linkage) -> list[Variable]:
     units = linkage.coordinate_units
     n = (len(units),)
-    return [Variable("q", n, units), Variable("qd", n, tuple(f"{u}/s" for u in units))]
+    return [Variable("q", n, units), Variable("qd", n, linkage.rate_units)]
 
 
 def motion_outputs(linkage: Linkage) -> list[Variable]:
     units, m, space = linkage.coordinate_units, sum(rows(linkage)), linkage.space
-    rates, changes = (tuple(f"{u}/{per}" for u in units) for per in ("s", "s2"))
+    changes = tuple(f"{u}/s2" for u in units)
     n, velocity = (len(units),), "velocity of the operational point"
     bias = "operational acceleration at zero wrench"
     variables = [
         Variable("x", *space.pose, description="pose of the operational point"),
         Variable("v", *space.twist, description=velocity, derivative_of="x"),
         Variable("q", n, units, description="joint coordinates"),
-        Variable("qd", n, rates, description="joint rates", derivative_of="q"),
+        Variable("qd", n, linkage.rate_units, description="joint rates", derivative_of="q"),
         Variable("qdd", n, changes, description="joint accelerations", derivative_of="qd"),
         Variable("a_bias", *space.acceleration, description=bias),
         Variable("energy", (), "J", description="kinetic and potential energy"),

@@ -1,4 +1,18 @@
-"""Coulomb friction on single joint coordinates (dry_friction.py), with the deflection z as a state:
+"""Coulomb friction that sticks: a slider in series with a spring and a damper.
+
+    e  = clip(z + tau v, -d, d)        v: rate of the sliding surfaces, z: deflection of the spring
+    F  = -k e                          |F| <= k d, the friction
+    z' = (e - z)/tau
+
+Where |z + tau v| < d the slider sticks: z' = v, and F = -k z - k tau v is an elastic force that
+holds its place for any time; nothing creeps. Otherwise it slides: |F| = k d at any speed, and z
+follows to +-d within tau. It is not stiffer at high speeds, and it dissipates: -F v >= (k z^2/2)'.
+
+Kikuuwe, Takesue, Sano, Mochiyama, Fujimoto, IEEE Trans. Robotics 22 (2006), 1176; without drift
+before sliding as Dupont, Hayward, Armstrong, Altpeter, IEEE Trans. Automatic Control 47 (2002),
+787, require.
+
+On the coordinate c of a joint, with the deflection z as a state,
 
     Q = -(dc/dq)' f e/d,   tau = d/v_f
 
@@ -11,12 +25,22 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components.component import Variable
-from hapticlink.components.forces import dry_friction
 from hapticlink.components.linkage.joint_coordinates import JointCoordinate, joints_with
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Linkage
 
+LAG = 4  # default of tau, in integration steps: of its modes in a step, none is faster than 1/4
 KEYS = ("friction", "friction_deflection", "friction_speed")
+
+
+def friction_effort(z: ca.SX, v: ca.SX, d: ca.SX, tau: ca.SX | float) -> ca.SX:
+    """e, in the unit of the deflection z."""
+    return ca.fmin(ca.fmax(z + tau * v, -d), d)
+
+
+def deflection_rate(z: ca.SX, v: ca.SX, d: ca.SX, tau: ca.SX | float) -> ca.SX:
+    """z'."""
+    return (friction_effort(z, v, d, tau) - z) / tau
 
 
 def rubbing(linkage: Linkage) -> list[JointCoordinate]:
@@ -70,7 +94,7 @@ def efforts(model: LinkageModel) -> ca.SX | None:
     if not rubbing(model.linkage):
         return None
     j = Joints(model)
-    return -j.jacobian.T @ (j.f * dry_friction.friction_effort(j.z, j.v, j.d, j.tau) / j.d)
+    return -j.jacobian.T @ (j.f * friction_effort(j.z, j.v, j.d, j.tau) / j.d)
 
 
 def clip_deflection(model: LinkageModel, z: ca.SX) -> ca.SX:
@@ -84,4 +108,4 @@ def deflection_rates(model: LinkageModel) -> ca.SX:
     if not rubbing(model.linkage):
         return ca.SX(0, 1)
     j = Joints(model)
-    return dry_friction.deflection_rate(j.z, j.v, j.d, j.tau)
+    return deflection_rate(j.z, j.v, j.d, j.tau)

@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hapticlink.components.integrators import dormand_prince_8
 from hapticlink.components.integrators.base import Baumgarte, Integrator, MechanicalSystem, Ode
 from hapticlink.components.integrators.linearly_implicit import LinearlyImplicit
 from hapticlink.components.integrators.passive_midpoint import PassiveMidpoint
-from hapticlink.components.integrators.runge_kutta import HEUN, RK4, RungeKutta
+from hapticlink.components.integrators.runge_kutta import DORMAND_PRINCE_8, HEUN, RK4, RungeKutta
 from hapticlink.components.integrators.semi_implicit_euler import SemiImplicitEuler
 from hapticlink.components.registry import Registry, no_instance
 
@@ -24,7 +23,7 @@ METHODS: Registry[Integrator] = Registry(
         "heun": RungeKutta(HEUN, Baumgarte(math.sqrt(2), math.sqrt(0.5))),
         "linearly-implicit": LinearlyImplicit(),
         "rk4": RungeKutta(RK4),
-        "dormand-prince-8": dormand_prince_8.METHOD,
+        "dormand-prince-8": RungeKutta(DORMAND_PRINCE_8, Baumgarte(alpha_T=0.1)),
         "passive-midpoint": PassiveMidpoint(),
     },
     lambda part: no_instance(part, Integrator),

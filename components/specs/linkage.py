@@ -257,6 +257,11 @@ class Linkage:
         return tuple(unit for j in self.joint for unit in j.kind.units)
 
     @property
+    def rate_units(self) -> tuple[str, ...]:
+        """The units of their rates."""
+        return tuple(f"{unit}/s" for unit in self.coordinate_units)
+
+    @property
     def closed(self) -> bool:
         """Whether it has closures: loops or gears."""
         return bool(self.loop or self.gear)

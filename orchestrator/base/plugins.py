@@ -72,7 +72,8 @@ def _load(module: str, what: str) -> None:
             importlib.import_module(module)
     except ModuleNotFoundError as error:
         if not f"{module}.".startswith(f"{error.name}."):
-            raise InputFault(f"{what}: it imports {error.name!r}, which is not there") from error
+            text = f"it imports {error.name!r}, which is not there{_hint(error)}"
+            raise InputFault(f"{what}: {text}") from error
         hint = "give its name, without .py" if module.endswith(".py") else "is it installed?"
         raise InputFault(f"{what}: no such module, nor a file in {os.getcwd()}; {hint}") from error
     except SyntaxError as error:
@@ -86,11 +87,18 @@ def _load(module: str, what: str) -> None:
             text = str(error)
         except Exception:
             text = "its message cannot be read"
-        raise InputFault(f"{what}: {place}{type(error).__name__}: {text}") from error
+        text = f"{place}{type(error).__name__}: {text}{_hint(error)}"
+        raise InputFault(f"{what}: {text}") from error
     package = module.partition(".")[0]
     if package not in {name.partition(".")[0] for name in registry.origins()}:
         file = getattr(sys.modules[module], "__file__", None)
         raise InputFault(f"{what}: {file} registers no part (docs/extending.md)")
+
+
+def _hint(error: BaseException) -> str:
+    """The remedy for a name of this package that is not, or no longer, there."""
+    ours = isinstance(error, ImportError) and str(error.name).startswith("hapticlink.")
+    return "; docs/extending.md has a complete example of each part" if ours else ""
 
 
 @contextmanager

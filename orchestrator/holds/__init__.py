@@ -15,6 +15,8 @@ def _misfit(part: Any) -> str:
     """Why a part is no hold, "" if it is one."""
     if why := no_subclass(part, Hold):
         return why
+    if part.needs == "spring":
+        return "needs 'spring', whose energy `pspm` alone limits: take hold = \"pspm\""
     known = (None, *get_args(Needs))
     return "" if part.needs in known else f"needs {part.needs!r}, which is none of {known}"
 

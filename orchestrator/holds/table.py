@@ -12,8 +12,8 @@ from typing import NamedTuple
 class HoldRow(NamedTuple):
     """What is declared of a hold in C; the other names are those of `Hold`.
 
-    depth: the newest samples that `push_samples` keeps. remembers: how many vectors of the signal's
-    size the hold keeps besides.
+    depth: the newest samples that `push_samples` keeps, up to the entries of `stamps` in loop.h.
+    remembers: how many vectors of the signal's size the hold keeps besides.
     """
 
     push: str
@@ -58,6 +58,8 @@ def hold_table_h() -> str:
     names |= dict.fromkeys(f"Value value_{row.value};" for row in ROWS)
     rows = (f"    {{push_{row.push}, value_{row.value}}}," for row in ROWS)
     declared = "\n".join(names)
-    return f"/* Made of orchestrator/holds/table.py. */\n\n{declared}\n\n" + " \\\n".join(
-        ["#define HOLD_TABLE", *rows, ""]
+    deepest = f"#define DEEPEST {max(row.depth for row in ROWS)}"
+    return (
+        f"/* Made of orchestrator/holds/table.py. */\n\n{declared}\n\n{deepest}\n\n"
+        + " \\\n".join(["#define HOLD_TABLE", *rows, ""])
     )

@@ -10,7 +10,7 @@ from hapticlink.components.blocks.controller import controller
 from hapticlink.components.blocks.hand import hand
 from hapticlink.components.device import discretisation
 from hapticlink.components.dynamics.assembly import AssemblyError
-from hapticlink.components.dynamics.massless_bodies import MasslessError
+from hapticlink.components.dynamics.light_bodies import MasslessError
 from hapticlink.components.integrators.runge_kutta import Tableau
 from hapticlink.components.paths import TimeSpline, TimeTable, signal
 from hapticlink.components.port_space import PLANE

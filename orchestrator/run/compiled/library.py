@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import platform
 import subprocess
 from functools import cache
@@ -18,6 +19,8 @@ from hapticlink.orchestrator.run.compiled import build
 def load() -> ctypes.CDLL:
     """The library. Raises Fault, with the remedy, where it can neither be found nor be compiled, or
     does not load."""
+    if os.environ.get("HAPTICLINK_LOOP") == "python":
+        raise Fault("HAPTICLINK_LOOP=python: there is no event loop in Python any more: unset it")
     built = build.HERE / build.name()
     path = built if built.exists() else _compiled()
     try:

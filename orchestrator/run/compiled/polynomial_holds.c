@@ -9,6 +9,9 @@
 
 #include <string.h>
 
+_Static_assert(DEEPEST <= sizeof ((Hold *)0)->stamps / sizeof(int64_t),
+               "loop.h: Hold.stamps has too few entries for the deepest row of the table of holds");
+
 /* s: time since the newest stamp, t - t_n; H, H1: t_n - t_{n-1} and t_{n-1} - t_{n-2} (ticks). */
 typedef struct {
     const double *y, *y1, *y2;
@@ -22,7 +25,7 @@ static Samples samples(const Hold *h, int64_t tick, double ahead) {
     return (Samples){
         .y = y,
         .y1 = last > 0 ? y - h->width : y,
-        .y2 = h->samples,
+        .y2 = last > 1 ? y - 2 * h->width : y,
         .s = (double)(tick - *t) + ahead,
         .H = last > 0 ? (double)(t[0] - t[-1]) : 0.0,
         .H1 = last > 1 ? (double)(t[-1] - t[-2]) : 0.0,

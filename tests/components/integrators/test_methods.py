@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from hapticlink.components import integrators
-from hapticlink.components.integrators.dormand_prince_8 import DORMAND_PRINCE_8
-from hapticlink.components.integrators.runge_kutta import HEUN, RK4
+from hapticlink.components.integrators.runge_kutta import DORMAND_PRINCE_8, HEUN, RK4
 
 
 @given(st.sampled_from([HEUN, RK4, DORMAND_PRINCE_8]), st.data())

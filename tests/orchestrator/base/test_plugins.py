@@ -91,7 +91,7 @@ def test_modules_that_are_no_plugins(tmp_path):
         "empty": ("x = 1", "empty.py registers no part (docs/extending.md)"),
         "taken": (
             HOLD.format(name="foh"),
-            "taken.py, line 5: ValueError: hold 'foh' is one of hapticlink: take another",
+            "taken.py, line 9: ValueError: hold 'foh' is one of hapticlink: take another",
         ),
         "named": (HOLD.format(name="my hold"), "hold 'my hold': name it by letters, digits, _ and"),
     }
@@ -165,6 +165,10 @@ PARTS = [
     ("FAMILIES", RAISING, "mine", FAMILY, "plugin part17: FOLDER/part17.py, line 2: RuntimeError"),
     ("COMMANDS", RAISING, "mine", "hapticlink mine",
      "plugin part18: FOLDER/part18.py, line 2: RuntimeError: no"),
+    # Of an earlier version.
+    ("HOLDS", SPEED.replace("speed", "spring"), "Mine", EXPLAIN, "take hold = \"pspm\""),
+    ("HOLDS", "from hapticlink.orchestrator.holds import OfSamples", "OfSamples", EXPLAIN,
+     "; docs/extending.md has a complete example of each part"),
 ]  # fmt: skip
 
 

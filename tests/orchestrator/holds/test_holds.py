@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.holds.table import TABLE
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from tests.orchestrator.holds.bench import Bench
 
 Vector = NDArray[np.float64]
 stamps = st.lists(st.integers(1, 40), min_size=3, max_size=8).map(np.cumsum)
-EXTRAPOLATING = ["lead", "foh", "second-order", "delayed", "smooth", "mean"]
+EXTRAPOLATING = [name for name, row in TABLE.items() if not row.needs and not row.gives_samples]
 
 
 def held(name: str, size: int = 1, **parts: object) -> CompiledHold:

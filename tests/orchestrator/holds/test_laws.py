@@ -41,8 +41,9 @@ def through(stamps, samples, slopes=()):
 
 def polynomial(name, stamps, y, yd, t):
     """A hold's value at tick t from all samples y, and what they have beside, yd."""
-    known = min(len(stamps), 1 + {"foh": 1, "second-order": 2}.get(name, 0))
-    if name in ("zoh", "latest", "foh", "second-order"):
+    row = TABLE[name]
+    known = min(len(stamps), row.degree + 1)
+    if row.depth == row.degree + 1 and not row.needs:
         return through(stamps[-known:], y[-known:])(float(t * BASE))
     if name == "lead":
         return y[-1] if len(y) < 2 else 1.5 * y[-1] - 0.5 * y[-2]

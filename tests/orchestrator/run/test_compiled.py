@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from hapticlink.commands import doctor
+from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.event_kinds import event
@@ -58,6 +59,13 @@ def test_a_machine_without_the_library_is_told_the_remedy(tmp_path, monkeypatch)
         assert said.startswith("the event loop, a library of C, is not there for ")
         assert "it is not built, and there is no C compiler; take a wheel" in said
         assert 'pip install "hapticlink[native]"' in said
+
+
+def test_the_loop_in_python_is_refused(monkeypatch):
+    library.load.cache_clear()
+    monkeypatch.setenv("HAPTICLINK_LOOP", "python")
+    with pytest.raises(Fault, match="no event loop in Python any more: unset it"):
+        library.load()
 
 
 STEPS = (
