@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 4598,
-    "fmus": 2611,
-    "orchestrator": 12034,
-    "programs": 1144,
-    "analysis": 6450,
-    "visualization": 3348,
-    "api": 429,
-    "commands": 1326,
+    "components": 4738,
+    "fmus": 2615,
+    "orchestrator": 11468,
+    "programs": 1098,
+    "analysis": 6422,
+    "visualization": 3127,
+    "api": 400,
+    "commands": 1325,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
@@ -47,7 +47,7 @@ imports. A number is raised only in a commit that says why."""
 CAPABILITIES = {
     "network": (("orchestrator", "network"), 14),
     "engine": (("fmus", "engine"), 16),
-    "spring": (("components",), 51),
+    "spring": (("components",), 47),
     "program": (("programs",), 6),
 }
 """Words of a capability: where it lives, and the most files outside of it that name it."""
