@@ -59,7 +59,7 @@ def nothing_skipped() -> Iterator[None]:
     with ExitStack() as stack:
         for module, name, instead in (
             (blocks, "_loop", lambda scene, _: build(scene, False)),
-            (experiment, "with_fetched", lambda system: system),
+            (experiment, "choose_fetched", lambda system: system),
             (calls_of_fmi, "Setter", always),
         ):
             stack.enter_context(patch.object(module, name, instead))

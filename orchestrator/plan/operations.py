@@ -39,7 +39,7 @@ Stamp = int | Place
 """So many ticks after the event, or the stamp of what is in another place."""
 
 
-class Signals(NamedTuple):
+class SignalUse(NamedTuple):
     """The places in the signal vector that an operation reads and writes."""
 
     read: tuple[Place, ...] = ()
@@ -70,7 +70,7 @@ class Instruction:
         """The places to which it brings samples, each with the stamp of these."""
         yield from ()
 
-    def signals(self, system: System) -> Signals | None:
+    def signals(self, system: System) -> SignalUse | None:
         """What it reads and writes beside its FMU or hold; None of what has no slopes."""
         return None
 
@@ -101,8 +101,8 @@ class Get(OfFmu):
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
         yield ("outputs", self.fmu), self.ahead
 
-    def signals(self, system: System) -> Signals:
-        return Signals(written=(("outputs", self.fmu),))
+    def signals(self, system: System) -> SignalUse:
+        return SignalUse(written=(("outputs", self.fmu),))
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,8 @@ class Push(OfHold):
         source = system.connection[self.connection].source
         yield ("hold", self.connection), self.ahead or ("outputs", source)
 
-    def signals(self, system: System) -> Signals:
-        return Signals(read=(("sources", self.connection),))
+    def signals(self, system: System) -> SignalUse:
+        return SignalUse(read=(("sources", self.connection),))
 
 
 @dataclass(frozen=True)
@@ -129,9 +129,9 @@ class _Evaluation(OfHold):
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
         yield ("held", self.connection), ("hold", self.connection)
 
-    def signals(self, system: System) -> Signals:
+    def signals(self, system: System) -> SignalUse:
         held = (("held", self.connection),)
-        return Signals(held, held)
+        return SignalUse(held, held)
 
 
 @dataclass(frozen=True)
@@ -164,10 +164,10 @@ class Set(OfFmu):
             held = c.hold and not self.now
             yield ("input", c.name), ("held", c.name) if held else ("outputs", c.source)
 
-    def signals(self, system: System) -> Signals:
+    def signals(self, system: System) -> SignalUse:
         into = system.into(self.fmu)
         sources = (("sources", c.name) for c in into)
-        return Signals((*sources, *(("held", c.name) for c in into if c.hold)))
+        return SignalUse((*sources, *(("held", c.name) for c in into if c.hold)))
 
 
 @dataclass(frozen=True)
@@ -184,8 +184,8 @@ class Step(OfFmu):
         over = 0 if system.fmu[self.fmu].sampled and self.parts == 1 else self.dticks
         return {"b": self.part * self.dticks, "c": self.parts, "d": over, "x": size}
 
-    def signals(self, system: System) -> Signals:
-        return Signals()
+    def signals(self, system: System) -> SignalUse:
+        return SignalUse()
 
 
 @dataclass(frozen=True)

@@ -62,10 +62,16 @@ class RunFolder(RunResults):
                 self._broken_off("fault", error)
 
     def _new(
-        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int, end: int
+        self,
+        clock: str,
+        recorded: Mapping[str, int] | None,
+        values: Vector,
+        every: int,
+        end: int,
+        most: int,
     ) -> FileRecorder:
         path = self.folder / f"{clock}.csv"
-        return FileRecorder(path, recorded, values, self._publish, every, end)
+        return FileRecorder(path, recorded, values, self._publish, every, end, most)
 
     def finish(self) -> None:
         if self._csv:

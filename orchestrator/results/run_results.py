@@ -16,7 +16,8 @@ class Recorder:
     """Records rows of a table: `time` and those `values` whose places the columns `recorded` name,
     at every `every`-th call of `row`, and at the one numbered `end`, the last one, from 0 on; where
     `recorded` is None there is no table, and rows are counted only. `first` is called after the
-    first row. A context manager.
+    first row. most: calls of `row` that there may be, where a rate may be raised during the run. A
+    context manager.
 
     rows: of the whole run, of which `filled` are written. `view` is `values` at `places` where
     these are side by side, else None. `due`: whether the next row is written. `room`: the rows that
@@ -34,6 +35,7 @@ class Recorder:
         first: Callable[[], object],
         every: int = 1,
         end: int = 0,
+        most: int = 0,
     ) -> None:
         places = [*(recorded or {}).values()]
         self.values, self.places = values, np.array(places, np.int64)
@@ -44,7 +46,7 @@ class Recorder:
         self._first = first
         self.due, self.room, self.count = (ctypes.c_int64(n) for n in (1, 0, 0))
         self.reached = ctypes.c_double()
-        self.rows, self.filled = self._new_rows(recorded is not None, end // every + 2)
+        self.rows, self.filled = self._new_rows(recorded is not None, max(end, most) // every + 2)
 
     def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
         """Room for the rows of the whole run, and the number of those that are written."""
@@ -104,15 +106,22 @@ class RunResults:
         values: Vector,
         every: int = 1,
         end: int = 0,
+        most: int = 0,
     ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
-        self._recorders[clock] = made = self._new(clock, recorded, values, every, end)
+        self._recorders[clock] = made = self._new(clock, recorded, values, every, end, most)
         return made
 
     def _new(
-        self, clock: str, recorded: Mapping[str, int] | None, values: Vector, every: int, end: int
+        self,
+        clock: str,
+        recorded: Mapping[str, int] | None,
+        values: Vector,
+        every: int,
+        end: int,
+        most: int,
     ) -> Recorder:
-        return Recorder(recorded, values, self._publish, every, end)
+        return Recorder(recorded, values, self._publish, every, end, most)
 
     def finish(self) -> None:
         """Make the CSVs of all clocks. Raises OSError, as on a full disk; the rows can be read

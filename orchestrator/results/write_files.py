@@ -32,6 +32,7 @@ class FileRecorder(Recorder):
         first: Callable[[], object],
         every: int = 1,
         end: int = 0,
+        most: int = 0,
     ) -> None:
         self.path, self.target = path, path.with_suffix(rows_file.SUFFIX)
         self._unfinished = path.with_name(f".{self.target.name}.{os.getpid()}")
@@ -39,7 +40,7 @@ class FileRecorder(Recorder):
             self._unfinished = self.target
         self._file: rows_file.RowsBeingWritten | None = None
         self._published, self._full = False, 0.0
-        super().__init__(recorded, values, first, every, end)
+        super().__init__(recorded, values, first, every, end, most)
 
     def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
         if not recorded:

@@ -99,10 +99,13 @@ class Simulation(LoadedFmus):
             self.setters[fmu.name, False] = self.setter(incoming, self.signals.places)
             if fmu.name in self.system.coupling.get_after_set:
                 self.setters[fmu.name, True] = self.setter(incoming, self.signals.sources)
-        for clock in self.system.timeline.clocks:
+        # A run in real time may give a slower clock any rate up to the haptic one.
+        time = self.system.timeline
+        most = time.points(time.clocks[0]) if self.pace else 0
+        for clock in time.clocks:
             recorded, every = self.signals.recorded(clock.name), self.system.recording.every
-            end = self.system.timeline.points(clock) - 1
-            recorder = self._results.recorder(clock.name, recorded, values, every, end)
+            end = time.points(clock) - 1
+            recorder = self._results.recorder(clock.name, recorded, values, every, end, most)
             self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:
@@ -120,7 +123,7 @@ class Simulation(LoadedFmus):
     def _beside(self, clock: str, name: str, columns: Sequence[str]) -> Recorder:
         """A table of what runs beside the loop; its row of t = 0 is there at once."""
         recorded = {column: i for i, column in enumerate(columns)}
-        most = self.system.timeline.points(self.system.timeline.clock(clock))
+        most = self.system.timeline.points(self.system.timeline.clocks[0])
         recorder = self._results.recorder(name, recorded, np.zeros(len(columns)), end=most)
         self._stack.enter_context(recorder)
         recorder.row(0.0)

@@ -105,14 +105,14 @@ def test_recorded_arrivals_replay_a_run(
     with relay(folder, served, *network, 5, -1) as at:
         run = run_at(at, folder, out)
     assert run["fault"] is None
-    assert read_table(out / "haptics.csv").total == 385
+    assert len(read_table(out / "haptics.csv")["time"]) == 385
     assert replayed(out) == tables(out)
     sides, told = run["real_time"]["samples"]["graphics"], run["network"]["virtual_environment"]
     frames, samples = (
         read_table(out / f"{name}.csv")
         for name in ("virtual_environment_frames", "graphics_samples")
     )
-    assert sides["taken"] == samples.total - 1
+    assert sides["taken"] == len(samples["time"]) - 1
     assert (frames["time"] == samples["time"]).all()
     assert (frames["sent"] < frames["arrived"])[1:].all()
     assert told["round_trip"]["min"] >= 2 * network[0]

@@ -29,7 +29,7 @@ SCENES = sorted(n for n, t in SHIPPED.items() if "[hand]" in t or "extends" in t
 
 @pytest.mark.parametrize("name", SCENES)
 def test_every_shipped_scene_runs_in_c(tmp_path, name):
-    run = simulate(name, tmp_path, ["duration=0.02"]).results.run
+    run = simulate(name, tmp_path, ["duration=0.06"]).results.run
     assert run["fault"] is None
     assert run["in_python"] == {}
 

@@ -19,7 +19,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import read_results
-from tests.little_fmus import SLAVE, edited_entries, python_fmu, python_fmu_of, slave
+from tests.little_fmus import PLAIN, SLAVE, edited_entries, python_fmu, python_fmu_of, slave
 from tests.orchestrator.c_fmus import HOSTILE_LOG, hostile_fmu
 from tests.orchestrator.foreign_scenes import (
     COMMAND,
@@ -160,7 +160,9 @@ def test_a_process_that_dies_or_hangs_ends_the_run_in_good_order(tmp_path, body,
 def test_two_fmus_with_modules_of_one_name_each_run_their_own(tmp_path):
     for name, value in (("first", 1.0), ("second", 2.0)):
         (tmp_path / name).mkdir()
-        slave = SLAVE.format(name="Same", body=f"self.y = {value}", end="")
+        slave = SLAVE.format(
+            name="Same", variables=PLAIN, body=f"self.y = {value}", initial="None", end=""
+        )
         python_fmu_of(tmp_path / name, slave, "same")
     text = fmu_table("one", "first/Same") + fmu_table("two", "second/Same")
     found = ran(tmp_path, text)
