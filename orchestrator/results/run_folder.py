@@ -4,13 +4,13 @@ one are on the disk."""
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt, text_files
-from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_record import (
@@ -61,17 +61,8 @@ class RunFolder(RunResults):
             with suppress(OSError):
                 self._broken_off("fault", error)
 
-    def _new(
-        self,
-        clock: str,
-        recorded: Mapping[str, int] | None,
-        values: Vector,
-        every: int,
-        end: int,
-        most: int,
-    ) -> FileRecorder:
-        path = self.folder / f"{clock}.csv"
-        return FileRecorder(path, recorded, values, self._publish, every, end, most)
+    def _recorder_of(self, clock: str) -> Callable[..., FileRecorder]:
+        return partial(FileRecorder, self.folder / f"{clock}.csv")
 
     def finish(self) -> None:
         if self._csv:

@@ -109,19 +109,13 @@ class RunResults:
         most: int = 0,
     ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
-        self._recorders[clock] = made = self._new(clock, recorded, values, every, end, most)
+        new = self._recorder_of(clock)
+        self._recorders[clock] = made = new(recorded, values, self._publish, every, end, most)
         return made
 
-    def _new(
-        self,
-        clock: str,
-        recorded: Mapping[str, int] | None,
-        values: Vector,
-        every: int,
-        end: int,
-        most: int,
-    ) -> Recorder:
-        return Recorder(recorded, values, self._publish, every, end, most)
+    def _recorder_of(self, clock: str) -> Callable[..., Recorder]:
+        """What makes the recorder of a clock, from the arguments of `Recorder`."""
+        return Recorder
 
     def finish(self) -> None:
         """Make the CSVs of all clocks. Raises OSError, as on a full disk; the rows can be read
