@@ -27,14 +27,16 @@ def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
     page = at_the_start(served, window)
     start = np.array(page.get("view.frame.x.slice(0, 2)"))
     page.pull(*(0.02 * np.array(way)))
-    page.run_for(1.5)
+    if moved:
+        to_go = f"{way[0]} * (f.x[0] - {start[0]}) + {way[1]} * (f.x[1] - {start[1]}) - {moved}"
+        page.until(f"((f) => Math.abs({to_go}) < 1e-3)(view.frame)")
+    else:
+        page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) > 1")
+    page.run_for(1.0)
     found = np.array(page.get("view.frame.x.slice(0, 2)")) - start
     assert way @ found == pytest.approx(moved, abs=2e-3)
-    if not moved:
-        assert np.hypot(*page.get("view.frame.F_hand.slice(0, 2)")) > 1
     page.page.mouse.up()
-    page.run_for(1.0)
-    assert np.hypot(*page.get("view.frame.F_hand.slice(0, 2)")) < 0.1
+    page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) < 0.1")
 
 
 def test_the_page_says_what_to_do_until_somebody_does_it(served: Served, window: Window) -> None:
