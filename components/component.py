@@ -7,7 +7,8 @@
 All three are CasADi functions of flat columns, whose entries the `Variable` records describe.
 The outputs of a *continuous* block (a plant) are those at the end of its step. A *sampled* block
 (a controller, an observer) computes y_k from the inputs at t_k; it is stamped t_k and valid on
-[t_k, t_k + h).
+[t_k, t_k + h). A *frame* block (the graphics copy) computes from the inputs at t_k, too, and takes
+its whole step to do so: y_k is stamped t_k + h, and describes t_k.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import casadi as ca
 from hapticlink.components.ports import Kind, Power, SpringPorts
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
-Timing = Literal["continuous", "sampled"]
+Timing = Literal["continuous", "sampled", "frame"]
 STEP_SIZE, FRAME_SIZE = "step_size", "frame_size"
 """Parameters that a run sets, where a block has them: the longest communication step (s) of the
 block, and of the graphics copy. No block is built for a step size."""

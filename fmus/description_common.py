@@ -122,9 +122,10 @@ def base_attributes(unit: str) -> dict[str, str]:
 
 
 def icon(about: Described) -> bytes:
-    """A smooth wave for a continuous block, a sampled and held one for a sampled block."""
-    timing = about.component.timing if about.component else "continuous"
-    return (Path(__file__).parent / "icons" / f"{timing}.png").read_bytes()
+    """A sampled and held wave for a sampled block, a smooth one for any other."""
+    sampled = about.component and about.component.timing == "sampled"
+    name = "sampled" if sampled else "continuous"
+    return (Path(__file__).parent / "icons" / f"{name}.png").read_bytes()
 
 
 def as_text(root: ET.Element) -> bytes:

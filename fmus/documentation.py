@@ -29,6 +29,8 @@ th, td { border-bottom: 1px solid #ccd; padding: .25em .6em; text-align: left; }
 
 TIMING = {
     "continuous": "Continuous block: outputs are those of the end of its step.",
+    "frame": "Frame block: a step from t to t + h puts out, at t + h, what it computes from "
+    "the inputs of t.",
     "sampled": "Sampled block: a step that starts at t with the inputs of t puts out y(t), "
     "valid until the step ends.",
 }

@@ -89,7 +89,7 @@ def virtual_environment(
     component = block.component(
         "virtual_environment",
         "Graphics-rate copy of the linkage, its mobility and constrained directions",
-        "continuous",
+        "frame",
         initial=initial,
         step=step,
         output=output,

@@ -30,7 +30,7 @@ from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.units import Unit, why_unsuitable
 from hapticlink.orchestrator.fmi.variables import Scalar
 
-TIMINGS = ("continuous", "sampled")
+TIMINGS = ("continuous", "sampled", "frame")
 SPRING_ENDS = {
     "set_position": ("input",),
     "position": ("input", "output"),

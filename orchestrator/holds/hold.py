@@ -33,11 +33,13 @@ class Hold(ABC):
     """A hold reconstructs the value of an input between two samples of its source.
 
     1. Times are whole ticks; `HoldContext.seconds` converts them.
-    2. At t = 0 the hold receives the source's initial output, stamped 0, before its value is read,
-       also where samples are delayed. There is no sample of the time before: until the second one
-       arrives, the hold has only that.
-    3. `push` takes a sample with the instant at which the source had it (its stamp) and the instant
-       at which the target gets it (its arrival). Stamps never decrease.
+    2. At t = 0 the hold receives the source's initial output, which describes 0, before its value
+       is read, also where samples are delayed. There is no sample of the time before: until the
+       second one arrives, the hold has only that.
+    3. `push` takes a sample with the instant that it describes and the instant at which the target
+       gets it (its arrival). A plant's outputs describe the end of its step, at which they are
+       known; those of a frame block, and samples with a latency, describe an earlier one than that
+       of their arrival. Neither decreases.
     4. `value` may be called several times at a tick, for different instants, and returns a vector
        of `HoldContext.size` finite numbers, which the caller does not change.
     5. The whole state of a hold is in its attributes: the lifted map of a scene reads and writes it
@@ -70,11 +72,11 @@ class Hold(ABC):
         """Construct the hold from what is known of its connection; there is no sample yet."""
 
     @abstractmethod
-    def push(self, stamp: int, sample: Vector, arrival: int) -> None:
-        """Take a sample of the instant `stamp` (tick) that the target knows from `arrival` (tick)
-        on, which is `stamp` or later.
+    def push(self, described: int, sample: Vector, arrival: int) -> None:
+        """Take a sample that describes the instant `described` (tick), and which the target knows
+        from `arrival` (tick) on, the same or later.
 
-        Stamps never decrease; a second sample with the same stamp replaces the first. `sample` is
+        A second sample that describes the same instant replaces the first. `sample` is
         a view that is valid only during the call: copy what is kept.
         """
 

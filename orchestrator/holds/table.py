@@ -29,7 +29,7 @@ class HoldRow(NamedTuple):
 
 TABLE: dict[str, HoldRow] = {
     "zoh": HoldRow("samples", "zero_order", gives_samples=True, interpolates=True),
-    "lead": HoldRow("samples", "lead", depth=2),
+    "lead": HoldRow("lead", "lead", depth=2),
     "foh": HoldRow("samples", "first_order", depth=2, degree=1, interpolates=True),
     "foh-derivative": HoldRow("samples", "first_order_derivative", needs="derivative", degree=1),
     "slope": HoldRow("samples", "slope", depth=2, needs="integral"),

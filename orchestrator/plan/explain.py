@@ -1,5 +1,5 @@
-"""`--explain`: a plan as text: which operation is executed when, and the stamp of the newest sample
-from which each input is computed."""
+"""`--explain`: a plan as text: which operation is executed when, and the instant that the newest
+sample describes from which each input is computed."""
 
 from __future__ import annotations
 
@@ -54,11 +54,14 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
         yield f"block {name}: {_kind(event)}"
         yield from _lines(plan.block(event), "  ")
     yield ""
-    yield "tick, time (s), block, FMU that gets inputs: each input @ tick of its newest sample"
+    yield (
+        "tick, time (s), block, FMU that gets inputs: "
+        "each input @ the tick that its newest sample describes"
+    )
     connections = {c.name: c for c in system.connections}
-    used = ((u.tick, connections[u.connection], u.stamp) for u in uses(plan, max(events)))
+    used = ((u.tick, connections[u.connection], u.described) for u in uses(plan, max(events)))
     for (tick, target), group in groupby(used, key=lambda use: (use[0], use[1].target)):
-        inputs = " ".join(f"{c.target_port}@{stamp}" for _, c, stamp in group)
+        inputs = " ".join(f"{c.target_port}@{described}" for _, c, described in group)
         yield f"{tick:>8}  {timeline.seconds(tick):<12.9g} {events[tick]:<3} {target}: {inputs}"
     if cut:
         yield f"cut after {rows} events; a run writes them all to plan.txt"

@@ -59,11 +59,12 @@ def feed(system: System, event: Event, fmu: Fmu, part: int = 0) -> Iterator[Oper
     """Evaluate the holds in front of an FMU and set its inputs.
 
     A plant keeps an input constant over its step or substep, so it gets the hold's value at the
-    middle of it. A sampled block gets the value at this tick.
+    middle of it. A sampled block, and one whose outputs describe the beginning of its step, get the
+    value at this tick.
     """
     incoming = system.into(fmu.name)
     width = Fraction(0)
-    if not fmu.sampled:
+    if not (fmu.sampled or fmu.frames):
         width = Fraction(dticks(event, fmu), system.coupling.substeps.get(fmu.name, 1))
     for connection in incoming:
         if connection.hold:

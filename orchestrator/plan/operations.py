@@ -34,9 +34,11 @@ class Event(NamedTuple):
 
 Place = tuple[str, str]
 """Where a sample is: in the "outputs" of an FMU, in the "hold" of a connection, in its value that
-is "held", or in the "input" of its target; "sources" are those outputs that a connection takes."""
+is "held", or in the "input" of its target; "sources" are those outputs that a connection takes, and
+"step" is the beginning of an FMU's newest step."""
 Stamp = int | Place
-"""So many ticks after the event, or the stamp of what is in another place."""
+"""The instant that a sample describes: so many ticks after the event, or that of what is in another
+place."""
 
 
 class SignalUse(NamedTuple):
@@ -99,7 +101,8 @@ class Get(OfFmu):
     code, b = "GET", "judged"
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
-        yield ("outputs", self.fmu), self.ahead
+        frames = system.fmu[self.fmu].frames
+        yield ("outputs", self.fmu), ("step", self.fmu) if frames else self.ahead
 
     def signals(self, system: System) -> SignalUse:
         return SignalUse(written=(("outputs", self.fmu),))
@@ -114,7 +117,8 @@ class Push(OfHold):
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
         source = system.connection[self.connection].source
-        yield ("hold", self.connection), self.ahead or ("outputs", source)
+        begun = 0 if system.fmu[source].frames else self.ahead
+        yield ("hold", self.connection), begun if self.ahead else ("outputs", source)
 
     def signals(self, system: System) -> SignalUse:
         return SignalUse(read=(("sources", self.connection),))
@@ -183,6 +187,10 @@ class Step(OfFmu):
         size = float(self.dticks * (system.timeline.base / self.parts))
         over = 0 if system.fmu[self.fmu].sampled and self.parts == 1 else self.dticks
         return {"b": self.part * self.dticks, "c": self.parts, "d": over, "x": size}
+
+    def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
+        if not self.part:
+            yield ("step", self.fmu), 0
 
     def signals(self, system: System) -> SignalUse:
         return SignalUse()

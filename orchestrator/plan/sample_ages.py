@@ -22,11 +22,12 @@ from hapticlink.orchestrator.system.system import System
 
 
 class Use(NamedTuple):
-    """At `tick` the target of `connection` got a value computed from samples up to `stamp`."""
+    """At `tick` the target of `connection` got a value computed from samples that describe instants
+    up to `described` (tick)."""
 
     tick: int
     connection: str
-    stamp: int
+    described: int
 
 
 def uses(
@@ -47,15 +48,15 @@ def uses(
             blocks[event] = [
                 (place, stamp)
                 for place, stamp in _stamps(plan, event)
-                if place[0] == "outputs" or place[1] in traced
+                if place[0] in ("outputs", "step") or place[1] in traced
             ]
         for (kind, name), stamp in blocks[event]:
             if kind == "held" and name in links:
-                for _, arrived, _ in links[name].arrived(tick):
+                for _, _, arrived in links[name].arrived(tick):
                     newest["hold", name] = arrived
             sample = tick + stamp if isinstance(stamp, int) else newest[stamp]
             if kind == "hold" and name in links:
-                links[name].send(sample)
+                links[name].send(max(tick, sample), sample)  # a frame is sent when it is over
             else:
                 newest[kind, name] = sample
             if kind == "input":
@@ -70,7 +71,8 @@ def _stamps(plan: Plan, kind: Event) -> Iterator[tuple[Place, Stamp]]:
 
 @dataclass(frozen=True)
 class Delay:
-    """Age (s) of the newest sample that an input is computed from, at the time when it is set."""
+    """Age (s) of the newest sample that an input is computed from, at the time when it is set: the
+    time since the instant that the sample describes."""
 
     min: float
     max: float
@@ -91,19 +93,23 @@ def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
     repeats.
 
     An input is held until it is set again, which adds to the age. The first event is left out,
-    since all its samples are of t = 0.
+    since all its samples are of t = 0, and so is what comes before the pattern, unless these events
+    end before it.
     """
     system, seconds = plan.system, plan.system.timeline.seconds
     ticks, kinds = keyed_events(system.timeline, pattern_end(system), events)
+    last = int(ticks[-1]) if len(ticks) else 0
+    begun = begun if (begun := _pattern_begin(system)) < last else 0
     found: dict[str, list[NDArray[np.int64]]] = {}
     late = {c.name for c in system.connections if c.latency}
-    for connection, ages in _ages(plan, ticks, kinds):
+    for connection, at, ages in _ages(plan, ticks, kinds):
         if connection not in late:
-            found.setdefault(connection, []).append(ages)
-    for tick, connection, stamp in uses(plan, int(ticks[-1]), late) if late and len(ticks) else ():
-        if tick:
+            found.setdefault(connection, []).append(ages[at > begun])
+    for tick, connection, stamp in uses(plan, last, late) if late and last else ():
+        if tick > begun:
             found.setdefault(connection, []).append(np.array([tick - stamp]))
-    joined = {name: np.concatenate(parts) for name, parts in found.items()}
+    parts = {name: np.concatenate(each) for name, each in found.items()}
+    joined = {name: each for name, each in parts.items() if len(each)}
     return {
         name: Delay(seconds(int(a.min())), seconds(int(a.max())), seconds(int(a.sum())) / len(a))
         for name, a in joined.items()
@@ -112,8 +118,9 @@ def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
 
 def _ages(
     plan: Plan, ticks: NDArray[np.int64], kinds: Mapping[Event, NDArray[np.intp]]
-) -> Iterator[tuple[str, NDArray[np.int64]]]:
-    """By connection, the ages (ticks) of its inputs in events of each kind: what these leave in the
+) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64]]]:
+    """By connection, in events of each kind, the ticks at which its inputs are set and their ages
+    (ticks): what these leave in the
     places is found once a kind, and goes on from event to event for all of them at once. Without
     latencies, of which each sample has its own."""
     left: dict[Place, dict[Event, Stamp]] = {}
@@ -142,7 +149,7 @@ def _ages(
 
     for kind, rows in kinds.items():
         for connection, stamp in () if kind.first else used[kind]:
-            yield connection, ticks[rows] - of(stamp, rows)
+            yield connection, ticks[rows], ticks[rows] - of(stamp, rows)
 
 
 def pattern_end(system: System) -> int:
@@ -154,6 +161,14 @@ def pattern_end(system: System) -> int:
     periods = [c.period for c in clocks if c.period]
     if drawn or len(periods) < len(clocks):
         return timeline.end
+    return min(timeline.end, _pattern_begin(system) + math.lcm(*periods))
+
+
+def _pattern_begin(system: System) -> int:
+    """The tick from which on the pattern of samples repeats, where it does: after all phases and
+    constant latencies, and after the first frames, whose samples describe t = 0 as those before."""
+    timeline = system.timeline
+    clocks, late = timeline.clocks, [c.latency for c in system.connections if c.latency]
     begun = max(c.first % c.longest for c in clocks)
-    begun += max((math.ceil(exact(way.min) / timeline.base) for way in late), default=0)
-    return min(timeline.end, begun + math.lcm(*periods))
+    begun += max((timeline.clock(u.clock).longest for u in system.fmus if u.frames), default=0)
+    return begun + max((math.ceil(exact(way.min) / timeline.base) for way in late), default=0)

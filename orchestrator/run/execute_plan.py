@@ -19,7 +19,6 @@ from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEn
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
-from hapticlink.orchestrator.run.energy.balance import unstable
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
@@ -188,7 +187,7 @@ def _details(
         network={name: remote.network() for name, remote in simulation.remote.items()},
         timings=Timings(steps={name: i.step_time for name, i in instances.items()}),
         iterations=loop.iterations(),
-        unstable=unstable(system, energies),
+        unstable=simulation.balance.unstable(energies),
         step_errors={name: estimate for name, estimate in errors.items() if estimate},
         energies={name: e for name, e in energies.items() if name in across} or "none",
         energies_within_a_rate={name: e for name, e in energies.items() if name not in across},

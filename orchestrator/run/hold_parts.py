@@ -48,7 +48,8 @@ class HoldParts:
     the signals; further: those of what belongs to it besides, the source's derivative or integral,
     or the energy that the far side of a spring has put in. turns: for each entry of a sample that
     is a wrapped angle, a full turn in its unit. matrix: "projector" or "semidefinite". context:
-    what a plugin's hold is constructed from. base: a tick (s). spring: the one that it sets, or on
+    what a plugin's hold is constructed from. frames: whether a sample describes the beginning of
+    its source's step. base: a tick (s). spring: the one that it sets, or on
     whose far side it is; row: 0 for its set position, 1 for its set velocity. far: the connection
     whose hold observes the far side of the spring that this one sets.
     """
@@ -62,6 +63,7 @@ class HoldParts:
     turns: Mapping[int, float] = field(default_factory=dict)
     matrix: str | None = None
     latency: Latency | None = None
+    frames: bool = False
     displacement: Reader | None = None
     velocity: Reader | None = None
     spring: SetSpring | None = None
@@ -101,6 +103,7 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
         turns={} if matrix else _turns(connection, system),
         matrix=matrix,
         latency=connection.latency,
+        frames=system.fmu[connection.source].frames,
         displacement=displacement,
         velocity=velocity,
         spring=of,

@@ -24,7 +24,8 @@ JUMP, SHARE = 2.0, 0.05
 """A step is checked where the one before has changed v by more than a JUMP of the largest change
 that led to a check, and by more than a SHARE of the largest v."""
 AT_REST = 1e-6
-"""Rate (1/s), relative to the magnitude of the output itself, below which it is at rest."""
+"""Rate (1/s), relative to the largest of the outputs of which rates are checked, below which all of
+them are at rest."""
 
 REGULAR = 1
 """What the library tells of a step that is one of these."""

@@ -57,8 +57,9 @@ class ForeignFmu:
     rate: Literal["haptics", "graphics"] | AnyRate | None = None
     """Its communication rate: one of the scene's, or its own, written as graphics.rate is. By
     default that of the block that it replaces, else "haptics"."""
-    timing: Literal["sampled", "continuous"] | None = None
-    """sampled: doStep(t, h) computes y(t) from the inputs at t; continuous: y(t + h). By default
+    timing: Literal["sampled", "continuous", "frame"] | None = None
+    """sampled: doStep(t, h) computes y(t) from the inputs at t; continuous: y(t + h); frame: y(t),
+    which is known at t + h. By default
     what the FMU declares, else that of the block that it replaces, else "continuous"."""
     start: Mapping[str, Value] = field(default_factory=dict)
     """Start values of inputs and parameters by name; a list for a whole vector, lists of rows for a

@@ -161,4 +161,6 @@ def find_energy_ports(
         for port, p in u.description.power.items()
     )
     declared = springs.find_declared_springs(fmus, connections)
-    return EnergyPorts((*scene.power, *power), (*scene.spring, *declared), energy_in_play(scene))
+    driven = bool(scene.linkage and (scene.linkage.force or scene.linkage.driven))
+    every = (*scene.power, *power), (*scene.spring, *declared)
+    return EnergyPorts(*every, energy_in_play(scene), driven)

@@ -45,6 +45,11 @@ class Fmu:
     def sampled(self) -> bool:
         return self.description.timing == "sampled"
 
+    @property
+    def frames(self) -> bool:
+        """Whether its outputs describe the beginning of the step at whose end they are known."""
+        return self.description.timing == "frame"
+
     def starting(self, new: Starts) -> Fmu:
         """The FMU with `new` start values, in place of those that these variables have."""
         names = {scalar.name for scalar, _ in new}
@@ -122,6 +127,8 @@ class EnergyPorts:
     in_play: float | None = None
     """Scale (J) of the mechanism's gravitational energy, None where its energy balance is not
     checked."""
+    driven: bool = False
+    """Whether drives or forces of plugins put energy into the mechanism."""
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,8 @@ void hapticlink_change_rate(Clock *c, const Rate *rate) {
 /* A hold in a place among those of the loop begins with the newest sample of its source, of tick `stamp`. GROW where
  * it has no room. */
 int hapticlink_change_hold(Loop *l, int64_t place, Hold *h, int64_t stamp) {
+    h->published = l->holds[place]->published;
+    h->describes = l->holds[place]->describes;
     l->holds[place] = h;
     return push_sample(l, h, stamp, stamp);
 }

@@ -101,7 +101,7 @@ class CompiledHold:
         words["scale"] = rows if parts.matrix == "semidefinite" else 0
         self.c = c = _with_arrays(structures.Hold, words)
         c.fill(row, "depth", "remembers", kind=ROWS.index(row), n=n, width=width)
-        c.fill(sources=self.places, held=held)
+        c.fill(sources=self.places, held=held, frames=parts.frames)
         if turned:
             angles, turns = np.array([*parts.turns]), np.array([*parts.turns.values()])
             c.fill(angles=angles.astype(np.int64), turns=turns, n_angles=turned)

@@ -72,8 +72,8 @@ static int64_t draw(Link *k) {
     return (int64_t)(whole / unit + (whole % unit || rest));
 }
 
-/* A sample goes on its way, in the order of (arrival, stamp). */
-static int send(Link *k, const double *y, int64_t width, int64_t stamp, int64_t from) {
+/* A sample goes on its way `late` after it was published, in the order of (arrival, stamp). */
+static int send(Link *k, const double *y, int64_t width, int64_t stamp, int64_t published, int64_t from) {
     if (k->n == k->room) return GROW;
     const int64_t late = draw(k);
     k->sent++;
@@ -81,7 +81,7 @@ static int send(Link *k, const double *y, int64_t width, int64_t stamp, int64_t 
         k->lost++;
         return 0;
     }
-    const int64_t arrival = stamp + late > from ? stamp + late : from;
+    const int64_t arrival = published + late > from ? published + late : from;
     int64_t i = k->n++;
     for (; i > 0; i--) {
         const int64_t a = k->arrivals[i - 1], s = k->stamps[i - 1];
@@ -116,8 +116,18 @@ static int receive(Hold *h, int64_t tick) {
     return 0;
 }
 
-EXPORT int hapticlink_push(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
-    if (h->link && h->link->started) return send(h->link, y, h->width, stamp, arrival);
+/* The instant that a sample describes which its source has at `published`: a frame begins where the one before ends. */
+static int64_t described(Hold *h, int64_t published) {
+    if (h->published != published) {
+        h->describes = h->frames ? h->published : published;
+        h->published = published;
+    }
+    return h->describes;
+}
+
+EXPORT int hapticlink_push(Hold *h, const double *y, int64_t published, int64_t arrival) {
+    const int64_t stamp = described(h, published);
+    if (h->link && h->link->started) return send(h->link, y, h->width, stamp, published, arrival);
     if (h->account && !account_has_room(h->account, 1)) return GROW;
     if (h->link) h->link->started = 1;
     return push(h, y, stamp, arrival);

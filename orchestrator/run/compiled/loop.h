@@ -181,7 +181,8 @@ typedef struct {
  * `width` is 2 n where a sample is followed by its derivative or integral. `memory`: (remembers, n),
  * what else the kind remembers. `scratch`: (6, n), since the stack is no place for arrays of any size: for matrices and
  * a sample that is unwrapped, for the caller, for the kind.
- * restart, take, give: of a hold in Python. */
+ * restart, take, give: of a hold in Python. published: when the source had its newest sample; describes: the instant
+ * that this describes, which is its stamp in all that the hold does. */
 typedef struct {
     int64_t kind, n, width, depth, remembers;
     const int64_t *sources /* [width] */;
@@ -197,7 +198,9 @@ typedef struct {
     int64_t manifold, rows;               /* of a matrix: its kind, its rows */
     double *chosen /* [rows] */;
     void *restart, *take, *give;
+    int64_t frames;                       /* whether a sample describes the instant at which the one before was published */
     /* state: */
+    int64_t published, describes;
     int64_t count, stamps[3], arrival, span, interval, begun, unwrapped, rank;
     double *samples /* [depth * width | count * width] */, *memory /* [remembers * n] */;
     double *last /* [n_angles] */;        /* as they were unwrapped */
@@ -369,7 +372,7 @@ static inline int fmu_succeeded(int status) {
 /* Those that Python calls: library.py. */
 EXPORT int hapticlink_events(Loop *l, Events *e);
 EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick);
-EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t stamp, int64_t arrival);
+EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t published, int64_t arrival);
 EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 EXPORT void hapticlink_change_rate(Clock *c, const Rate *rate);
 EXPORT int hapticlink_change_hold(Loop *l, int64_t place, Hold *h, int64_t stamp);

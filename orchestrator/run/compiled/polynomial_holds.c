@@ -1,5 +1,5 @@
 /* Holds whose value is a polynomial in time, through samples or towards them. y, y1, y2: the newest
- * sample y_n and those before it, with their instants (stamps) t_n, t_{n-1}, t_{n-2}; behind n entries
+ * sample y_n and those before it, with the instants that they describe (stamps) t_n, t_{n-1}, t_{n-2}; behind n entries
  * of a sample are its derivatives (per s) or integrals, where the hold needs these.
  *
  * Until the second sample each of them is the zero-order hold, unless it is said otherwise. */
@@ -65,7 +65,8 @@ LAW(zero_order) {
     return 0;
 }
 
-/* Half-step lead: y_n + (y_n - y_{n-1})/2, constant until the next sample.
+/* Half-step lead: y_n + (y_n - y_{n-1}) (1/2 + a/H), constant until the next sample; a: how much later than its stamp
+ * the sample was known, by latency or since it was computed for a whole frame.
  *
  * The first-order hold evaluated at the middle of a period: order 2 where the target holds its inputs
  * constant over the period, and no delay at low frequency. So it is where a period is a whole number of
@@ -74,8 +75,15 @@ LAW(zero_order) {
 LAW(lead) {
     const Samples x = samples(h, tick, ahead);
     if (x.count < 2) return value_zero_order(h, l, tick, ahead, value);
-    EACH(x.y[k] + (x.y[k] - x.y1[k]) / 2);
+    const int64_t late = h->arrival - h->stamps[h->count - 1];
+    const double lead = 0.5 + (late > 0 ? (double)late / x.H : 0.0);
+    EACH(x.y[k] + (x.y[k] - x.y1[k]) * lead);
     return 0;
+}
+
+int push_lead(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
+    h->arrival = arrival;
+    return push_samples(h, y, stamp, arrival);
 }
 
 /* y_n + (y_n - y_{n-1}) s/H. Order 2, no delay at low frequency; amplifies at most 1.59-fold, at

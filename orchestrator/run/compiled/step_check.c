@@ -24,6 +24,8 @@
 
 typedef int (*SetState)(void *, void *);
 
+#define SMALL 1e-3 /* m or rad: a mechanism that is not larger is taken to be so large */
+
 /* Whether this is the first step (v before it is NaN) or the last one changed v by more than those before. */
 static int moved(const Check *c, const double *outputs) {
     for (int64_t i = 0; i < c->n; i++) {
@@ -35,10 +37,12 @@ static int moved(const Check *c, const double *outputs) {
 }
 
 static void note_rates(Check *c, const double *outputs, int jumped) {
+    double extent = SMALL; /* of rounding that moves nothing, no share can be told */
+    for (int64_t i = 0; i < c->n; i++) extent = fmax(extent, fabs(outputs[c->bases[i]]));
     for (int64_t i = 0; i < c->n; i++) {
         const int64_t k = c->ports[i];
         const double rate = outputs[c->rates[i]], change = fabs(rate - c->last[i]);
-        const double size = fmax(fabs(rate), c->at_rest * fabs(outputs[c->bases[i]]));
+        const double size = fmax(fabs(rate), c->at_rest * extent);
         if (jumped && change > c->jumps[k]) c->jumps[k] = change;
         if (size > c->scales[k]) c->scales[k] = size;
         c->last[i] = rate;

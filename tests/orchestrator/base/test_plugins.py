@@ -15,7 +15,7 @@ from hapticlink.orchestrator.holds import HOLDS, Hold
 
 class Newest(Hold):
     def __init__(self, context): pass
-    def push(self, stamp, sample, arrival): self.sample = sample.copy()
+    def push(self, described, sample, arrival): self.sample = sample.copy()
     def value(self, tick, ahead=0.0): return self.sample
 
 HOLDS.register({name!r}, Newest)
@@ -110,7 +110,7 @@ from hapticlink.orchestrator.holds import HOLDS, Hold
 class Mine(Hold):
     def __init__(self, context):
         self.size, self.pushed = context.size, 0
-    def push(self, stamp, sample, arrival):
+    def push(self, described, sample, arrival):
         self.pushed += 1
     def value(self, tick, ahead=0.0):
         {value}
@@ -122,7 +122,7 @@ SPEED = """from hapticlink.orchestrator.holds import Hold
 class Mine(Hold):
     needs = 'speed'
     def __init__(self, context): pass
-    def push(self, stamp, sample, arrival): pass
+    def push(self, described, sample, arrival): pass
     def value(self, tick, ahead=0.0): pass"""
 INTEGRATOR = """from hapticlink.components.integrators.base import Integrator
 class Mine(Integrator):

@@ -89,7 +89,7 @@ def test_what_was_iterated_is_counted(fmus):
 
 def test_it_reads_the_future_and_says_so(fmus):
     plan = Plan(system(fmus, ROWS, "iterated", Fraction(1, 100), UNTIL, between="foh"))
-    assert all(use.stamp == use.tick + 1 for use in uses(plan))
+    assert all(use.described == use.tick + 1 for use in uses(plan))
 
 
 def test_energy_is_booked_once_for_a_step_that_is_repeated(fmus):

@@ -122,3 +122,26 @@ def test_what_is_found_does_not_depend_on_room(monkeypatch):
     assert found.run["in_python"] == {}
     assert found.run["step_errors"] == expected
     assert expected["virtual_mechanism"]["checked"] > 4
+
+
+CONTRADICTION = """
+title = "Gears that contradict each other hold two sliders still"
+duration = 0.2
+haptics.rate = 512
+[linkage]
+operational_point = { body = "one" }
+body = [{ name = "one", mass = 0.1, inertia = 1e-4 }, { name = "two", mass = 0.2, inertia = 1e-4 }]
+joint = [
+  { name = "one", type = "prismatic", axis = 0, child = "one", drive = { effort = 0.3 } },
+  { name = "two", type = "prismatic", axis = 0, child = "two" },
+]
+gear = [{ joints = ["two", "one"], ratio = -1.5 }, { joints = ["two", "one"], ratio = 2.0 }]
+"""
+
+
+def test_of_rounding_that_moves_nothing_no_share_is_told(tmp_path):
+    (tmp_path / "scene.toml").write_text(CONTRADICTION)
+    found = hl.run(tmp_path / "scene.toml", out=tmp_path / "out")
+    rates = found.haptics["virtual_mechanism.qd"]
+    assert 0 < np.abs(rates).max() < 1e-12
+    assert not too_long(found)

@@ -64,7 +64,7 @@ def test_what_the_plan_says_is_what_the_fmus_see(stamped, coupling):
     outcome = run(Plan(system), results)
     table = results.tables()["haptics"]
     for name, column in ((LATE, "controller.seen_g"), ("device.stamp -> hand.d", "hand.seen_d")):
-        said = [timeline.seconds(u.stamp) for u in uses(Plan(system)) if u.connection == name]
+        said = [timeline.seconds(u.described) for u in uses(Plan(system)) if u.connection == name]
         np.testing.assert_allclose(table[column], said, rtol=0, atol=1e-12)
     # 3 ms are two ticks of 1/512 s, rounded up.
     seen = np.maximum(table["time"] - 2 / 512, 0.0)

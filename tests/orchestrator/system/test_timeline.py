@@ -76,7 +76,7 @@ def test_what_the_plan_says_is_what_the_fmus_see(stamped, name, coupling):
     said = list(uses(Plan(system)))
     for c in system.connections:
         seen = tables[system.fmu[c.target].clock][f"{c.target}.seen_{c.target_port}"]
-        stamps = [time.seconds(use.stamp) for use in said if use.connection == c.name]
+        stamps = [time.seconds(use.described) for use in said if use.connection == c.name]
         if not system.fmu[c.target].sampled:  # a row holds what the step that ends there has read
             stamps = [0.0, *stamps]
         np.testing.assert_allclose(seen, stamps, rtol=0, atol=1e-12)
