@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from hapticlink.fmus.versions import find_versions
 from hapticlink.orchestrator.base import plugins
@@ -77,7 +77,43 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         events=[(change.begin, change.text) for change in system.changes],
         not_recorded=not_recorded,
         units=_units(system),
+        without_effect=[*_find_idle_holds(scene, system), *_find_idle_events(scene, system)],
     )
+
+
+def _find_idle_holds(scene: Scene, system: System) -> Iterator[str]:
+    """The scene's default holds, where they are not the plain ones, that no connection can take."""
+
+    def longest(fmu: str) -> int:
+        return system.timeline.clock(system.fmu[fmu].clock).longest
+
+    ways = {
+        "hold": (scene.hold, "zoh", "a slower rate to a faster"),
+        "downsampling": (scene.downsampling, "latest", "a faster rate to a slower"),
+    }
+    for key, (hold, plain, way) in ways.items():
+        asked = {c.hold for c in system.connections} | {r.hold for r in system.refused}
+        if hold == plain or hold in asked:
+            continue
+        apart = (longest(c.source) - longest(c.target) for c in system.connections if c.hold)
+        own = any(d > 0 if key == "hold" else d < 0 for d in apart)
+        why = (
+            f"all connections from {way} one have holds of their own in [holds]"
+            if own
+            else f"there is no connection from {way} one ([holds] names others)"
+        )
+        yield f'{key} = "{hold}" acts on no connection: {why}'
+
+
+def _find_idle_events(scene: Scene, system: System) -> Iterator[str]:
+    """Events of `[[at]]` that no step of their FMU sees."""
+    for change in system.changes:
+        if change.end is not None and change.end <= change.begin:
+            first = f"the first one from there on is at {change.begin:g} s"
+            yield f"{change.text} acts on no step: {first}"
+    end = system.timeline.seconds(system.timeline.end)
+    if late := [f"{event.time:g}" for event in scene.at if event.time >= end]:
+        yield f"[[at]] {', '.join(late)} s acts on no step: the run ends at {end:g} s"
 
 
 def _units(system: System) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby, islice
 from typing import Any, NamedTuple
@@ -188,6 +189,7 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
             "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
         )
+    yield from record.without_effect
     yield from describe_replacements(record.replaced)
     yield from _lacking(results)
     yield from describe_unrecorded(record.not_recorded, record.fmus)
@@ -315,6 +317,8 @@ def _network(fmu: str, exchange: Mapping[str, Any]) -> Iterator[str]:
 
 PULL = 5.0
 """A spring hand's first force (N) from which on its target is told not to be where it starts."""
+APART, TURNED = 1e-3, 0.02
+"""Distance (m) and angle (rad) of handle and operational point at the start that are told."""
 SMALLEST_J = 1e-9
 """Energies below it have no line."""
 
@@ -417,6 +421,7 @@ def _start(results: Results) -> Iterator[str]:
     ):
         start, margin = device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0]
         yield f"warning: {describe_start_outside(start, margin)}"
+    yield from _start_apart(results)
     pulls = of_port(results, HAND_WRENCH)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
         pull = float(PLANE.distance(pulls[HAND_WRENCH][0])) if len(pulls["time"]) else 0.0
@@ -432,6 +437,29 @@ def _start(results: Results) -> Iterator[str]:
     table = of_block(results, JOINT_COORDINATES, size)
     if table and len(table["time"]):
         yield from describe_assembly(linkage, table[JOINT_COORDINATES][0])
+
+
+def _start_apart(results: Results) -> Iterator[str]:
+    """Lines for a handle that starts elsewhere than what it holds: the operational point, as a
+    device of others may, or a hand's target, by whole turns."""
+    handle, point = of_port(results, HANDLE_POSE), of_port(results, POINT_POSE)
+    if handle and point and len(handle["time"]) and len(point["time"]):
+        x, S = handle[HANDLE_POSE][0], point[POINT_POSE][0]
+        far, turned = float(PLANE.distance(x - S)), float(PLANE.angle(x - S))
+        if far > APART or turned > TURNED:
+            yield (
+                f"warning: the handle starts {short(1e3 * far)} mm and {short(turned)} rad from "
+                "the operational point: errors contain that"
+            )
+    hand = results.record.scene["hand"] or {}
+    if handle and hand.get("target") and hand["stiffness"][2] and len(handle["time"]):
+        angle, start = float(hand["target"][0][3]), float(handle[HANDLE_POSE][0][2])
+        if turns := round((angle - start) / math.tau):
+            away = "a whole turn" if abs(turns) == 1 else f"{abs(turns)} whole turns"
+            yield (
+                f"warning: hand.target begins {away} from the handle's angle, {short(start)} rad, "
+                f"and pulls it there: {short(angle - math.tau * turns)} rad is the same direction"
+            )
 
 
 def describe_assembly(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:

@@ -87,6 +87,8 @@ class RunSetup:
     """Times (s) and texts of what `[[at]]` does, each with the first step that it acts on."""
     units: dict[str, str] = field(default_factory=dict)
     """By column of a table, as its FMU names it; columns without a unit are left out."""
+    without_effect: list[str] = field(default_factory=list)
+    """What the scene asks for that acts nowhere in this run, each with the reason."""
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ The mechanism: E(t) - E(0) <= W, the work of the wrenches held on its inputs. Th
 integrator stays far below the energies involved; a gain of more than these means divergence.
 
 The loop: sum of generated <= work of the hands as ideal sources + E(0) - E(t), what the mechanism
-has given back of what it had stored and of its motion. Sampling and holding that generate more energy than
-was ever put in indicate an unstable loop. Where drives put in energy that is not known, it is not
-judged.
+has given back of what it had stored and of its motion. Sampling and holding that generate more
+energy than was ever put in indicate an unstable loop. Where drives put in energy that is not known,
+it is not judged.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.findings.summary import describe_generated
+from tests.little_fmus import entries, slave
 
 
 @pytest.mark.parametrize(
@@ -74,3 +76,47 @@ def test_turns_that_cost_the_rate_are_told(
     assert low < error < high
     told = [line for line in run.run["warnings"] if "friction of slide" in line]
     assert len(told) == (substeps == 1)
+
+
+SPRING = {"type": "spring", "stiffness": [10, 10, 0.1], "damping": [1, 1, 0.01]}
+AT_START = [0.0, 0.0445, 0.0148]
+FREEZE = {"freeze": ["controller.F_hand"], "time": 0.3}
+NOWHERE = [
+    ({"hold": "foh", "graphics.rate": 512}, "acts on no connection: there is no connection from a"),
+    ({"hold": "foh", "holds.controller.Lambda_inv": "zoh", "holds.controller.P_c": "zoh"}, "have"),
+    ({"at": [{**FREEZE, "until": 0.30001}]}, "acts on no step: the first one from there on"),
+    ({"at": [{**FREEZE, "time": 9.0}]}, "[[at]] 9 s acts on no step: the run ends at 0.5 s"),
+    ({"hand": {**SPRING, "target": [[*AT_START, 5.5]]}}, "a whole turn from the handle's angle"),
+    ({"hand": {**SPRING, "target": [[*AT_START, -13.35]]}}, "2 whole turns from the handle's"),
+]
+SOMEWHERE = [
+    {"hold": "foh"},
+    {"at": [{**FREEZE, "until": 0.301}]},
+    {"hand": {**SPRING, "target": [[*AT_START, -0.8]]}},
+    {"hand": {**SPRING, "stiffness": [10, 10, 0], "target": [[*AT_START, 5.5]]}},
+]
+SAID = "acts on no|turn.* from the handle"
+
+
+@pytest.mark.parametrize(("options", "said"), NOWHERE)
+def test_what_acts_nowhere_is_said(options, said):
+    run = hl.run("closed-loop", {"duration": 0.5, **options})
+    assert any(said in line and re.search(SAID, line) for line in run.run["warnings"])
+
+
+@pytest.mark.parametrize("options", SOMEWHERE)
+def test_what_acts_is_not(options):
+    run = hl.run("closed-loop", {"duration": 0.5, **options})
+    assert not [line for line in run.run["warnings"] if re.search(SAID, line)]
+
+
+def test_a_device_that_starts_elsewhere_is_said(tmp_path):
+    """A handle that nobody moves, 16 mm from the operational point."""
+    pose = [0.044522, 0.030797, -0.7878]
+    at = {f"{name}[{i + 1}]": pose[i] for name in ("x", "x_true") for i in range(3)}
+    mass = {f"M[{i},{k}]": float(i == k) for i in (1, 2, 3) for k in (1, 2, 3)}
+    slave(tmp_path, "Fixed", ("output", {**at, **entries("v", 3), **mass, **entries("c", 3)}))
+    own = {"path": str(tmp_path / "Fixed.fmu"), "replaces": "haptic_device"}
+    run = hl.run("closed-loop", {"duration": 0.05, "stop_when": "", "fmu": [own]})
+    (line,) = [w for w in run.run["warnings"] if "from the operational point: errors" in w]
+    assert line.startswith("warning: the handle starts 16 mm and")
