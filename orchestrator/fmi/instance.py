@@ -143,7 +143,7 @@ class Instance(ABC):
 
     @property
     def step_time(self) -> float:
-        """Time spent in doStep (s)."""
+        """Time spent in doStep (s), 0 where the steps are too short to be timed."""
         return float(self.place.step_time)
 
     @property

@@ -185,7 +185,7 @@ def _details(
         in_python=loop.in_python,
         real_time=real_time.report() if real_time else None,
         network={name: remote.network() for name, remote in simulation.remote.items()},
-        timings=Timings(steps={name: i.step_time for name, i in instances.items()}),
+        timings=Timings(steps={name: i.step_time for name, i in instances.items() if i.step_time}),
         iterations=loop.iterations(),
         unstable=simulation.balance.unstable(energies),
         step_errors={name: estimate for name, estimate in errors.items() if estimate},

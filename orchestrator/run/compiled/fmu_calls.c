@@ -5,9 +5,9 @@
 #include <math.h>
 #include <string.h>
 
-enum { SHORT = 10000, ALL = 64, EACH = 64 };
-/* Steps below SHORT ns, after ALL steps that were all timed, are timed one in EACH: reading the
- * clock takes longer than the shortest steps. */
+enum { SHORT = 10000, ALL = 64 };
+/* Steps below SHORT ns in the mean of the first ALL are not timed: reading the clock takes longer than
+ * the shortest of them, and of a few that are timed none can be told for the others. */
 
 typedef int (*Transfer2)(void *, const uint32_t *, size_t, void *);
 typedef int (*Transfer3)(void *, const uint32_t *, size_t, void *, size_t);
@@ -163,13 +163,15 @@ int fmu_step(Fmu *f, double time, double end, double size, At *at) {
     p->end = end;
     if (p->waiting <= time) return SETTLE;
     if (p->ended) return CALL;
-    const int timed = !f->sparse || f->n_steps % EACH == 0;
-    const int64_t begin = timed ? now() : 0;
+    const int64_t begin = f->untimed ? 0 : now();
     at->what = -1;
     at->status = fmu_do_step(f, time, size);
-    if (timed) p->step_time += 1e-9 * (double)(now() - begin) * (f->sparse ? EACH : 1);
+    if (!f->untimed) p->step_time += 1e-9 * (double)(now() - begin);
     if (f->kind.python && exception_left()) return RAISED;
-    if (++f->n_steps == ALL) f->sparse = p->step_time < 1e-9 * SHORT * ALL;
+    if (++f->n_steps == ALL && p->step_time < 1e-9 * SHORT * ALL) {
+        f->untimed = 1;
+        p->step_time = 0.0;
+    }
     const int cut = f->kind.fmi == 3 && (*f->terminate || *f->early);
     if (cut || !fmu_succeeded(at->status)) return STEPPED;
     p->time = end;

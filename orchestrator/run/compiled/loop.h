@@ -69,7 +69,7 @@ typedef struct {
     double *outputs /* [n_outputs] */;
     const double *inverse /* [n_outputs] */; /* 1/bound */
     double *good /* [n_outputs] */;       /* the last finite outputs, or NULL */
-    int64_t n_outputs, n_steps, sparse;   /* sparse: steps so short that few of them are timed */
+    int64_t n_outputs, n_steps, untimed;  /* untimed: steps too short to be timed */
     Check *check;                         /* NULL if there is none */
     const int64_t *row_due;                /* whether the next row is written; else `gets_between_rows` suffice */
     const Transfer *gets_between_rows /* [n_gets_between_rows] */;
