@@ -20,7 +20,7 @@ from benchmarks.page import Progress, table
 from hapticlink.orchestrator.base import temporary_folders
 from studies import draw
 
-SCENES = ("closed-loop", "two-users", "serial")
+SCENES = ("closed-loop-ideal", "two-users", "serial")
 RATES = (10, 30, 60)
 COPIES = {
     "ours, placed": ("exact", False),

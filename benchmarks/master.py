@@ -45,8 +45,8 @@ ROUNDS = 2
 LIMIT = 600
 """Seconds after which a master is stopped."""
 COLUMNS = ("packaging", "fmus", "signals", "master", "round", "step_us", "start_s", "memory_mb")
-ROWS = ("rows.csv", "closed-loop.csv")
-SCENE, RATE = "closed-loop", 512
+ROWS = ("rows.csv", "closed-loop-ideal.csv")
+SCENE, RATE = "closed-loop-ideal", 512
 DURATIONS = (3, 15)
 """Of two runs (s); their difference leaves out what each run costs once."""
 TICK_COLUMNS = ("packaging", "loop", "round", "tick_us")
@@ -110,6 +110,6 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
                     ring.mkdir()
                     rings.make(*case, ring)
                 rows.add(*case, master, turn, *measured(master, ring))
-        progress("closed-loop", len(cases), len(cases) + 1)
+        progress("closed-loop-ideal", len(cases), len(cases) + 1)
         ticks(whole, rounds, room)
     return master_page.page(folder, [*rows.rows.values()], [*whole.rows.values()], command)

@@ -93,11 +93,11 @@ def page(folder: Path, rows: Sequence[Row], whole: Sequence[Row], command: str) 
 
 
 def closed(rows: Sequence[Row]) -> Iterator[str]:
-    """What a haptic tick of `closed-loop` costs."""
+    """What a haptic tick of `closed-loop-ideal` costs."""
     yield (
-        "Microseconds of processor time per haptic tick of `closed-loop` with holds, energies,\n"
-        "checks and every output recorded, beside a C loop that only sets, steps and gets its "
-        "FMUs\n(all rounds in [closed-loop.csv](closed-loop.csv)):\n"
+        "Microseconds of processor time per haptic tick of `closed-loop-ideal` with holds,\n"
+        "energies, checks and every output recorded, beside a C loop that only sets, steps and gets\n"
+        "its FMUs (all rounds in [closed-loop-ideal.csv](closed-loop-ideal.csv)):\n"
     )
     cells = []
     for kind in dict.fromkeys(row["packaging"] for row in rows):

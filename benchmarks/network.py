@@ -22,7 +22,7 @@ from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import load
 from studies import draw
 
-SCENE, SECONDS, QUICK, SEED = "closed-loop", 8, 3, 1
+SCENE, SECONDS, QUICK, SEED = "closed-loop-ideal", 8, 3, 1
 NETWORKS: dict[str, tuple[float, float, float, float] | None] = {
     "one computer": None,
     "loopback": (0, 0, 0, -1),

@@ -24,7 +24,7 @@ from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.visualization.figures.real_time_figure import real_time
 
-SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 3
+SCENE, RATE, SECONDS, QUICK = "closed-loop-ideal", 512, 60, 3
 NEVER = 2**62
 Report = Mapping[str, Any]
 

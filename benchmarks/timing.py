@@ -15,8 +15,8 @@ from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.run import execute_plan
 
 SCENES = (
-    ("closed-loop", ()),
-    ("closed-loop", ("hold=foh",)),
+    ("closed-loop-ideal", ()),
+    ("closed-loop-ideal", ("hold=foh",)),
     ("closed-loop-direct", ("hold=passive",)),
     ("two-users", ()),
     ("pendulum", ()),

@@ -33,7 +33,7 @@ from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewe
 from hapticlink.visualization.live_page.server_pipe import ChildProcess
 from hapticlink.visualization.live_page.session import LiveSession
 
-SCENE, RATE, SECONDS, QUICK = "closed-loop", 512, 60, 5
+SCENE, RATE, SECONDS, QUICK = "closed-loop-ideal", 512, 60, 5
 SERVER = "hapticlink.visualization.live_page.server"
 
 

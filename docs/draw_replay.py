@@ -35,7 +35,7 @@ def main() -> None:
     with sync_playwright() as started, tempfile.TemporaryDirectory() as room:
         folders = [Path(room) / name for name in RUNS]
         for folder, topology in zip(folders, RUNS.values(), strict=True):
-            options = {"graphics.rate": 10, "controller.topology": topology}
+            options = {"controller.topology": topology}
             hl.run("closed-loop", options, out=folder, figures=False)
         OUT.joinpath("figures").mkdir(exist_ok=True)
         figure_axes.save(run_figures.figures(hl.run("enclosure")), OUT / "figures")

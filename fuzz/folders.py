@@ -15,7 +15,7 @@ from fuzz.cases import Made, seeded
 from fuzz.processes import Process, own_folder
 from hapticlink.orchestrator.results import read_results
 
-SCENES = ("pendulum", "closed-loop", "four-bar")
+SCENES = ("pendulum", "closed-loop-ideal", "four-bar")
 REFUSED = "another run writes there"
 
 

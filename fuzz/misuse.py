@@ -74,7 +74,7 @@ def _live(draw: random.Random) -> tuple[str, Callable[[], object]]:
                 live.resume()
             live.stop()
 
-        return hl.RealTime("closed-loop", {"duration": 0.05}).run(turn)
+        return hl.RealTime("closed-loop-ideal", {"duration": 0.05}).run(turn)
 
     return f"RealTime.{name}{ascii(tuple(values))[:200]}", call
 
@@ -111,7 +111,7 @@ def attack(number: int, seed: int) -> Iterator[Made]:
     """`number` calls, the functions in turn."""
     functions = _functions()
     kinds = [*functions, "RealTime"]
-    hl.run("closed-loop", {"duration": 0.02})  # FMUs are built before
+    hl.run("closed-loop-ideal", {"duration": 0.02})  # FMUs are built before
     with own_folder() as folder:
         for i, _, draw in seeded(number, seed):
             kind = kinds[i % len(kinds)]

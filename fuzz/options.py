@@ -20,7 +20,7 @@ WORDS = (
     "run", "info", "build", "export", "sweep", "schema", "--set", "--vary", "--out", "--explain",
     "--plugin", "--jobs", "--runs", "--metric", "--scheduler", "--help", "--version", "--bogus",
     "--", "-", "", "=", "--set=", "--jobs=-1", "--jobs=1e9", "0", "two", "/dev/null", "/dev/full",
-    "none.toml", "none.ssp", "none.csv", ".", "/", "\udcff", "closed-loop", "pendulum",
+    "none.toml", "none.ssp", "none.csv", ".", "/", "\udcff", "closed-loop-ideal", "pendulum",
     "x" * 300,
 )  # fmt: skip
 NUMBERS = ("0", "1", "-1", "1e400", "1e-400", "0.5", "nan", "inf", "1e9", "9" * 5000, "", "x", "²")

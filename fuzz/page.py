@@ -112,7 +112,7 @@ def attack(number: int, seed: int) -> Iterator[Made]:
         for i, case, draw in seeded(number, seed):
             kind, packed = places[i * len(places) // number]
             name = f"{kind}, {packed} FMUs"
-            scene = hl.scene("closed-loop", {"packaging": packed, "duration": 1e4})
+            scene = hl.scene("closed-loop-ideal", {"packaging": packed, "duration": 1e4})
             outcome, wrong = _case(scene, kind, draw, folder)
             counts = before.setdefault(name, [])
             counts.append(_left_behind())

@@ -100,7 +100,7 @@ def python_itself(status: int, said: str) -> bool:
 
 
 def attack(
-    number: int, seed: int, scene: str = "closed-loop", duration: float = 0.2
+    number: int, seed: int, scene: str = "closed-loop-ideal", duration: float = 0.2
 ) -> Iterator[Made]:
     """Each case that is made."""
     draw = random.Random(seed)

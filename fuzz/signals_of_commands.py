@@ -20,22 +20,22 @@ LATEST = (1.0, 3.0, 12.0)
 """Seconds after the start at which the first signal comes at the latest, in turn by chance."""
 READ = "first"
 """The folder of a run, with what `fit` needs."""
-RUN = ["run", "closed-loop", "--set", "duration=0.5"]
+RUN = ["run", "closed-loop-ideal", "--set", "duration=0.5"]
 COMMANDS = {
     "run": [*RUN, "--out", "out"],
-    "view": ["view", "closed-loop", "--no-browser", "--port", "0", "--out", "view"],
+    "view": ["view", "closed-loop-ideal", "--no-browser", "--port", "0", "--out", "view"],
     "new": ["new", "mine"],
     "compare": ["compare", READ, READ],
     "report": ["report", READ, "--out", "report.html"],
-    "build": ["build", "closed-loop", "--out", "fmus"],
-    "export": ["export", "closed-loop", "--out", "ssp"],
-    "info": ["info", "closed-loop"],
+    "build": ["build", "closed-loop-ideal", "--out", "fmus"],
+    "export": ["export", "closed-loop-ideal", "--out", "ssp"],
+    "info": ["info", "closed-loop-ideal"],
     "schema": ["schema"],
-    "stability": ["stability", "closed-loop"],
+    "stability": ["stability", "closed-loop-ideal"],
     "advise": ["advise", "closed-loop-direct", "--out", "advised"],
-    "transparency": ["transparency", "closed-loop", "--out", "felt"],
+    "transparency": ["transparency", "closed-loop-ideal", "--out", "felt"],
     "fit": ["fit", READ, "--out", "fitted"],
-    "tune": ["tune", "closed-loop", "--set", "sensing=encoders", "--out", "tuned"],
+    "tune": ["tune", "closed-loop-ideal", "--set", "sensing=encoders", "--out", "tuned"],
     "sweep": ["sweep", "pendulum", "--vary", "duration=0.1,0.2,0.3", "--out", "swept"],
     "study": ["study", "--out", "studied"],
     "bench": ["bench", "master", "--quick", "--out", "benched"],

@@ -16,7 +16,7 @@ from fuzz.cases import Made
 from fuzz.commands import Place
 from fuzz.processes import own_folder
 
-SCENES = ("pendulum", "sampled-spring", "closed-loop")
+SCENES = ("pendulum", "sampled-spring", "closed-loop-ideal")
 KINDS = ("bytes", "text", "elements", "annotation", "description")
 STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"
 _SCENE = re.compile(r"(<hapticlink:Scene>)(.*?)(</hapticlink:Scene>)", re.DOTALL)

@@ -36,7 +36,7 @@ OFF = (2e-4, 0.0, 2e-3)
 QUIET = 1e-7
 """Speed (m/s and rad/s) of a handle at rest."""
 MOST = 0.5
-SCENES = ("closed-loop", "closed-loop-direct", "serial", "closed-loop-b1")
+SCENES = ("closed-loop-ideal", "closed-loop-direct", "serial", "closed-loop-b1")
 
 
 def drawn(seed: int) -> tuple[str, dict[str, Any]]:

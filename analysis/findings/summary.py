@@ -12,6 +12,7 @@ import numpy as np
 from hapticlink.analysis.findings import friction_speed
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
+from hapticlink.analysis.findings.report_premises import describe_experiment
 from hapticlink.analysis.findings.tracking import UserSignals, of_block, of_port
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.port_space import PLANE
@@ -112,6 +113,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
     """What one would open the figures for: tracking error, largest forces, energies, closure of the
     loops. measures: those of the results, if they are there."""
     measures = measures or Measures(results)
+    yield from describe_experiment(results.record.scene)
     for user, error in measures.tracking.items():
         yield _tracking(user, error)
         if user and _left(results, UserSignals.of(user).margin):
@@ -185,9 +187,12 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from _start(results)
     off, frames = measures.folded
     if off:
+        held = record.scene[
+            "local_model"
+        ]  # whose loops are open: no copy that closes them is there
         yield (
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
-            "Lambda_inv, P_c and contacts: take graphics.sync = 'exact'"
+            f"Lambda_inv, P_c and contacts{'' if held else ': take graphics.sync = ' + repr('exact')}"
         )
     yield from record.without_effect
     yield from describe_replacements(record.replaced)

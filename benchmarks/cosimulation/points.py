@@ -12,7 +12,7 @@ from hapticlink.components.integrators import METHODS
 from hapticlink.orchestrator.holds import HOLDS
 from studies.mismatch import design
 
-LOOP, CONTACT = "closed-loop", "obstacles"
+LOOP, CONTACT = "closed-loop-ideal", "obstacles"
 STUDY = design.REFERENCE
 """The rate (Hz) of the runs that the study of mismatched rates takes as continuous."""
 NONE = "none"

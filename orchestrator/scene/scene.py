@@ -97,6 +97,10 @@ class Scene:
     """Title of figures and messages."""
     description: str = ""
     """Text that `hapticlink info` prints."""
+    format: Literal[2] = 2
+    """Version of the format of scenes."""
+    experiment: Literal["", "chapter 6", "section B.6"] = ""
+    """The report's experiment that it is: the summary says in what it differs from that."""
     duration: Duration
     """Simulated time."""
     hold: HoldName = "zoh"

@@ -25,7 +25,7 @@ LINKAGES: dict[str, Pose] = {
     "slider-crank": (-0.00319, 0.02165, -0.2928),
 }
 """Linkages with the pose of the operational point at the start (m, m, rad)."""
-SHIPPED = {"five-bar": "closed-loop", "serial": "serial"}
+SHIPPED = {"five-bar": "closed-loop-ideal", "serial": "serial"}
 """Scenes of linkages that are shipped with a device; the others are in linkages/."""
 WALLS = {
     "five-bar": (-0.03, 0.068, -0.045, 0.036),

@@ -22,7 +22,7 @@ PANELS = ("(a) topology controller active", "(b) inactive")
 
 
 def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
-    on, off = runs("closed-loop", *ON), runs("closed-loop", *OFF)
+    on, off = runs("closed-loop-ideal", *ON), runs("closed-loop-ideal", *OFF)
     yield _trajectories(on, off, folder)
     yield from _coordinates(on, off, folder)
     yield _velocity_terms(runs, folder)
@@ -65,7 +65,7 @@ def _trajectories(on: Results, off: Results, folder: Path) -> Entry:
         f"({count.listed} s), links 3 and 4 then "
         f"within {count.fold:.2f} rad of a line; of {count.frames} frames {count.wrong} disagree "
         f"with it, and {count.unseen} episodes fall between frames",
-        command("closed-loop", *ON),
+        command("closed-loop-ideal", *ON),
     )
 
 
@@ -90,13 +90,13 @@ def _coordinates(on: Results, off: Results, folder: Path) -> Iterator[Entry]:
             "the difference of handle (HD) and operational point (HS) is smaller with the topology "
             "controller than without",
             f"at most {worst[0]:.2g} mm with it, {worst[1]:.3g} mm without",
-            f"{command('closed-loop', *ON)}; {command('closed-loop', *OFF)}",
+            f"{command('closed-loop-ideal', *ON)}; {command('closed-loop-ideal', *OFF)}",
         )
 
 
 def _velocity_terms(runs: Runs, folder: Path) -> Entry:
-    none = runs("closed-loop", *ON)
-    full = runs("closed-loop", *ON, "controller.bias=full")
+    none = runs("closed-loop-ideal", *ON)
+    full = runs("closed-loop-ideal", *ON, "controller.bias=full")
     figure, axes = draw.panels(2)
     worst, sizes = {}, {}
     for results, label, colour in ((none, "none", draw.BLUE), (full, "full", draw.ORANGE)):
@@ -123,7 +123,7 @@ def _velocity_terms(runs: Runs, folder: Path) -> Entry:
         f"F_drift {a.drift_force:.2g} N RMS, {a.largest_drift:.2g} N at most, against F_h "
         f"{a.hand_force:.2g} N, and {worst['none']:.2g} mm. Bias full: F_drift "
         f"{b.drift_force:.2g} N RMS, {b.largest_drift:.2g} N at most, and {worst['full']:.2g} mm",
-        command("closed-loop", *ON, "controller.bias=full"),
+        command("closed-loop-ideal", *ON, "controller.bias=full"),
     )
 
 
@@ -131,9 +131,9 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
     jacobi = "coupling=jacobi"
     weaker = "controller.teleoperation.damping=[70.0, 70.0, 0.2]"
     cases = (
-        ("Gauss-Seidel, printed gains", runs("closed-loop", *ON), draw.BLUE),
-        ("Jacobi, printed gains", runs("closed-loop", *ON, jacobi), draw.ORANGE),
-        ("Jacobi, B_pc,theta = 0.2", runs("closed-loop", *ON, jacobi, weaker), draw.GREEN),
+        ("Gauss-Seidel, printed gains", runs("closed-loop-ideal", *ON), draw.BLUE),
+        ("Jacobi, printed gains", runs("closed-loop-ideal", *ON, jacobi), draw.ORANGE),
+        ("Jacobi, B_pc,theta = 0.2", runs("closed-loop-ideal", *ON, jacobi, weaker), draw.GREEN),
     )
     figure, axes = draw.panels(2)
     jumps = []
@@ -148,7 +148,7 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
     axes[0].legend(fontsize="small")
     title = "The drift torque chatters from tick to tick"
     axes[1].set(xlabel="time (s)", ylabel="change of F_drift,theta in a tick (N.m)", title=title)
-    unlimited = runs("closed-loop", *ON, jacobi, "device.torque_limit=500.0").record.end
+    unlimited = runs("closed-loop-ideal", *ON, jacobi, "device.torque_limit=500.0").record.end
     return Entry(
         "Order of calls: Jacobi against Gauss-Seidel",
         draw.save(figure, folder, "order_of_calls.png"),
@@ -160,5 +160,5 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
         f"{jumps[1]:.2g} N.m a tick ({jumps[0]:.1e} under Gauss-Seidel, {jumps[2]:.1e} with "
         f"0.2). Only the motors' torque limit of 0.5 N.m bounds it: with 500 N.m the run "
         f"diverges at {unlimited.time:.2f} s",
-        command("closed-loop", jacobi),
+        command("closed-loop-ideal", jacobi),
     )

@@ -23,7 +23,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
             ("exact", (), draw.BLUE),
             ("pulled (report)", (PULLED,), draw.ORANGE),
         ):
-            results = runs("closed-loop", *options, f"controller.bias={bias}")
+            results = runs("closed-loop-ideal", *options, f"controller.bias={bias}")
             time, gap = tracking(results)
             found[bias, label] = (*count_folded(results), gap.max())
             axis.semilogy(time, np.maximum(gap, 1e-4), color=colour, label=label)
@@ -47,5 +47,5 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         "not for links 3 and 4, which the pose of the operational point does not determine: the "
         "copy folds to the other assembly, and the device gets Lambda^-1 and the constrained "
         f"directions of that one. {'; '.join(counts)}. All other figures use the exact copy",
-        command("closed-loop", PULLED),
+        command("closed-loop-ideal", PULLED),
     )

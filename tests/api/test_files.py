@@ -43,7 +43,7 @@ def test_an_export_of_rates_that_do_not_divide_says_so(
     rate: object, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """512 / 30 = 17.07: masters with whole decimation factors step the graphics copy elsewhere."""
-    hl.export("closed-loop", {"graphics.rate": rate}, out=tmp_path / "loop.ssp")
+    hl.export("closed-loop-ideal", {"graphics.rate": rate}, out=tmp_path / "loop.ssp")
     warned = [line for line in caplog.messages if "whole multiples of the fastest rate" in line]
     assert [said in line and "at other instants" in line for line in warned] == [True] * bool(said)
     assert ("a step of graphics is" in caplog.text) == bool(said)

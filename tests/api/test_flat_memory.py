@@ -37,7 +37,7 @@ def test_runs_in_a_loop_stay_flat() -> None:
     1 MB a run."""
 
     def run() -> None:
-        hl.run("closed-loop", {"duration": 0.02})
+        hl.run("closed-loop-ideal", {"duration": 0.02})
 
     for _ in range(3):
         run()
@@ -69,9 +69,9 @@ def test_states_that_are_saved_over_are_freed(tmp_path: Path) -> None:
 
 def test_fmus_of_one_library_work_beside_each_other(tmp_path: Path) -> None:
     """Two controllers and a mechanism of Python share one library: same bytes as isolated."""
-    ours = hl.run("closed-loop", {"duration": 0.1}, out=tmp_path / "a", figures=False)
+    ours = hl.run("closed-loop-ideal", {"duration": 0.1}, out=tmp_path / "a", figures=False)
     apart = {"duration": 0.1, "isolate": True}
-    theirs = hl.run("closed-loop", apart, out=tmp_path / "b", figures=False)
+    theirs = hl.run("closed-loop-ideal", apart, out=tmp_path / "b", figures=False)
     assert ours.fault is theirs.fault is None
     for table in ("haptics.csv", "graphics.csv"):
         assert (tmp_path / "a" / table).read_bytes() == (tmp_path / "b" / table).read_bytes()

@@ -102,7 +102,7 @@ REFUSED: list[tuple[str, Turn]] = [
 
 def test_what_cannot_be_is_refused_and_changes_nothing() -> None:
     turn, refused = trying(*(ask for _, ask in REFUSED))
-    made = ran("closed-loop", turn, "duration=0.2")
+    made = ran("closed-loop-ideal", turn, "duration=0.2")
     assert len(refused) == len(REFUSED)
     assert [each for each in zip(REFUSED, refused, strict=True) if each[0][0] not in each[1]] == []
     assert made.fault is None
@@ -117,7 +117,7 @@ def test_turns_come_after_a_time(every: Any) -> None:
 
 
 def test_before_a_run_there_is_nothing_to_read_or_change() -> None:
-    live = hl.RealTime("closed-loop")
+    live = hl.RealTime("closed-loop-ideal")
     asked: tuple[Callable[[], object], ...] = (
         lambda: live.time,
         lambda: live["hand.F"],
@@ -145,7 +145,7 @@ def test_outputs_are_read_and_a_parameter_is_set_from_the_next_step_on() -> None
         read[live.time] = live["hand.F"]
         change(live)
 
-    made = ran("closed-loop", turn, "duration=0.2")
+    made = ran("closed-loop-ideal", turn, "duration=0.2")
     wrench, times = made["hand.F"], made.time("hand.F")
     for time, value in read.items():
         assert np.array_equal(wrench[times == time][0], value)
@@ -158,7 +158,7 @@ def test_a_spring_hand_pulls_to_where_it_is_moved() -> None:
     """F = K (target - x), as whoever holds a mouse has it."""
     hand = "hand={ type = 'spring', stiffness = [50.0, 50.0, 0.1], target = [[0, 0.1, 0, 0]] }"
     change = once(0.1, lambda live: live.set("hand.target", (0.3, 0.1, 0.0)))
-    made = ran("closed-loop", change, hand, "duration=0.2")
+    made = ran("closed-loop-ideal", change, hand, "duration=0.2")
     pull = made["hand.F"] / [50.0, 50.0, 0.1] + made["haptic_device.x_true"]
     moved = np.abs(pull[:, 0] - 0.3) < 1e-9
     assert np.allclose(pull[~moved], [0.1, 0.0, 0.0], rtol=0, atol=1e-12)
@@ -194,8 +194,8 @@ def test_a_hold_is_changed_and_begins_with_the_newest_sample() -> None:
 
 
 def test_a_rate_is_changed_from_the_end_of_the_step_on() -> None:
-    made = ran("closed-loop", once(0.1, lambda live: live.rate("graphics", 64.0)), "duration=0.3",
-               "graphics.rate=32")  # fmt: skip
+    made = ran("closed-loop-ideal", once(0.1, lambda live: live.rate("graphics", 64.0)),
+               "duration=0.3", "graphics.rate=32")  # fmt: skip
     want = [*(k / 32 for k in range(4)), *(k / 64 for k in range(8, 20))]
     assert made.graphics["time"].tolist() == want
     assert made.run["real_time"]["samples"]["graphics"]["late"] == 0
@@ -203,10 +203,10 @@ def test_a_rate_is_changed_from_the_end_of_the_step_on() -> None:
 
 def test_a_rate_is_changed_as_by_a_scene_that_has_it_then() -> None:
     """A rate whose periods are no whole ticks, of which each end is the first tick after it."""
-    made = ran("closed-loop", once(0.1, lambda live: live.rate("graphics", 37.3)), "duration=1.0",
-               "graphics.rate=32")  # fmt: skip
+    made = ran("closed-loop-ideal", once(0.1, lambda live: live.rate("graphics", 37.3)),
+               "duration=1.0", "graphics.rate=32")  # fmt: skip
     at = [{"time": 4 / 32, "set": {"graphics.rate": 37.3}}]
-    again = hl.run("closed-loop", {"duration": 1.0, "graphics.rate": 32, "at": at})
+    again = hl.run("closed-loop-ideal", {"duration": 1.0, "graphics.rate": 32, "at": at})
     assert np.array_equal(made.graphics["time"], again.graphics["time"])
 
 
@@ -214,7 +214,7 @@ def test_a_rate_of_none_brings_back_the_steps_of_the_scene() -> None:
     """30 Hz, whose periods are no whole haptic ticks; the first is at least one such tick long."""
     turns = [once(0.1, lambda live: live.rate("graphics", 64.0)),
              once(0.2, lambda live: live.rate("graphics", None))]  # fmt: skip
-    made = ran("closed-loop", lambda live: [turn(live) for turn in turns], "duration=0.35",
+    made = ran("closed-loop-ideal", lambda live: [turn(live) for turn in turns], "duration=0.35",
                "graphics.rate=30")  # fmt: skip
     time = made.graphics["time"]
     again = time[time > 0.23]
@@ -227,7 +227,7 @@ def test_jitter_moves_each_end_by_up_to_half_its_share_of_a_period() -> None:
     ends = {}
     for seed in (0, 0, 1):
         change = once(0.1, lambda live, s=seed: live.rate("graphics", 20.0, 0.5, s))
-        made = ran("closed-loop", change, "duration=4.0", "graphics.rate=32")
+        made = ran("closed-loop-ideal", change, "duration=4.0", "graphics.rate=32")
         time = made.graphics["time"]
         off = 20 * (time[5:] - time[4] - np.arange(1, len(time) - 4) / 20)
         assert np.abs(off).max() < 0.25 + 20 / 512
@@ -253,7 +253,7 @@ def test_time_stands_still_in_a_pause_and_goes_on_by_steps() -> None:
         if len(seen) == 10:
             live.resume()
 
-    made = ran("closed-loop", turn, "duration=0.2", clock=clock)
+    made = ran("closed-loop-ideal", turn, "duration=0.2", clock=clock)
     ticks = np.array(seen) * 512
     assert (ticks[1:5] == ticks[1]).all()
     assert np.array_equal(np.diff(ticks[4:10]), [3, 3, 3, 0, 0])
@@ -288,7 +288,7 @@ fmu = [
 
 def test_a_reset_begins_anew_with_changed_options() -> None:
     turn = once(0.05, lambda live: live.reset({"hold": "foh"}))
-    made = ran("closed-loop", turn, "duration=0.1")
+    made = ran("closed-loop-ideal", turn, "duration=0.1")
     assert made.run["end"]["reason"] == "duration"
     assert np.array_equal(made.haptics["time"], np.arange(52) / 512)
     assert "foh" in made.run["holds"].values()

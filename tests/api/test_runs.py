@@ -24,7 +24,7 @@ FAR = {"linkage.start_velocity.slide": 1e308, "linkage.start.slide": 1.7e308}
 
 @pytest.fixture(scope="module")
 def short() -> hl.Run:
-    return hl.run("closed-loop", SHORT)
+    return hl.run("closed-loop-ideal", SHORT)
 
 
 def same(one: hl.Run, two: hl.Run) -> bool:
@@ -38,12 +38,12 @@ def same(one: hl.Run, two: hl.Run) -> bool:
 def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
     tmp_path: Path, emptied_temporary_folder: Path
 ) -> None:
-    memory = hl.run("closed-loop", SHORT)
+    memory = hl.run("closed-loop-ideal", SHORT)
     assert memory.folder is None
     assert not list(emptied_temporary_folder.iterdir())
-    folder = hl.run("closed-loop", SHORT, out=tmp_path / "api")
+    folder = hl.run("closed-loop-ideal", SHORT, out=tmp_path / "api")
     options = sets(f"{key}={value}" for key, value in SHORT.items())
-    assert status("run", "closed-loop", *options, "--out", tmp_path / "command") == 0
+    assert status("run", "closed-loop-ideal", *options, "--out", tmp_path / "command") == 0
     command = hl.load(tmp_path / "command")
     assert same(memory, folder)
     assert same(memory, command)
@@ -55,7 +55,7 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
     assert folder.run["options"] == ["duration=0.1", "graphics.rate=40"]
 
 
-@pytest.mark.parametrize("scene", ["bar", "closed-loop"])
+@pytest.mark.parametrize("scene", ["bar", "closed-loop-ideal"])
 def test_a_long_run_reads_no_table_back_and_tells_the_same(
     scene: str,
     bar: Path,
@@ -119,17 +119,19 @@ def test_print_gives_the_lines_of_the_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert (
-        status("run", "closed-loop", *sets(["duration=0.1"]), "--no-figures", "--out", tmp_path)
+        status(
+            "run", "closed-loop-ideal", *sets(["duration=0.1"]), "--no-figures", "--out", tmp_path
+        )
         == 0
     )
     name, said = capsys.readouterr().out.partition(":")[::2]
     found = hl.load(tmp_path)
-    assert name == "closed-loop"
+    assert name == "closed-loop-ideal"
     assert f"{found}\n" == f"{found.run['scene']['title']}:{said}"
 
 
 def test_a_scene_is_four_lines() -> None:
-    lines = repr(hl.scene("closed-loop", {"graphics.rate": 15})).splitlines()
+    lines = repr(hl.scene("closed-loop-ideal", {"graphics.rate": 15})).splitlines()
     assert len(lines) == 4
     assert "4 bodies, 1 closed loops" in lines[1]
     assert "graphics at 15 Hz" in lines[2]
@@ -211,13 +213,13 @@ def test_a_fault_of_the_run_is_told_with_its_results(bar: Path, tmp_path: Path) 
 
 def test_a_fault_before_the_first_step_has_no_samples() -> None:
     far = {"linkage.operational_point": {"body": "link2", "at": [0.9, 0.0]}}
-    lost = hl.run("closed-loop", far)
+    lost = hl.run("closed-loop-ideal", far)
     said = "haptic_device: the start pose (x m, y m, theta rad) = (0.66"
     assert str(lost.fault).startswith(said)
     assert "outside the device's workspace by 0.7" in str(lost.fault)
     assert [len(part) for part in lost.tracking()] == [0, 0, 0]
     assert lost.figures() == {}
-    (row,) = hl.sweep("closed-loop", {"duration": [0.1]}, far, jobs=1).rows
+    (row,) = hl.sweep("closed-loop-ideal", {"duration": [0.1]}, far, jobs=1).rows
     assert row["end"] == "fault"
     assert "outside the device's workspace" in row["message"]
 
@@ -282,14 +284,14 @@ def test_what_a_run_warns_of_stands_in_run_json(tmp_path: Path) -> None:
     options = {"graphics.rate": 10, "duration": 2.0}
     pulled = {**options, "graphics.sync": "operational"}
     memory, folder = (
-        hl.run("closed-loop", pulled, out=out, figures=False) for out in (None, tmp_path)
+        hl.run("closed-loop-ideal", pulled, out=out, figures=False) for out in (None, tmp_path)
     )
     (warning,) = memory.run["warnings"]
     off = int((memory["virtual_environment.branch_ok"] == 0).sum())
     assert off > 0
     assert warning.startswith(f"warning: the graphics copy was folded in {off} of ")
     assert folder.run["warnings"] == hl.load(tmp_path).run["warnings"] == [warning]
-    assert hl.run("closed-loop", options).run["warnings"] == []
+    assert hl.run("closed-loop-ideal", options).run["warnings"] == []
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")

@@ -69,7 +69,7 @@ def test_nothing_acts_on_the_terminal_but_the_bar(
 
 
 def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) -> None:
-    assert status("info", "closed-loop") == 0
+    assert status("info", "closed-loop-ideal") == 0
     said = capsys.readouterr().out
     assert "ticks of 1/7680 s, gauss-seidel" in said
     assert "virtual_environment.Lambda_inv -> controller.Lambda_inv: 0 to 33.2, zoh" in said
@@ -79,16 +79,22 @@ def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) ->
     ("arguments", "message"),
     [
         (["run", "no-such-scene"], "neither a file nor a shipped scene"),
-        (["run", "closed-loop", "--set", "controler.topology=false"], "did you mean 'controller'"),
-        (["run", "closed-loop", "--set", "holds.hand.G=zoh"], "is no connection of this"),
-        (["run", "closed-loop", "--set", "stop_when=hand.G<0"], "there is no such output"),
-        (["run", "closed-loop", "--bogus"], "Unknown option"),
+        (
+            ["run", "closed-loop-ideal", "--set", "controler.topology=false"],
+            "did you mean 'controller'",
+        ),
+        (["run", "closed-loop-ideal", "--set", "holds.hand.G=zoh"], "is no connection of this"),
+        (["run", "closed-loop-ideal", "--set", "stop_when=hand.G<0"], "there is no such output"),
+        (["run", "closed-loop-ideal", "--bogus"], "Unknown option"),
         (["fly"], "Unknown command"),
         (["run", "pendulum", "--set", "title=\udcff"], r"'title=\udcff': no text"),
         (["build", "five-bar", "--all-platforms", "--out", "none"], "--set packaging=native"),
         (["new", "nowhere/crane"], "nowhere"),
         (["export-results", "runs/a", "--to", "mcap"], '.frame("haptics").to_parquet('),
-        (["advise", "closed-loop", "--draws=3"], "there are eight; --seed N gives eight others"),
+        (
+            ["advise", "closed-loop-ideal", "--draws=3"],
+            "there are eight; --seed N gives eight others",
+        ),
     ],
 )
 def test_bad_input_is_status_2(

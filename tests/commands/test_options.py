@@ -89,11 +89,11 @@ def test_completion_knows_scenes_and_keys(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("mine.toml").write_text("")
-    assert {"closed-loop", "mine.toml"} <= set(completion.scenes())
+    assert {"closed-loop-ideal", "mine.toml"} <= set(completion.scenes())
     keys = completion.keys()
     assert {"graphics.rate=", "controller.topology.stiffness=", "hand.wrench="} <= set(keys)
     assert len(set(keys)) == len(keys)
-    assert status("__complete", "run", "closed-loop", "--set", "haptics.") == 0
+    assert status("__complete", "run", "closed-loop-ideal", "--set", "haptics.") == 0
     assert "haptics.rate=" in capsys.readouterr().out
 
 
@@ -114,7 +114,7 @@ def test_bash_completes_the_name_of_a_scene(tmp_path: Path) -> None:
         ["bash", "--norc", "-c", pressed],
         env=environment, check=True, capture_output=True, text=True,
     )  # fmt: skip
-    assert "closed-loop" in told.stdout.split()
+    assert "closed-loop-ideal" in told.stdout.split()
 
 
 def test_the_doctor_builds_and_runs(capsys: pytest.CaptureFixture[str]) -> None:

@@ -50,7 +50,7 @@ def test_watt_s_linkage_draws_watt_s_curve(tmp_path: Path) -> None:
 
 
 def test_the_first_variation_ends_early() -> None:
-    run = run_once("closed-loop", {"graphics.rate": 10, "controller.topology": False})
+    run = run_once("closed-loop-ideal", {"graphics.rate": 10, "controller.topology": False})
     assert run.fault is None
     end = run.run["end"]
     assert end["reason"] == "stop_when"
@@ -65,7 +65,7 @@ def test_the_first_example_prints_what_is_below_it() -> None:
 
 
 def test_the_handle_stays_within_5_mm() -> None:
-    distance = run_once("closed-loop").tracking().distance_mm
+    distance = run_once("closed-loop-ideal").tracking().distance_mm
     assert 4 < distance.max() < 5
 
 
@@ -83,7 +83,7 @@ def test_an_own_controller_acts_as_the_scene_s_own_block(tmp_path: Path) -> None
         "controller.teleoperation.damping": [5.0, 5.0, 0.005],
     }
     stiffer = swap | {"fmu.controller.start.k": 200.0}
-    own, built_in, k200 = (hl.run("closed-loop", o) for o in (swap, law, stiffer))
+    own, built_in, k200 = (hl.run("closed-loop-ideal", o) for o in (swap, law, stiffer))
     assert own.tracking().distance_mm.max() == pytest.approx(9.8, abs=0.05)
     assert k200.tracking().distance_mm.max() == pytest.approx(5.9, abs=0.05)
     for signal in ("virtual_mechanism.x", "haptic_device.x_true", "controller.F_drift"):
@@ -108,7 +108,7 @@ def test_a_program_in_c_plus_plus_gets_the_pose_of_our_own_run(tmp_path: Path) -
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    ours = hl.run("closed-loop", {"hand.wrench": [0.5, 0.0, 0.0]})
+    ours = hl.run("closed-loop-ideal", {"hand.wrench": [0.5, 0.0, 0.0]})
     pose = done.stdout.splitlines()[-1].split()
     assert [*map(float, pose)] == ours["virtual_mechanism.x"][-1].tolist()
 
@@ -116,11 +116,11 @@ def test_a_program_in_c_plus_plus_gets_the_pose_of_our_own_run(tmp_path: Path) -
 def test_fmpy_gets_the_pose_of_our_own_run_from_the_hand_s_force(tmp_path: Path) -> None:
     page = ROOT / "docs" / "fmus-elsewhere.md"
     (script,) = (b.text for b in blocks(page, "python") if "hand.F[1]" in b.text)
-    hl.build("closed-loop", as_one=True, without="hand", out=tmp_path / "fmus")
+    hl.build("closed-loop-ideal", as_one=True, without="hand", out=tmp_path / "fmus")
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, text=True
     )
-    ours = hl.run("closed-loop", {"hand.wrench": [0.5, 0.0, 0.0], "duration": 1.0})
+    ours = hl.run("closed-loop-ideal", {"hand.wrench": [0.5, 0.0, 0.0], "duration": 1.0})
     assert float(done.stdout.split()[-1]) == ours["virtual_mechanism.x"][-1, 0]
 
 
@@ -135,5 +135,5 @@ def test_libcosim_reaches_the_pose_of_our_jacobi(tmp_path: Path) -> None:
     numbers = re.compile(r"\[[-+.e\d]+(, [-+.e\d]+)*\]")
     printed = next(line for line in done.stdout.splitlines() if numbers.fullmatch(line))
     options = {"coupling": "jacobi", "graphics.rate": 32, "duration": 1.0}
-    ours = hl.run("closed-loop", options)["virtual_mechanism.x"][-1].tolist()
+    ours = hl.run("closed-loop-ideal", options)["virtual_mechanism.x"][-1].tolist()
     assert json.loads(printed) == ours

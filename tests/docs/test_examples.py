@@ -34,7 +34,7 @@ SHORTER = {"hapticlink sweep": 0.02} | {
 }
 """Duration (s) of commands that take longer than their page needs."""
 NOT_RUN = {
-    "hapticlink sweep closed-loop --set controller.bias=full --vary graphics.rate=10..60..5 "
+    "hapticlink sweep closed-loop-ideal --set controller.bias=full --vary graphics.rate=10..60..5 "
     "--vary hold=zoh,lead,foh":
         "33 runs; docs/rates.md has a sweep that is run",
     "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,foh":
@@ -65,7 +65,7 @@ NOT_RUN = {
     "hapticlink fit shaken.csv": "of a log of one's own; tests/analysis/fit",
     "hapticlink report runs/closed-loop": "of a run that is shorter here, elsewhere; replay.md",
     "hapticlink compare runs/closed-loop "
-    "runs/closed-loop,graphics.rate=10,controller.topology=false": "as its runs; replay.md",
+    "runs/closed-loop,controller.topology=false": "as its runs; replay.md",
     "hapticlink stability held.toml --equilibrium "
     "--set 'controller.teleoperation.stiffness=[500.0, 500.0, 0.5]'":
         "as the one above it on its page",
@@ -74,9 +74,9 @@ NOT_RUN = {
     "hapticlink bench one": "takes minutes, and measures the machine",
     "hapticlink bench standalone": "takes minutes, and measures the machine",
     "hapticlink bench view": "takes a minute, and measures the machine",
-    "hapticlink build closed-loop --set packaging=native --all-platforms --out fmus":
+    "hapticlink build closed-loop-ideal --set packaging=native --all-platforms --out fmus":
         "compiles for five machines; tests/orchestrator/scene/test_packaging.py",
-    "hapticlink sweep closed-loop --vary graphics.rate=10..60 --scheduler tcp://10.0.0.5:8786":
+    "hapticlink sweep closed-loop-ideal --vary graphics.rate=10..60 --scheduler tcp://10.0.0.5:8786":
         "needs a cluster; tests/analysis/sweep/test_sweep.py",
     "hapticlink run their.ssp --set haptics.rate=100 --set duration=10 --set fmu.engine.rate=20":
         "is of somebody else's file; tests/orchestrator/ssp/test_ssp.py",

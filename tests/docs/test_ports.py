@@ -20,12 +20,12 @@ WALL = {
 }
 SCENES: list[tuple[str, Mapping[str, Any]]] = [
     (
-        "closed-loop",
+        "closed-loop-ideal",
         {"sensing": "encoders", "controller.bias": "full", "controller.passivity": True},
     ),
-    ("closed-loop", {"mechanism.directions": True, "mechanism.diagnostics": True}),
-    ("closed-loop", {"mechanism.integrator": "passive-midpoint"}),
-    ("closed-loop", {"graphics.sync": "operational", "hand.damping": (1.0, 1.0, 0.1)}),
+    ("closed-loop-ideal", {"mechanism.directions": True, "mechanism.diagnostics": True}),
+    ("closed-loop-ideal", {"mechanism.integrator": "passive-midpoint"}),
+    ("closed-loop-ideal", {"graphics.sync": "operational", "hand.damping": (1.0, 1.0, 0.1)}),
     ("enclosure", {"controller.contact": True}),
     ("local-model", {}),
     ("two-hands", {"mechanism.directions": True}),

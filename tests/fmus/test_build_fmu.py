@@ -152,7 +152,7 @@ def test_the_icon_tells_the_kind(fmus):
 
 @pytest.mark.parametrize("block", ["virtual_mechanism", "virtual_environment"])
 def test_documentation_names_no_file_of_the_sources(block, tmp_path):
-    plan = next(b for b in blocks(open_scene.load("closed-loop")).loop if b.name == block)
+    plan = next(b for b in blocks(open_scene.load("closed-loop-ideal")).loop if b.name == block)
     path = build_block(plan.block, plan.settings, tmp_path)
     page = zipfile.ZipFile(path).read("documentation/index.html").decode()
     assert not re.search(r"\w\.py\b|`\w+_\w+`", page)

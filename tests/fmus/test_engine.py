@@ -88,8 +88,8 @@ def difference(one, two, name):
 
 
 def test_a_placed_copy_gives_the_same_loop():
-    ours = run_once("closed-loop", ["duration=0.5"])
-    theirs = hl.run("closed-loop", ["duration=0.5", by("virtual_environment")])
+    ours = run_once("closed-loop-ideal", ["duration=0.5"])
+    theirs = hl.run("closed-loop-ideal", ["duration=0.5", by("virtual_environment")])
     assert not any(theirs.run["replaced"]["virtual_environment"].values())
     for name in ("virtual_mechanism.x[1]", "haptic_device.x[3]", "controller.F_motor[2]"):
         assert difference(ours, theirs, name) < 1e-11
@@ -98,17 +98,17 @@ def test_a_placed_copy_gives_the_same_loop():
 def test_a_pulled_copy_follows_as_ours_does():
     """Both take the pull with x and v at the end of a substep."""
     options = ["duration=0.5", "graphics.sync=operational"]
-    ours = hl.run("closed-loop", options)
-    placed = run_once("closed-loop", ["duration=0.5"])
-    theirs = hl.run("closed-loop", [*options, by("virtual_environment")])
+    ours = hl.run("closed-loop-ideal", options)
+    placed = run_once("closed-loop-ideal", ["duration=0.5"])
+    theirs = hl.run("closed-loop-ideal", [*options, by("virtual_environment")])
     name = "haptic_device.x[1]"
     assert 0 < difference(ours, theirs, name) < 1e-4
     assert difference(ours, theirs, name) < 0.2 * difference(ours, placed, name)
 
 
 def test_a_mechanism_moves_as_ours_does():
-    ours = run_once("closed-loop", ["duration=0.5"])
-    theirs = hl.run("closed-loop", ["duration=0.5", by("virtual_mechanism")])
+    ours = run_once("closed-loop-ideal", ["duration=0.5"])
+    theirs = hl.run("closed-loop-ideal", ["duration=0.5", by("virtual_mechanism")])
     assert any("has no energy: there is no energy at" in line for line in theirs.run["warnings"])
     for i in (1, 2):
         assert 0 < difference(ours, theirs, f"virtual_mechanism.x[{i}]") < 1e-5
@@ -151,7 +151,7 @@ def test_a_disc_bounces_as_its_spring_and_damper_say(tmp_path):
 
 
 def test_the_fmu_keeps_the_contract_of_our_fmus(tmp_path):
-    loaded = open_scene.load("closed-loop")
+    loaded = open_scene.load("closed-loop-ideal")
     plan = next(b for b in blocks(loaded).loop if b.name == "virtual_environment")
     path = build_block(plan.block, plan.settings, tmp_path, engine="mujoco")
     assert check_fmu(path) == []
@@ -162,8 +162,8 @@ def test_the_fmu_keeps_the_contract_of_our_fmus(tmp_path):
     [
         ("quick-return", "virtual_mechanism", [], "leave the block to hapticlink"),
         ("enclosure", "virtual_mechanism", [], 'contacts.detection = "haptics"'),
-        ("closed-loop", "virtual_environment", ["graphics.sync=joint"], "sync"),
-        ("closed-loop", "virtual_mechanism", ["mechanism.integrator=heun"], "not MuJoCo's"),
+        ("closed-loop-ideal", "virtual_environment", ["graphics.sync=joint"], "sync"),
+        ("closed-loop-ideal", "virtual_mechanism", ["mechanism.integrator=heun"], "not MuJoCo's"),
     ],
 )
 def test_what_it_does_not_hold_is_refused_with_the_remedy(scene, block, options, why):
@@ -175,7 +175,7 @@ def test_without_mujoco_it_says_what_to_install(monkeypatch):
     monkeypatch.setattr(mujoco_fmu, "find_spec", lambda name: None)
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")
     with pytest.raises(InputFault, match=r"hapticlink\[engine\]"):
-        hl.run("closed-loop", [by("virtual_environment")])
+        hl.run("closed-loop-ideal", [by("virtual_environment")])
 
 
 def test_a_motion_that_diverges_ends_the_run_with_its_cause():

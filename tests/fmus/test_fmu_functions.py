@@ -13,8 +13,8 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from tests.blocks import once
 from tests.fmus import sample_components
 
-PULLED = ("closed-loop", "graphics.sync=operational")
-SCENES = (("closed-loop",), PULLED, ("local-model",), ("obstacles",), ("virtual-wall",))
+PULLED = ("closed-loop-ideal", "graphics.sync=operational")
+SCENES = (("closed-loop-ideal",), PULLED, ("local-model",), ("obstacles",), ("virtual-wall",))
 
 
 @once
@@ -78,9 +78,9 @@ def test_nothing_is_simplified_across_the_two():
 @pytest.mark.parametrize(
     ("scene", "name", "share"),
     [
-        (("closed-loop",), "virtual_mechanism", 0.88),
-        (("closed-loop",), "haptic_device", 0.75),
-        (("closed-loop",), "virtual_environment", 0.65),
+        (("closed-loop-ideal",), "virtual_mechanism", 0.88),
+        (("closed-loop-ideal",), "haptic_device", 0.75),
+        (("closed-loop-ideal",), "virtual_environment", 0.65),
         (("closed-loop-direct",), "virtual_mechanism", 0.75),
     ],
 )
@@ -100,7 +100,7 @@ def test_exact_copy_takes_a_fifteenth_of_the_operations_of_a_pulled_one():
         before = (parts.substeps - 1) * parts.substep.n_instructions()
         return before + parts.advance.n_instructions()
 
-    assert 15 * operations("closed-loop") < operations(*PULLED)
+    assert 15 * operations("closed-loop-ideal") < operations(*PULLED)
 
 
 def test_a_pulled_copy_counts_its_constrained_directions_once_a_frame():

@@ -71,7 +71,7 @@ class Both(dict[str, tuple[Path, ...]]):
     def __init__(self, folder: Path) -> None:
         super().__init__()
         self._folder = folder
-        loaded = open_scene.load("closed-loop", OPTIONS)
+        loaded = open_scene.load("closed-loop-ideal", OPTIONS)
         self._blocks = {b.name: (b.block, b.settings) for b in blocks.blocks(loaded).built}
         self._blocks["discrete_equivalent"] = ("discrete_equivalent", {"rule": "trapezoidal"})
 
@@ -318,7 +318,7 @@ def test_the_same_component_gives_the_same_bytes(native_fmus, tmp_path):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_same_scene_gives_the_same_bytes(both, name, tmp_path):
-    scene = open_scene.load("closed-loop", OPTIONS)
+    scene = open_scene.load("closed-loop-ideal", OPTIONS)
     block = next(b for b in blocks.blocks(scene).built if b.name == name)
     again = build(component(block.block, block.settings), tmp_path)
     assert again.read_bytes() == both[name][0].read_bytes()

@@ -23,7 +23,7 @@ SHORT = "duration=1"
 def cases() -> Iterator[tuple[str, tuple[str, ...]]]:
     yield from ((scene, (SHORT,)) for scene in hl.shipped())
     for hold in HOLDS:
-        for scene in ("closed-loop", "closed-loop-direct"):
+        for scene in ("closed-loop-ideal", "closed-loop-direct"):
             for rate in (32, 30):
                 yield scene, (SHORT, f"graphics.rate={rate}", f"hold={hold}")
 

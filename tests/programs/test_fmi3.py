@@ -25,7 +25,7 @@ from tests.programs.comparison import differing, outputs, run
 pytestmark = needs_compiler
 SECOND = "duration=1"
 DIRECT = (SECOND, "graphics.rate=30", "hold=passive")
-CASES = [("closed-loop", (SECOND,)), ("closed-loop-direct", DIRECT), ("five-bar", (SECOND,))]
+CASES = [("closed-loop-ideal", (SECOND,)), ("closed-loop-direct", DIRECT), ("five-bar", (SECOND,))]
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 
 
@@ -44,7 +44,7 @@ def test_it_has_the_bits_of_the_run(scene: str, options: tuple[str, ...], tmp_pa
 
 
 def test_fmpy_simulates_it_as_that_of_fmi2() -> None:
-    made = {fmi: program("closed-loop", (SECOND,), fmi=fmi) for fmi in (2, 3)}
+    made = {fmi: program("closed-loop-ideal", (SECOND,), fmi=fmi) for fmi in (2, 3)}
     two, three = (
         simulate_fmu(str(path), stop_time=1.0, output_interval=1 / 512) for path in made.values()
     )
@@ -59,7 +59,7 @@ def test_fmpy_simulates_it_as_that_of_fmi2() -> None:
 
 def test_vectors_and_matrices_are_arrays() -> None:
     """Whole ones with one unit, or their units in the description; a part of one is scalars."""
-    found = variables(program("closed-loop", (SECOND,), "hand", fmi=3))
+    found = variables(program("closed-loop-ideal", (SECOND,), "hand", fmi=3))
     inverse = found["virtual_environment.Lambda_inv"]
     assert inverse.shape == (3, 3)
     assert inverse.unit is None
@@ -71,17 +71,17 @@ def test_vectors_and_matrices_are_arrays() -> None:
     assert (gain.unit, gain.causality, gain.variability) == ("1/s2", "parameter", "tunable")
     assert found["haptic_device.base_x"].variability == "fixed"
     options = (SECOND, 'record.signals=["virtual_mechanism.x[1]", "virtual_mechanism.v"]')
-    found = variables(program("closed-loop", options, fmi=3))
+    found = variables(program("closed-loop-ideal", options, fmi=3))
     recorded = [name for name, v in found.items() if v.causality == "output"]
     assert recorded == ["virtual_mechanism.x[1]", "virtual_mechanism.v"]
 
 
 def test_it_lives_as_every_fmu_of_this_project() -> None:
-    assert check_fmu(program("closed-loop", (SECOND,), "hand", fmi=3)) == []
+    assert check_fmu(program("closed-loop-ideal", (SECOND,), "hand", fmi=3)) == []
 
 
 def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
-    with session(program("closed-loop", (SECOND,), "hand", fmi=3)) as fmu:
+    with session(program("closed-loop-ideal", (SECOND,), "hand", fmi=3)) as fmu:
         slave = fmu.instance()
         at = {v.name: v.valueReference for v in fmu.description.modelVariables}
         nothing = (False, False, True, 0.0)
@@ -148,10 +148,10 @@ def test_a_condition_to_stop_asks_to_terminate(tmp_path: Path) -> None:
 def test_hapticlink_runs_it(tmp_path: Path) -> None:
     """Beside the blocks of the same scene, with the force of their hand: the same rows, of sampled
     blocks one later."""
-    path = program("closed-loop", (SECOND,), "hand", fmi=3)
+    path = program("closed-loop-ideal", (SECOND,), "hand", fmi=3)
     copy = f'fmu.+={{name="copy", path="{path}"}}'
     wire = 'connection.+={from="hand.F", to="copy.hand.F"}'
-    rows = run("closed-loop", (SECOND, copy, wire), tmp_path).results.haptics
+    rows = run("closed-loop-ideal", (SECOND, copy, wire), tmp_path).results.haptics
     columns = [c for c in rows.columns if f"copy.{c}" in rows.columns]
     assert {c.partition(".")[0] for c in columns} >= {"haptic_device", "virtual_mechanism"}
     for column in columns:
@@ -161,7 +161,7 @@ def test_hapticlink_runs_it(tmp_path: Path) -> None:
 
 
 def test_terminals_and_description_of_the_build_fit_the_standard() -> None:
-    with zipfile.ZipFile(program("closed-loop", (SECOND,), "hand", fmi=3)) as archive:
+    with zipfile.ZipFile(program("closed-loop-ideal", (SECOND,), "hand", fmi=3)) as archive:
         read = {
             name: etree.parse(BytesIO(archive.read(f"{folder}/{name}.xml")))
             for folder, name in (

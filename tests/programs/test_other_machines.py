@@ -30,7 +30,7 @@ class Life:
 
     @cached_property
     def files(self) -> dict[str, bytes]:
-        with zipfile.ZipFile(program("closed-loop", fmi=self.fmi)) as archive:
+        with zipfile.ZipFile(program("closed-loop-ideal", fmi=self.fmi)) as archive:
             return {name: archive.read(name) for name in archive.namelist()}
 
     def lived(self, command: list[str], environment: Mapping[str, str] = os.environ) -> float:

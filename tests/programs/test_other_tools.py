@@ -18,7 +18,7 @@ Values = Callable[[], Sequence[float]]
 
 def equal_a_run(columns: list[str], step: Callable[[], object], values: Values, folder: Path):
     """Whether outputs of plants have the bits of a run after each step."""
-    rows = run("closed-loop", OPTIONS, folder).results.haptics
+    rows = run("closed-loop-ideal", OPTIONS, folder).results.haptics
     for row in range(1, STEPS + 1):
         step()
         assert [*values()] == [rows[column][row] for column in columns], row
@@ -34,7 +34,7 @@ def test_libcosim(tmp_path: Path) -> None:
     from libcosimpy.CosimSlave import CosimLocalSlave
 
     execution = CosimExecution.from_step_size(1_000_000_000 // 512)
-    scene = CosimLocalSlave(str(program("closed-loop", OPTIONS)), "scene")
+    scene = CosimLocalSlave(str(program("closed-loop-ideal", OPTIONS)), "scene")
     index = execution.add_local_slave(scene)
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
@@ -46,7 +46,7 @@ def test_libcosim(tmp_path: Path) -> None:
 
 def test_ecos(ecos: Any, tmp_path: Path) -> None:  # noqa: F811
     structure = ecos.EcosSimulationStructure()
-    structure.add_model("scene", str(program("closed-loop", OPTIONS)))
+    structure.add_model("scene", str(program("closed-loop-ideal", OPTIONS)))
     names = [f"scene::{column}" for column in COLUMNS]
     with ecos.EcosSimulation(step_size=1 / 512, structure=structure) as simulation:
         simulation.init()

@@ -67,7 +67,7 @@ for (let i = 1; i <= given.events; i++) {
 
 
 def dragged(options: tuple[str, ...] = ()) -> Scene:
-    return load_viewed_scene("closed-loop", options, duration=1.5)
+    return load_viewed_scene("closed-loop-ideal", options, duration=1.5)
 
 
 @cache

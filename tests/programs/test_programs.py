@@ -36,12 +36,12 @@ DELAYED = (
 )
 SLOW = "mechanism_at=graphics; graphics.rate=100"
 CASES = {
-    "zoh": ("closed-loop", HALF),
-    "foh with delays, jitter and loss": ("closed-loop", "; ".join(DELAYED)),
-    "smooth, jacobi": ("closed-loop", f"{HALF}; hold=smooth; coupling=jacobi"),
-    "drawn rate": ("closed-loop", f"{HALF}; graphics.rate={{min=20,max=90,seed=5}}"),
+    "zoh": ("closed-loop-ideal", HALF),
+    "foh with delays, jitter and loss": ("closed-loop-ideal", "; ".join(DELAYED)),
+    "smooth, jacobi": ("closed-loop-ideal", f"{HALF}; hold=smooth; coupling=jacobi"),
+    "drawn rate": ("closed-loop-ideal", f"{HALF}; graphics.rate={{min=20,max=90,seed=5}}"),
     "listed frames, a phase": (
-        "closed-loop",
+        "closed-loop-ideal",
         f"{HALF}; graphics.rate=[0.01,0.05,0.3,0.6]; phases={{haptic_device=0.001}}",
     ),
     "passive": ("closed-loop-direct", f"{HALF}; graphics.rate=30; hold=passive"),
@@ -49,12 +49,12 @@ CASES = {
     "pspm": ("closed-loop-direct", f"{HALF}; graphics.rate=30; hold=pspm"),
     "mechanism alone": ("pendulum", HALF),
     "derivatives and integrals": (
-        "closed-loop",
+        "closed-loop-ideal",
         f'{HALF}; {SLOW}; holds={{"virtual_mechanism.x -> controller.x_S"="hermite",'
         '"virtual_mechanism.v -> controller.v_S"="slope"}',
     ),
     "a derivative": (
-        "closed-loop", f'{HALF}; {SLOW}; holds={{"virtual_mechanism.x"="foh-derivative"}}',
+        "closed-loop-ideal", f'{HALF}; {SLOW}; holds={{"virtual_mechanism.x"="foh-derivative"}}',
     ),
     "mean": ("two-users", "duration=0.2; downsampling=mean"),
 }  # fmt: skip
@@ -110,20 +110,20 @@ def test_random_scenes_have_the_bits_of_their_runs(seed: int, tmp_path: Path) ->
             f'delays={{"virtual_environment.P_c"={{min={low:.4f},max={low + 0.02:.4f},'
             f"loss={draw.choice((0.0, 0.1))},seed={seed}}}}}"
         )
-    experiment = run("closed-loop", tuple(options), tmp_path)
+    experiment = run("closed-loop-ideal", tuple(options), tmp_path)
     step = draw.choice((1, 11, 100)) * experiment.system.timeline.clocks[0].longest
-    found = outputs(program("closed-loop", tuple(options)), experiment, step)
+    found = outputs(program("closed-loop-ideal", tuple(options)), experiment, step)
     assert [*differing(found, experiment)] == [], options
 
 
 def test_it_lives_as_every_fmu_of_this_project() -> None:
     """Two instances, reset, loading again, a state saved, restored, serialised and restored into
     another instance."""
-    assert check_fmu(program("closed-loop", DELAYED)) == []
+    assert check_fmu(program("closed-loop-ideal", DELAYED)) == []
 
 
 def test_the_same_scene_gives_the_same_files() -> None:
-    scene = open_scene.load("closed-loop", DELAYED)
+    scene = open_scene.load("closed-loop-ideal", DELAYED)
     assert program_files(scene, "program") == program_files(scene, "program")
 
 
@@ -131,8 +131,8 @@ def test_without_the_hand_its_force_is_an_input(tmp_path: Path) -> None:
     """At its start value the scene's constant hand gives the bits of the run; another force moves
     the device elsewhere."""
     options = (HALF, "hand={type='constant', wrench=[0.4,0.1,0.0]}")
-    experiment = run("closed-loop", options, tmp_path)
-    path = program("closed-loop", options, "hand")
+    experiment = run("closed-loop-ideal", options, tmp_path)
+    path = program("closed-loop-ideal", options, "hand")
     found = outputs(path, experiment, 240)
     assert [*differing(found, experiment, skipped="hand.")] == []
     with session(path) as opened:
@@ -160,7 +160,7 @@ def test_a_time_between_ticks_is_the_tick_before() -> None:
         assert one.get(*outputs) == two.get(*outputs)
 
 
-@pytest.mark.parametrize("scene", ["closed-loop", "five-bar"])
+@pytest.mark.parametrize("scene", ["closed-loop-ideal", "five-bar"])
 def test_outputs_depend_at_once_on_the_inputs_that_are_listed_alone(scene: str) -> None:
     """Without a step between, a changed input changes no output whose dependencies lack it: in a
     closed loop none."""
@@ -187,7 +187,7 @@ def test_outputs_depend_at_once_on_the_inputs_that_are_listed_alone(scene: str) 
 
 
 def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
-    path = program("closed-loop", DELAYED, "hand")
+    path = program("closed-loop-ideal", DELAYED, "hand")
     with session(path) as opened:
         names = {v.name: v.valueReference for v in opened.description.modelVariables}
         fixed = next(v for v in opened.description.modelVariables
@@ -222,7 +222,7 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
 
 
 def test_a_state_whose_bytes_are_damaged_is_refused() -> None:
-    path = program("closed-loop", DELAYED)
+    path = program("closed-loop-ideal", DELAYED)
     with session(path) as opened:
         fmu = Named(opened).start()
         fmu.step(0.0, 0.1)
@@ -251,12 +251,12 @@ def test_steps_that_each_begin_a_little_early_do_not_take_the_program_back() -> 
 def test_a_scene_that_diverges_becomes_a_program(tmp_path: Path) -> None:
     """What its latencies need is known from its run, up to where that fails."""
     options = (HALF, "controller.teleoperation.stiffness=[1e6,1e6,1e3]", *DELAYED[1:])
-    assert simulate("closed-loop", tmp_path, options).outcome.reason == "diverged"
-    assert program("closed-loop", options).exists()
+    assert simulate("closed-loop-ideal", tmp_path, options).outcome.reason == "diverged"
+    assert program("closed-loop-ideal", options).exists()
 
 
 def test_a_run_that_diverges_names_the_output() -> None:
-    path = program("closed-loop", DELAYED, "hand")
+    path = program("closed-loop-ideal", DELAYED, "hand")
     with session(path) as opened:
         fmu = Named(opened).start()
         fmu.set(**{"hand.F[1]": 1e300})
@@ -271,9 +271,9 @@ def test_a_run_that_diverges_names_the_output() -> None:
 
 
 def test_what_cannot_go_is_refused_with_the_reason(tmp_path) -> None:
-    scene = open_scene.load("closed-loop", ("coupling=iterated",))
+    scene = open_scene.load("closed-loop-ideal", ("coupling=iterated",))
     with pytest.raises(InputFault, match="cannot become one program") as refused:
-        build_program(scene, "closed-loop", out=tmp_path)
+        build_program(scene, "closed-loop-ideal", out=tmp_path)
     assert "steps are repeated by Python" in str(refused.value)
     with pytest.raises(InputFault, match="no block 'foot'"):
         build_program(open_scene.load("pendulum"), "pendulum", out=tmp_path, without="foot")
@@ -311,8 +311,8 @@ def test_a_condition_to_stop_ends_the_simulation(tmp_path: Path) -> None:
 
 def test_it_has_the_outputs_that_the_scene_records(tmp_path: Path) -> None:
     options = (HALF, 'record.signals=["virtual_mechanism.x"]')
-    experiment = run("closed-loop", options, tmp_path)
-    found = outputs(program("closed-loop", options), experiment, 240)
+    experiment = run("closed-loop-ideal", options, tmp_path)
+    found = outputs(program("closed-loop-ideal", options), experiment, 240)
     assert found.names == [f"virtual_mechanism.x[{i}]" for i in (1, 2, 3)]
     assert [*differing(found, experiment)] == []
 

@@ -10,13 +10,13 @@ from tests.shared_fixtures import run_once
 
 @pytest.fixture(scope="module")
 def runs():
-    """(topology, bias) -> results of `closed-loop` at 30 Hz."""
+    """(topology, bias) -> results of `closed-loop-ideal` at 30 Hz."""
     options = {
         ("true", "none"): (),
         ("false", "none"): ("controller.topology=false",),
         ("true", "full"): ("controller.bias=full",),
     }
-    found = {of: run_once("closed-loop", given) for of, given in options.items()}
+    found = {of: run_once("closed-loop-ideal", given) for of, given in options.items()}
     assert all(run.fault is None for run in found.values())
     return found
 
@@ -66,7 +66,7 @@ def test_jacobi_delay_makes_the_printed_gains_unstable(tmp_path):
     worst = {}
     for damping in (0.375, 0.2):
         options = ["coupling=jacobi", f"controller.teleoperation.damping=[70.0, 70.0, {damping}]"]
-        experiment = simulate("closed-loop", tmp_path / str(damping), options)
+        experiment = simulate("closed-loop-ideal", tmp_path / str(damping), options)
         rate = experiment.results.haptics["controller.F_drift"][:, 2]
         worst[damping] = np.abs(np.diff(rate)).max()
     assert worst[0.375] > 30 * worst[0.2]

@@ -23,7 +23,7 @@ EIGENVALUES = (0.0, 0.59269813383711, 522.142472656353)
 @pytest.fixture(scope="module")
 def at_rest(tmp_path_factory):
     """Outputs by name of the two FMUs in initialisation, the wrench set on the mechanism."""
-    scene = open_scene.load("closed-loop", ["mechanism.directions=true"])
+    scene = open_scene.load("closed-loop-ideal", ["mechanism.directions=true"])
     files = fmu_files.fmu_files(
         scene, blocks(scene), timeline(scene), tmp_path_factory.mktemp("fmus")
     )

@@ -7,7 +7,9 @@ from benchmarks.skip import OFF, ON, compared, counts, run
 SHORT = "duration=0.5"
 
 
-@pytest.mark.parametrize("scene", ["closed-loop", "five-bar", "virtual-wall", "parallelogram"])
+@pytest.mark.parametrize(
+    "scene", ["closed-loop-ideal", "five-bar", "virtual-wall", "parallelogram"]
+)
 def test_results_are_the_same_to_the_bit(tmp_path, scene):
     made = {s: run(scene, tmp_path / s, s, SHORT) for s in (ON, OFF)}
     values, differ, largest, apart = compared(made[ON], made[OFF])
@@ -29,8 +31,8 @@ def test_another_result_is_told_from_the_same(tmp_path):
 
 def test_only_connected_outputs_cross_where_those_are_recorded(tmp_path):
     """Fetching is what differs between these two, so the operations are the same."""
-    some = run("closed-loop", tmp_path / "some", ON, SHORT, "record.signals=connected")
-    every = run("closed-loop", tmp_path / "every", ON, SHORT)
+    some = run("closed-loop-ideal", tmp_path / "some", ON, SHORT, "record.signals=connected")
+    every = run("closed-loop-ideal", tmp_path / "every", ON, SHORT)
     assert counts(some, ON)[0] == counts(every, ON)[0]
     assert counts(some, ON)[2] < 0.95 * counts(every, ON)[2]
 

@@ -26,7 +26,7 @@ def of(kind: str, found: list[Episode]) -> list[Episode]:
 
 
 def test_a_copy_that_folds_is_marked_in_as_many_frames_as_its_output_says() -> None:
-    r = hl.run("closed-loop", {"graphics.sync": "operational", "graphics.substeps": 1})
+    r = hl.run("closed-loop-ideal", {"graphics.sync": "operational", "graphics.substeps": 1})
     off = r["virtual_environment.branch_ok"] == 0
     time = r.time("virtual_environment.branch_ok")
     marked = np.zeros(len(time), bool)
@@ -38,7 +38,9 @@ def test_a_copy_that_folds_is_marked_in_as_many_frames_as_its_output_says() -> N
 
 @pytest.mark.parametrize(("limit", "there"), [(0.02, True), (5.0, False)])
 def test_motors_that_are_too_weak_are_marked(limit: float, there: bool) -> None:
-    r = hl.run("closed-loop", {"device.torque_limit": limit, "duration": 1.0, "stop_when": ""})
+    r = hl.run(
+        "closed-loop-ideal", {"device.torque_limit": limit, "duration": 1.0, "stop_when": ""}
+    )
     assert bool(of("saturated", episodes(r))) == there
 
 

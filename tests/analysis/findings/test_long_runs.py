@@ -75,7 +75,7 @@ def test_tables_of_a_long_run_are_read_when_they_are_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of the rows a block at a time; when these are removed, of the CSVs."""
-    simulate("closed-loop", tmp_path, ["duration=1"], keep_rows=True)
+    simulate("closed-loop-ideal", tmp_path, ["duration=1"], keep_rows=True)
     found, whole = both(tmp_path, monkeypatch)
     for name, table in whole.tables.items():
         assert [len(block.rows) for block in found.tables[name].blocks(more=1)][:-1] in (
@@ -93,12 +93,12 @@ def test_tables_of_a_long_run_are_read_when_they_are_asked_for(
 
 
 def test_a_long_run_leaves_its_csvs_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = hl.run("closed-loop", {"duration": 0.5}, out=tmp_path / "a", figures=False)
+    whole = hl.run("closed-loop-ideal", {"duration": 0.5}, out=tmp_path / "a", figures=False)
     monkeypatch.setattr(read_results, "IN_MEMORY", 0)
-    run = hl.run("closed-loop", {"duration": 0.5}, out=tmp_path / "b", figures=False)
+    run = hl.run("closed-loop-ideal", {"duration": 0.5}, out=tmp_path / "b", figures=False)
     assert {p.name for p in (tmp_path / "b").iterdir()} == {*run.run["files"]}
     assert run.has_rows_of(whole)
-    assert hl.run("closed-loop", {"duration": 0.5}).has_rows_of(whole)
+    assert hl.run("closed-loop-ideal", {"duration": 0.5}).has_rows_of(whole)
 
 
 def test_a_curve_keeps_the_least_and_the_most_of_each_stretch() -> None:

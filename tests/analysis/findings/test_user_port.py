@@ -37,11 +37,11 @@ SECOND = (
 
 
 SCENES = [
-    ("closed-loop", ()),
-    ("closed-loop", SECOND),
-    ("closed-loop", ("coupling=jacobi",)),
-    ("closed-loop", ("sensing=encoders", "controller.bias=full")),
-    ("closed-loop", ("controller.topology=false", "controller.teleoperation=false")),
+    ("closed-loop-ideal", ()),
+    ("closed-loop-ideal", SECOND),
+    ("closed-loop-ideal", ("coupling=jacobi",)),
+    ("closed-loop-ideal", ("sensing=encoders", "controller.bias=full")),
+    ("closed-loop-ideal", ("controller.topology=false", "controller.teleoperation=false")),
     ("closed-loop-direct", ()),
     ("closed-loop-direct", ("hold=foh", "graphics.rate=60")),
     ("closed-loop-direct", ("graphics.rate={min=20,max=40,seed=3}",)),
@@ -74,7 +74,7 @@ def test_its_blocks_are_all_of_it(scene: str, options: tuple[str, ...]) -> None:
     into = sum(e.held for n, e in meters.items() if "-> virtual_mechanism." in n)
     lost = port.measured.blocks["mechanism"].generated
     assert lost == pytest.approx(energy[-1] - energy[0] - into, abs=1e-6)
-    if scene == "closed-loop":
+    if scene == "closed-loop-ideal":
         assert abs(lost) < 1e-6
 
 
@@ -115,7 +115,7 @@ def test_a_force_that_is_lost_or_overtaken_does_not_act(link: dict[str, float]) 
             for key, value in (link | {"seed": 2}).items()
         ),
     ]
-    results, port = with_port("closed-loop", *options)
+    results, port = with_port("closed-loop-ideal", *options)
     table = results.haptics
     force, x = table["hand.F"], table["haptic_device.x_true"]
     drawn = np.random.Generator(np.random.PCG64(2)).random((len(force), 2))[1:]
@@ -174,7 +174,7 @@ def test_all_blocks_vanish_with_the_step() -> None:
     generated = []
     for rate in (512, 4096):
         options = [f"haptics.rate={rate}", f"graphics.rate={rate}", "controller.bias=full"]
-        _, port = with_port("closed-loop", *options)
+        _, port = with_port("closed-loop-ideal", *options)
         generated.append(sum(abs(b.generated) for b in port.measured.blocks.values()))
     coarse, fine = generated
     assert fine < coarse / 4
@@ -186,7 +186,7 @@ def test_a_held_mobility_modulates_power() -> None:
     works = []
     for rate in (10, 30, 60, 512):
         options = [f"graphics.rate={rate}", "mechanism.directions=true", "controller.bias=full"]
-        _, port = with_port("closed-loop", *options)
+        _, port = with_port("closed-loop-ideal", *options)
         works.append(port.works["held mobility"])
     assert np.all(np.diff(works) < 0.0)
     assert works[0] > 4e-3
@@ -215,7 +215,7 @@ LACKING = [
 def test_a_handle_that_something_else_pushes_has_none() -> None:
     """The work on it is not that of `hand.F`."""
     other = "connection=[{from='hand_left.F', to='haptic_device.F_hand'}]"
-    results, port = account("closed-loop", "duration=0.1", *SECOND, other)
+    results, port = account("closed-loop-ideal", "duration=0.1", *SECOND, other)
     assert port is None
     notes = [line for line in summary.lines(results) if "no energy at the user's port" in line]
     assert "hand_left.F -> haptic_device.F_hand" in notes[0]

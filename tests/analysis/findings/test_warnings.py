@@ -100,13 +100,13 @@ SAID = "acts on no|turn.* from the handle"
 
 @pytest.mark.parametrize(("options", "said"), NOWHERE)
 def test_what_acts_nowhere_is_said(options, said):
-    run = hl.run("closed-loop", {"duration": 0.5, **options})
+    run = hl.run("closed-loop-ideal", {"duration": 0.5, **options})
     assert any(said in line and re.search(SAID, line) for line in run.run["warnings"])
 
 
 @pytest.mark.parametrize("options", SOMEWHERE)
 def test_what_acts_is_not(options):
-    run = hl.run("closed-loop", {"duration": 0.5, **options})
+    run = hl.run("closed-loop-ideal", {"duration": 0.5, **options})
     assert not [line for line in run.run["warnings"] if re.search(SAID, line)]
 
 
@@ -117,6 +117,6 @@ def test_a_device_that_starts_elsewhere_is_said(tmp_path):
     mass = {f"M[{i},{k}]": float(i == k) for i in (1, 2, 3) for k in (1, 2, 3)}
     slave(tmp_path, "Fixed", ("output", {**at, **entries("v", 3), **mass, **entries("c", 3)}))
     own = {"path": str(tmp_path / "Fixed.fmu"), "replaces": "haptic_device"}
-    run = hl.run("closed-loop", {"duration": 0.05, "stop_when": "", "fmu": [own]})
+    run = hl.run("closed-loop-ideal", {"duration": 0.05, "stop_when": "", "fmu": [own]})
     (line,) = [w for w in run.run["warnings"] if "from the operational point: errors" in w]
     assert line.startswith("warning: the handle starts 16 mm and")

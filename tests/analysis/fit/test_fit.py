@@ -120,7 +120,7 @@ def test_the_command_writes_what_a_scene_takes(log: Log, tmp_path: Path, capsys)
     record = json.loads(capsys.readouterr().out)
     assert record["parameters"] == json.loads((out / "fit.json").read_text())["parameters"]
     scene = tmp_path / "mine.toml"
-    scene.write_text('extends = "closed-loop"\n' + (out / "fitted.toml").read_text())
+    scene.write_text('extends = "closed-loop-ideal"\n' + (out / "fitted.toml").read_text())
     read = hl.scene(scene)
     fitted = record["parameters"]["device.handle_mass"]["value"]
     assert read.device.handle_mass == pytest.approx(fitted, rel=1e-12)
@@ -138,7 +138,7 @@ def test_a_run_whose_hand_is_held_is_fitted_without_bias(tmp_path: Path) -> None
         "hand": {"type": "arm", "target": [[0, 0.0445477, 0.0148492, -0.785398]], **arm},
         "at": [{"time": 0.0, "noise": {"controller.x_D": 0.02}}],
     }
-    hl.run("closed-loop", options, out=tmp_path, figures=False)
+    hl.run("closed-loop-ideal", options, out=tmp_path, figures=False)
     found = hl.fit(tmp_path, device=["handle_mass", "motor_damping"])
     value = {e.key: e.value for e in found.estimates}
     assert value["device.handle_mass"] == pytest.approx(0.2, rel=1e-6)
@@ -150,7 +150,7 @@ def test_a_run_whose_hand_is_held_is_fitted_without_bias(tmp_path: Path) -> None
 
 
 def test_what_a_run_cannot_say_is_left_out_in_words(tmp_path: Path) -> None:
-    hl.run("closed-loop", {"duration": 0.6}, out=tmp_path, figures=False)
+    hl.run("closed-loop-ideal", {"duration": 0.6}, out=tmp_path, figures=False)
     found = hl.fit(tmp_path, device=["handle_mass"])
     assert [e.key for e in found.estimates] == ["device.handle_mass"]
     assert found.left_out == ('hand: type = "constant" in this run, no arm to be fitted',)

@@ -54,12 +54,12 @@ def test_a_limit_cycle_that_divides_the_period_is_no_rest() -> None:
         "hand.target": [[0.0, *POINT[:2], POINT[2] + 1e-3]],
         "controller.teleoperation.damping": [70.0, 70.0, 0.6],
     }
-    run = hl.run("closed-loop", options | {"duration": 2.0}, figures=False)
+    run = hl.run("closed-loop-ideal", options | {"duration": 2.0}, figures=False)
     speed = run["virtual_mechanism.qd"][-17:, 3]
     assert speed[-1] == pytest.approx(speed[-17], rel=1e-4)
     assert speed[-1] == pytest.approx(-speed[-2], rel=1e-3)
     with pytest.raises(hl.InputFault, match=r"does not come to rest in 60 s.* at 2\.6e\+02 Hz"):
-        hl.equilibrium_stability("closed-loop", options)
+        hl.equilibrium_stability("closed-loop-ideal", options)
 
 
 def test_a_run_that_diverges_has_no_rest() -> None:

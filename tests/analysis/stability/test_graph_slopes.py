@@ -33,7 +33,7 @@ CASES = {
     "encoders": (
         "closed-loop-direct", {**HELD, "graphics.rate": 128, "sensing": "encoders"}, NORM
     ),
-    "graphics copy": ("closed-loop", {**HELD, "graphics.rate": 128}, NORM),
+    "graphics copy": ("closed-loop-ideal", {**HELD, "graphics.rate": 128}, NORM),
 }  # fmt: skip
 """Scene, options, and how many outputs of an FMU may have no slope at the equilibrium."""
 

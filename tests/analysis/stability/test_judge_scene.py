@@ -78,7 +78,7 @@ def test_slopes_that_are_taken_over_stay_within_what_a_growth_rate_is_uncertain(
 ) -> None:
     """Against slopes that are found anew at each of the numbers and at each age: those of holds on
     manifolds change on the way to the equilibrium."""
-    read = hl.scene("closed-loop", {"hold": "foh", "graphics.rate": 128})
+    read = hl.scene("closed-loop-ideal", {"hold": "foh", "graphics.rate": 128})
     assert read.linkage is not None
     poses = find_rest_poses(read, read.linkage)[:1]
     taken_over, _ = in_poses(read, poses, HANDS, DRIFT)
@@ -235,18 +235,18 @@ def test_a_run_that_fails_is_said_first() -> None:
 
 def test_what_cannot_be_held_is_refused() -> None:
     with pytest.raises(hl.InputFault, match="--equilibrium"):
-        hl.stability("closed-loop", {"graphics.rate": {"min": 20, "max": 60, "seed": 1}})
+        hl.stability("closed-loop-ideal", {"graphics.rate": {"min": 20, "max": 60, "seed": 1}})
     with pytest.raises(hl.InputFault, match="poses = 0: give a whole number >= 1"):
-        hl.stability("closed-loop", poses=0)
+        hl.stability("closed-loop-ideal", poses=0)
     with pytest.raises(hl.InputFault, match=r"bounds = 0\.2: give Bounds"):
-        hl.equilibrium_stability("closed-loop", bounds=0.2)  # type: ignore[arg-type]
+        hl.equilibrium_stability("closed-loop-ideal", bounds=0.2)  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("no_margins")
 def test_rates_that_hardly_repeat_are_judged_with_frames_of_whole_periods() -> None:
     """29.97 Hz at 512 Hz: 17 periods, 30.118 Hz, instead of a period of 100 s."""
-    odd = hl.stability("closed-loop", {"graphics.rate": 29.97}, poses=1)
-    whole = hl.stability("closed-loop", {"graphics.rate": "512/17"}, poses=1)
+    odd = hl.stability("closed-loop-ideal", {"graphics.rate": 29.97}, poses=1)
+    whole = hl.stability("closed-loop-ideal", {"graphics.rate": "512/17"}, poses=1)
     assert odd.rounded == (
         "judged with graphics at 30.118 Hz: with its own rates all repeats only after 100 s"
     )
@@ -260,7 +260,7 @@ def test_rates_that_hardly_repeat_are_judged_with_frames_of_whole_periods() -> N
 
 def test_a_hand_beside_a_pose_leaves_it_where_it_pulls_away() -> None:
     """What is a divergence to the linearisation is judged by such a run."""
-    scene = hl.scene("closed-loop")
+    scene = hl.scene("closed-loop-ideal")
     (pose,) = choose_evenly_spaced(simulate_scene(scene, ("duration=0.1",)), scene.linkage, 1)
     assert not pose.leaves(scene, HANDS["stiff arm, firm grip"])
     elsewhere = replace(pose, point=(pose.point[0] + 0.02, *pose.point[1:]))
@@ -291,7 +291,7 @@ def test_fmus_are_compiled_for_a_verdict_where_contacts_are_many(
 ) -> None:
     assert with_quicker_fmus(hl.scene("push-disc")).packaging == "native"
     assert with_quicker_fmus(hl.scene("enclosure")).packaging == "python"
-    assert with_quicker_fmus(hl.scene("closed-loop")).packaging == "python"
+    assert with_quicker_fmus(hl.scene("closed-loop-ideal")).packaging == "python"
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")  # each pose would compile them again
     assert with_quicker_fmus(hl.scene("push-disc")).packaging == "python"
 

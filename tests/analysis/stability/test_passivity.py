@@ -84,7 +84,7 @@ def test_too_many_forces_are_refused_before_anything_is_searched() -> None:
 def test_a_rate_that_hardly_repeats_is_judged_with_whole_frames() -> None:
     """29.97 and 512 Hz repeat after 100 s; 17 haptic periods are a frame of 30.118 Hz."""
     found, whole = (
-        hl.passivity("closed-loop", HELD | {"graphics.rate": rate}) for rate in (30, "512/17")
+        hl.passivity("closed-loop-ideal", HELD | {"graphics.rate": rate}) for rate in (30, "512/17")
     )
     assert "30.118 Hz" in found.rounded
     assert found.rounded in "".join(found.lines())
@@ -105,7 +105,7 @@ def test_a_target_that_comes_to_rest_later_is_judged_from_there() -> None:
 def test_at_half_the_rate_rounding_is_no_damping() -> None:
     """A force that changes its sign every period does not move the device, which has no impedance
     there: its own damping was found to be -1.5e8 N.s/m, that of rounding."""
-    found = hl.passivity("closed-loop", HELD | {"graphics.rate": 512})
+    found = hl.passivity("closed-loop-ideal", HELD | {"graphics.rate": 512})
     assert abs(found.own) < 1.0
     assert found.needed < 10.0
     assert max(f for f, _ in found.curve) < 256.0

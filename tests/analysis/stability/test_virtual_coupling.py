@@ -81,7 +81,9 @@ def test_the_closed_form_and_the_lifted_map_have_the_limit(
     assert np.linalg.eigvalsh(mobility)[-1] == pytest.approx(896.1, rel=1e-3)
     exact = limit(mobility, late)
     assert exact == pytest.approx(reference, rel=0.02)
-    with SceneVariants(open_scene.load("closed-loop", HELD | (LATE if late else {}))) as session:
+    with SceneVariants(
+        open_scene.load("closed-loop-ideal", HELD | (LATE if late else {}))
+    ) as session:
         verdicts = [
             session.judge([f"controller.teleoperation.damping=[70, 70, {share * exact}]"]).verdict
             for share in (0.995, 1.005)
@@ -96,7 +98,9 @@ def test_runs_shake_beyond_the_limit(late: int, reference: float) -> None:
     def growth(B: float) -> float:
         pulled = [0.0, *POINT[:2], POINT[2] + 1e-3]
         given = HELD | (LATE if late else {}) | {"duration": 1.0, "hand.target": [pulled]}
-        run = hl.run("closed-loop", given | {"controller.teleoperation.damping": [70.0, 70.0, B]})
+        run = hl.run(
+            "closed-loop-ideal", given | {"controller.teleoperation.damping": [70.0, 70.0, B]}
+        )
         shaken = np.abs(np.diff(run["virtual_mechanism.x"][:, 2] - run["haptic_device.x"][:, 2], 2))
         _, early, _, last = np.array_split(shaken, 4)
         return float(last.max() / early.max())

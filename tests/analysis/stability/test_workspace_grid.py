@@ -133,4 +133,4 @@ def test_where_the_point_moves_on_a_curve_the_poses_are_on_it() -> None:
 
 def test_a_grid_is_a_whole_number_of_places() -> None:
     with pytest.raises(hl.InputFault, match="grid = -1"):
-        hl.stability("closed-loop", grid=-1)
+        hl.stability("closed-loop-ideal", grid=-1)

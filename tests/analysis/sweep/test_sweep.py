@@ -222,7 +222,7 @@ def test_a_process_of_many_runs_makes_each_as_a_process_of_its_own(
         {"duration": "0.1", "haptics.rate": "256", "linkage.body.link1.mass": "0.5"},
         {"duration": "0.1", "hold": "foh"},
     ]
-    made = points_of.jobs("closed-loop", (), points)
+    made = points_of.jobs("closed-loop-ideal", (), points)
 
     def rows(job: Job) -> bytes:
         assert job.scene

@@ -65,7 +65,7 @@ def test_a_spring_and_a_mass_too_many_are_felt_as_what_they_are() -> None:
 def test_ideal_sensing_is_right_up_to_half_a_period_of_delay() -> None:
     """The impedance law makes the mechanism's inertia exactly, and the held motors' force is T/2
     late: right up to .1/(2 pi T/2)."""
-    found = transparency.transparency("closed-loop", count=1)[0]
+    found = transparency.transparency("closed-loop-ideal", count=1)[0]
     assert found.right_up_to == pytest.approx(FORCE / (np.pi * T), rel=0.02)
 
 
@@ -85,20 +85,20 @@ def phasor(t: NDArray[np.float64], y: NDArray[np.float64], hertz: float) -> NDAr
 
 @pytest.mark.parametrize("options", [{}, ENCODERS])
 def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
-    """At the start of closed-loop, in a firm grip that is shaken by .1 mm along x and y: poses and
-    forces of the FMUs at the frequency, within .1 %. Of encoders
+    """At the start of closed-loop-ideal, in a firm grip that is shaken by .1 mm along x and y: poses
+    and forces of the FMUs at the frequency, within .1 %. Of encoders
     with counts so fine that they are not seen."""
-    start = hl.run("closed-loop", {"duration": 0.01}, figures=False)
+    start = hl.run("closed-loop-ideal", {"duration": 0.01}, figures=False)
     pose = start.tables["haptics"]["virtual_mechanism.x"][0].tolist()
     held = write_options(options | {"hand": spring(pose, (0.0, 0.0, 0.0), 1000.0)})
-    with resting("closed-loop", held) as place:
+    with resting("closed-loop-ideal", held) as place:
         cut = response(place.period({}), hand_port(place.map.system))
     S = np.diag([1.0, 1.0, LENGTH])
     for hertz, axis in ((2.0, 0), (50.0, 1)):
         amplitude = [0.0, 0.0, 0.0]
         amplitude[axis] = 1e-4
         sine = {"mean": pose, "amplitude": amplitude, "frequency": [hertz] * 3}
-        table = shaken("closed-loop", options, sine, 3.0).tables["haptics"]
+        table = shaken("closed-loop-ideal", options, sine, 3.0).tables["haptics"]
         late = table["time"] > 2.0
         t = table["time"][late] - 2.0
         x, F = (phasor(t, table[n][late], hertz) for n in ("haptic_device.x", "hand.F"))
@@ -108,17 +108,17 @@ def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
 
 def test_a_pressed_run_gives_the_felt_stiffness() -> None:
     """A hand without a spring presses along the constrained direction at 2 Hz: within 1 %."""
-    read = open_scene.load("closed-loop", write_options(ENCODERS))
+    read = open_scene.load("closed-loop-ideal", write_options(ENCODERS))
     assert read.linkage
     S = np.diag([1.0, 1.0, mean_link_length(read.linkage)])
-    felt = transparency.transparency("closed-loop", write_options(ENCODERS), count=1)[0]
+    felt = transparency.transparency("closed-loop-ideal", write_options(ENCODERS), count=1)[0]
     (constraint,) = felt.constrained
     hertz = float(HERTZ[np.argmin(np.abs(HERTZ - transparency.SLOW))])
     wrench = (0.05 * S @ constraint.along).tolist()
     sine = {"amplitude": wrench, "frequency": [hertz] * 3, "phase": [np.pi / 2] * 3}
     hand = {"type": "profile", "table": sine}
     given = ENCODERS | {"hand": hand, "linkage.start_velocity": {}, "duration": 3.0}
-    table = hl.run("closed-loop", given, figures=False).tables["haptics"]
+    table = hl.run("closed-loop-ideal", given, figures=False).tables["haptics"]
     late = table["time"] > 1.0
     x, F = (
         phasor(table["time"][late], table[n][late], hertz) for n in ("haptic_device.x", "hand.F")
@@ -134,7 +134,9 @@ def test_costs_are_those_of_changed_scenes_and_their_limit_that_of_runs(
     """With the mechanism at 512 Hz no hold counts at rest. At 6.5 times the stiffnesses the handle
     comes to rest if the motors are a period late, and not if they are not, as the limits say."""
     monkeypatch.setattr(Judge, "margin", partialmethod(Judge.margin, fine=0.2))
-    costs = {c.change: c for c in transparency.costs("closed-loop", write_options(ENCODERS), print)}
+    costs = {
+        c.change: c for c in transparency.costs("closed-loop-ideal", write_options(ENCODERS), print)
+    }
     own, half = costs["as it is"], costs["half the haptic rate"]
     assert costs["hold foh"].cells() == own.cells() == costs["half the graphics rate"].cells()
     late = costs["motors a haptic period late"]
@@ -145,17 +147,17 @@ def test_costs_are_those_of_changed_scenes_and_their_limit_that_of_runs(
     lines = list(transparency.cost_lines(list(costs.values())))
     assert lines[1].startswith("as it is, half the graphics rate, twice the")
     assert sum(" times" in line for line in lines) == 6
-    pose = hl.run("closed-loop", {"duration": 0.01}, figures=False)["virtual_mechanism.x"][0]
+    pose = hl.run("closed-loop-ideal", {"duration": 0.01}, figures=False)["virtual_mechanism.x"][0]
     hand = spring((pose + np.array([1e-4, 0.0, 1e-3])).tolist(), (0.0, 0.0, 0.0), 100.0)
     given: dict[str, Any] = ENCODERS | {"hand": hand, "linkage.start_velocity": {}, "duration": 2.0}
-    control = open_scene.load("closed-loop").controller
+    control = open_scene.load("closed-loop-ideal").controller
     assert control is not None
     assert isinstance(control.teleoperation, Teleoperation)
     for law, of in (("teleoperation", control.teleoperation), ("topology", Topology())):
         given[f"controller.{law}.stiffness"] = (6.5 * np.array(of.stiffness)).tolist()
         given[f"controller.{law}.damping"] = (6.5**0.5 * np.array(of.damping)).tolist()
     for delays, rests in (({}, False), ({"controller.F_motor": T}, True)):
-        run = hl.run("closed-loop", given | {"delays": delays}, figures=False)
+        run = hl.run("closed-loop-ideal", given | {"delays": delays}, figures=False)
         assert (np.abs(run["haptic_device.v"][-200:]).max() < 1e-4) == rests
 
 

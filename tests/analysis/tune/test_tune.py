@@ -247,7 +247,7 @@ def pressed(name: str, pose: Pose, n: NDArray[np.float64], hertz: float, swing: 
     return np.array([(phase[:, None] * run[s][window]).mean(axis=0) for s in signals])
 
 
-@pytest.mark.parametrize("name", ["closed-loop", "obstacles"])
+@pytest.mark.parametrize("name", ["closed-loop-ideal", "obstacles"])
 def test_pressing_gives_the_felt_stiffness(name: str) -> None:
     """A constraint alone, and with a contact. n' x is n' X F, F the hand's; a run that does not
     swing is taken off, since the handle still settles along a wall, which has a part at any
@@ -261,7 +261,7 @@ def test_pressing_gives_the_felt_stiffness(name: str) -> None:
         assert n @ x == pytest.approx(n @ X @ F, rel=0.03)
 
 
-@pytest.mark.parametrize("name", ["closed-loop", "telescope"])
+@pytest.mark.parametrize("name", ["closed-loop-ideal", "telescope"])
 def test_runs_settle_within_the_margin_and_not_beyond(name: str) -> None:
     """Where constraints limit the gains, and where contacts do. From 0.1 mm off rest: with all
     gains at 0.9 of the margin the handle comes to rest in every pose, in a firm grip, at 1.1 of it
@@ -311,9 +311,9 @@ def test_a_contact_that_is_slid_off_is_pressed_lightly() -> None:
 def test_slopes_of_operations_have_the_radius_of_the_whole_map() -> None:
     """A judgement takes the slopes of single operations; the whole map, by differences along all of
     its columns, has the same spectral radius."""
-    pose = poses(recorded("closed-loop"))[0]
+    pose = poses(recorded("closed-loop-ideal"))[0]
     given = {"sensing": "encoders", "graphics.rate": 128} | pose.started | pose.held
-    with resting("closed-loop", given) as place:
+    with resting("closed-loop-ideal", given) as place:
         period = place.period(dict.fromkeys(("drift", "topology"), 3.0))
         whole = linearised(place.map, period.point)
         radii = [np.abs(np.linalg.eigvals(at.A)).max() for at in (period.in_map, whole)]
@@ -324,13 +324,17 @@ def test_slopes_of_operations_have_the_radius_of_the_whole_map() -> None:
     ("scene", "options", "why"),
     [
         ("pendulum", {}, "no gains to tune"),
-        ("closed-loop", {}, "sensing=encoders"),
+        ("closed-loop-ideal", {}, "sensing=encoders"),
         (
             "enclosure",
             {"sensing": "encoders", "controller.contact": False},
             "controller.contact=true",
         ),
-        ("closed-loop", {"sensing": "encoders", "graphics.rate": {"min": 20, "max": 30}}, "varies"),
+        (
+            "closed-loop-ideal",
+            {"sensing": "encoders", "graphics.rate": {"min": 20, "max": 30}},
+            "varies",
+        ),
     ],
 )
 def test_what_cannot_be_tuned_is_refused(scene: str, options: dict[str, Any], why: str) -> None:
@@ -340,7 +344,7 @@ def test_what_cannot_be_tuned_is_refused(scene: str, options: dict[str, Any], wh
 
 def test_a_margin_is_one_or_more() -> None:
     with pytest.raises(hl.InputFault, match="give 1 or more"):
-        hl.tune("closed-loop", margin=0.5)
+        hl.tune("closed-loop-ideal", margin=0.5)
 
 
 def recorded(name: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The closed-loop solve where W is regular, redundant and singular."""
+"""The closed-loop-ideal solve where W is regular, redundant and singular."""
 
 import casadi as ca
 import numpy as np

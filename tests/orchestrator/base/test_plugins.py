@@ -193,7 +193,7 @@ def test_a_hold_that_fails_ends_the_run_with_its_results(tmp_path):
         "return np.full(self.size, np.nan)": "its value is array([nan, nan, nan,",
         "return np.array(['1'] * 9)": "its value is array(['1', '1',",
     }
-    run = "hapticlink run closed-loop --set graphics.rate=100 --set duration=0.1 --no-figures"
+    run = "hapticlink run closed-loop-ideal --set graphics.rate=100 --set duration=0.1 --no-figures"
     said(tmp_path, 1, *(
         (f"mine{i}", HOLDING.format(value=value), f"{run} --set hold=mine --out {i}", message)
         for i, (value, message) in enumerate(values.items())

@@ -22,7 +22,7 @@ def _outputs(scene: str, options: tuple[str, ...]) -> Iterator[str]:
 def test_every_name_is_a_block_or_an_output_of_one():
     options = ("mechanism.directions=true", "controller.passivity=true")
     midpoint = ("mechanism.integrator=passive-midpoint",)
-    scenes = {"closed-loop": (), "obstacles": options, "pendulum": midpoint}
+    scenes = {"closed-loop-ideal": (), "obstacles": options, "pendulum": midpoint}
     known = {*BLOCKS, *(name for item in scenes.items() for name in _outputs(*item))}
     missing = sorted({*_constants()} - known)
     assert not missing, missing

@@ -40,7 +40,7 @@ def test_a_rate_is_the_rational_that_was_written():
 )  # fmt: skip
 def test_a_rate_that_is_printed_sets_the_same_rate(rate: Fraction, text: str) -> None:
     assert write_exact(rate) == text
-    read = open_scene.load("closed-loop", ["haptics.rate=2048", f"graphics.rate={text}"])
+    read = open_scene.load("closed-loop-ideal", ["haptics.rate=2048", f"graphics.rate={text}"])
     assert read.graphics
     assert exact(read.graphics.rate) == rate
 

@@ -47,10 +47,10 @@ def tables(folder: Path) -> dict[str, bytes]:
 
 
 def run_at(at: str, folder: Path, out: Path, real_time: bool = True) -> dict[str, Any]:
-    """The run.json of a run of closed-loop whose graphics are served."""
+    """The run.json of a run of closed-loop-ideal whose graphics are served."""
     where = {"graphics": at}
     return hl.run(
-        "closed-loop", OPTIONS, out=out, figures=False, real_time=real_time, remote=where,
+        "closed-loop-ideal", OPTIONS, out=out, figures=False, real_time=real_time, remote=where,
         key=folder / "key",
     ).run  # fmt: skip
 
@@ -58,7 +58,7 @@ def run_at(at: str, folder: Path, out: Path, real_time: bool = True) -> dict[str
 def replayed(out: Path) -> dict[str, bytes]:
     """The tables of a run with the arrivals of another one."""
     again = out.with_name(f"{out.name}-again")
-    run = hl.run("closed-loop", OPTIONS, out=again, figures=False, arrivals=out)
+    run = hl.run("closed-loop-ideal", OPTIONS, out=again, figures=False, arrivals=out)
     assert run.fault is None
     assert run.run["real_time"]["deadlines_missed"] == 0
     assert f"without a clock; samples arrived as those of {out} did" in str(run)
@@ -77,8 +77,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def served(folder: Path) -> Iterator[str]:
-    """A server of closed-loop, to which runs come one after the other."""
-    with server("closed-loop", folder, *SETS) as at:
+    """A server of closed-loop-ideal, to which runs come one after the other."""
+    with server("closed-loop-ideal", folder, *SETS) as at:
         yield at
     assert not processes_of(folder)
 
@@ -88,7 +88,7 @@ def test_a_remote_fmu_has_the_bytes_of_one_here(folder: Path, served: str, tmp_p
     run = run_at(served, folder, tmp_path / "remote", real_time=False)
     assert run["fault"] is None
     assert run["isolated"]["virtual_environment"] == f"served from {served}"
-    hl.run("closed-loop", OPTIONS, out=tmp_path / "here", figures=False)
+    hl.run("closed-loop-ideal", OPTIONS, out=tmp_path / "here", figures=False)
     assert tables(tmp_path / "remote") == tables(tmp_path / "here")
 
 
@@ -123,21 +123,27 @@ def test_recorded_arrivals_replay_a_run(
 
 
 def test_arrivals_of_another_run_are_refused(tmp_path: Path) -> None:
-    hl.run("closed-loop", ["duration=0.05"], out=tmp_path / "plain", figures=False)
+    hl.run("closed-loop-ideal", ["duration=0.05"], out=tmp_path / "plain", figures=False)
     with pytest.raises(InputFault, match="no run in real time"):
-        hl.run("closed-loop", arrivals=tmp_path / "plain")
-    hl.run("closed-loop", ["duration=0.05"], out=tmp_path / "paced", figures=False, real_time=True)
+        hl.run("closed-loop-ideal", arrivals=tmp_path / "plain")
+    hl.run(
+        "closed-loop-ideal",
+        ["duration=0.05"],
+        out=tmp_path / "paced",
+        figures=False,
+        real_time=True,
+    )
     with pytest.raises(InputFault, match="a run of another scene: hold differ"):
-        hl.run("closed-loop", ["hold=foh"], arrivals=tmp_path / "paced")
+        hl.run("closed-loop-ideal", ["hold=foh"], arrivals=tmp_path / "paced")
     with pytest.raises(InputFault, match="without real time"):
-        hl.run("closed-loop", real_time=True, arrivals=tmp_path / "paced")
+        hl.run("closed-loop-ideal", real_time=True, arrivals=tmp_path / "paced")
 
 
 def test_who_has_no_key_or_another_scene_is_refused(
     folder: Path, served: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = [*SETS, "--out", tmp_path / "out", "--no-figures", "--remote", f"graphics={served}"]
-    run = ("run", "closed-loop", *options)
+    run = ("run", "closed-loop-ideal", *options)
     assert status(*run, "--key", tmp_path / "none") == 2
     assert "no key: " in capsys.readouterr().err
     key_file.create(tmp_path / "other")
@@ -172,12 +178,12 @@ def test_random_bytes_do_not_disturb_a_run(folder: Path, served: str, tmp_path: 
 def test_a_server_may_start_late(tmp_path: Path) -> None:
     at = free_address()
     key_file.create(tmp_path / "key")
-    arguments = ["run", "closed-loop", *SETS, "--out", tmp_path / "out", "--no-figures"]
+    arguments = ["run", "closed-loop-ideal", *SETS, "--out", tmp_path / "out", "--no-figures"]
     asked = command(*arguments, "--remote", f"graphics={at}", "--key", tmp_path / "key")
     with process(asked, tmp_path / "run.log", tmp_path) as running:
         sleep(1)
         assert running.poll() is None
-        with server("closed-loop", tmp_path, *SETS, at=at):
+        with server("closed-loop-ideal", tmp_path, *SETS, at=at):
             assert running.wait(120) == 0, (tmp_path / "run.log").read_text()
 
 
@@ -262,8 +268,8 @@ def test_two_network_namespaces(tmp_path: Path, netem: bool) -> None:
             pytest.skip(f"the kernel has no netem: {without.strip()}")
         sets, out = ["--set", "duration=6"], tmp_path / "out"
         options = [*sets, "--out", out, "--no-figures", "--real-time", "--key", tmp_path / "key"]
-        with server("closed-loop", tmp_path, *sets, at="10.213.7.1:5555", before=there) as at:
-            asked = command("run", "closed-loop", *options, "--remote", f"graphics={at}")
+        with server("closed-loop-ideal", tmp_path, *sets, at="10.213.7.1:5555", before=there) as at:
+            asked = command("run", "closed-loop-ideal", *options, "--remote", f"graphics={at}")
             with process([*here, *asked], tmp_path / "run.log", tmp_path) as running:
                 until((out / "run.json").exists, running, tmp_path / "run.log")
                 sleep(1)
@@ -280,7 +286,7 @@ def test_two_network_namespaces(tmp_path: Path, netem: bool) -> None:
     assert length > 1.5
     assert "held values went on" in (tmp_path / "run.log").read_text()
     again = hl.run(
-        "closed-loop", ["duration=6"], out=tmp_path / "again", arrivals=out, figures=False
+        "closed-loop-ideal", ["duration=6"], out=tmp_path / "again", arrivals=out, figures=False
     )
     assert again.fault is None
     assert tables(tmp_path / "again") == tables(out)
@@ -290,7 +296,7 @@ def test_two_network_namespaces(tmp_path: Path, netem: bool) -> None:
 def test_ctrl_c_ends_a_run(folder: Path, served: str, tmp_path: Path) -> None:
     options = [*sets(["hold=foh", "duration=60"]), "--out", tmp_path / "out", "--real-time"]
     options += ["--remote", f"graphics={served}", "--key", folder / "key"]
-    asked = command("run", "closed-loop", *options)
+    asked = command("run", "closed-loop-ideal", *options)
     with process(asked, tmp_path / "run.log", tmp_path) as running:
         until((tmp_path / "out" / "run.json").exists, running, tmp_path / "run.log")
         running.send_signal(signal.SIGINT)

@@ -18,7 +18,7 @@ from tests.shared_fixtures import sets, status
 
 def test_explain_tells_blocks_and_the_samples_behind_inputs(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = explained(capsys, "closed-loop", "graphics.rate=128", "hold=foh")
+    told = explained(capsys, "closed-loop-ideal", "graphics.rate=128", "hold=foh")
     assert not list(tmp_path.iterdir())
     assert "ticks of 1/512 s, gauss-seidel" in told
     assert "haptics: every 1 ticks: hand (sampled), controller (sampled)" in told
@@ -38,8 +38,10 @@ def explained(capsys: pytest.CaptureFixture[str], scene: str, *options: str) -> 
 
 def test_a_run_keeps_what_explain_prints(tmp_path, capsys):
     options = ["duration=0.2", "graphics.rate={min=20, max=60, seed=2}"]
-    told = explained(capsys, "closed-loop", *options)
-    assert status("run", "closed-loop", "--no-figures", "--out", tmp_path, *sets(options)) == 0
+    told = explained(capsys, "closed-loop-ideal", *options)
+    assert (
+        status("run", "closed-loop-ideal", "--no-figures", "--out", tmp_path, *sets(options)) == 0
+    )
     assert (tmp_path / "plan.txt").read_text() == told
     assert "plan.txt" in capsys.readouterr().out
 
@@ -47,7 +49,7 @@ def test_a_run_keeps_what_explain_prints(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("scene", "option"),
     [
-        ("closed-loop", "graphics.rate={min=20, max=60, seed=2}"),
+        ("closed-loop-ideal", "graphics.rate={min=20, max=60, seed=2}"),
         ("closed-loop-direct", "delays.hand.F={min=0.001, max=0.02}"),
     ],
 )
@@ -68,7 +70,7 @@ def test_what_does_not_come_round_is_told_to_its_end(tmp_path, capsys, scene, op
 @pytest.mark.parametrize("align", ["exact", "tick"])
 def test_a_phase_moves_the_frames(tmp_path, align):
     options = ["duration=0.2", "graphics.phase=0.01", f"graphics.align={align}"]
-    experiment = simulate("closed-loop", tmp_path, options)
+    experiment = simulate("closed-loop-ideal", tmp_path, options)
     assert experiment.outcome.fault is None
     frames = experiment.results.graphics["time"]
     expected = np.array([0.0, *(0.01 + np.arange(6) / 30)])
@@ -81,7 +83,9 @@ def test_a_recorded_trace_is_a_list_of_frames_beside_its_scene(tmp_path):
     stamps = ["1.600", "1.617", "1.634", "1.700  # a hitch", "1.716", "1.8"]
     (tmp_path / "frames.csv").write_text("time,fps\n" + "\n".join(stamps))
     scene = tmp_path / "traced.toml"
-    scene.write_text('extends = "closed-loop"\nduration = 0.2\n[graphics]\nrate.trace="frames.csv"')
+    scene.write_text(
+        'extends = "closed-loop-ideal"\nduration = 0.2\n[graphics]\nrate.trace="frames.csv"'
+    )
     experiment = simulate(str(scene), tmp_path / "out")
     run = experiment.results.run
     assert run["scene"]["graphics"]["rate"] == [0.017, 0.034, 0.1, 0.116, 0.2]
@@ -95,7 +99,7 @@ def test_a_phase_of_our_block_moves_it_alone(share, rate):
     part = Fraction(*share)
     phase = part / (512 if rate == "haptics" else 30)
     options = [f'phases.virtual_mechanism="{phase}"', f"mechanism_at={rate}"]
-    time = timeline(open_scene.load("closed-loop", options))
+    time = timeline(open_scene.load("closed-loop-ideal", options))
     moved = time.of["virtual_mechanism"]
     others = {name for fmu, name in time.of.items() if fmu != "virtual_mechanism"}
     assert others == {"haptics", "graphics"}
@@ -107,13 +111,13 @@ def test_a_phase_of_our_block_moves_it_alone(share, rate):
 
 def test_explain_and_run_json_tell_phases(tmp_path, capsys):
     options = ["phases.virtual_mechanism=0.0005", "duration=0.1"]
-    told = explained(capsys, "closed-loop", *options)
+    told = explained(capsys, "closed-loop-ideal", *options)
     # 1/512 s, 1/30 s and 1/2000 s meet on ticks of 1/192000 s.
     assert "ticks of 1/192000 s" in told
     assert "haptics_at_0.0005s: every 375 ticks, first 96: virtual_mechanism" in told
     rows = re.findall(r"^ +(\d+) .* controller: .*x_S@(\d+) ", told, re.M)
     assert rows[:4] == [("0", "0"), ("375", "96"), ("750", "471"), ("1125", "846")]
-    found = simulate("closed-loop", tmp_path, options).results
+    found = simulate("closed-loop-ideal", tmp_path, options).results
     clock = {"first": 0.0005, "shortest": 1 / 512, "longest": 1 / 512}
     assert found.run["clocks"]["haptics_at_0.0005s"] == clock
     at = 0.0005 + np.arange(51) / 512
@@ -126,7 +130,7 @@ def test_explain_and_run_json_tell_phases(tmp_path, capsys):
 
 def test_explain_goes_on_until_all_phases_have_begun_and_come_again(tmp_path, capsys):
     options = ["graphics.rate=128", "phases.virtual_mechanism='1/1024'"]
-    told = explained(capsys, "closed-loop", *options)
+    told = explained(capsys, "closed-loop-ideal", *options)
     rows = re.findall(r"^ +(\d+)  .* virtual_mechanism: F_drift@\d+ F_hand@(\d+)", told, re.M)
     # Ticks of 1/1024 s: graphics comes every 8; steps start at 0 and after half a haptic period.
     assert rows == [("0", "0"), *((str(t), str(t - 1)) for t in range(1, 19, 2))]
@@ -135,7 +139,7 @@ def test_explain_goes_on_until_all_phases_have_begun_and_come_again(tmp_path, ca
 def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path):
     options = ["duration=0.02", "hold=foh", "downsampling=mean"]
     options += ["phases.virtual_mechanism='1/1024'", "holds.controller.F_drift=lead"]
-    run = simulate("closed-loop", tmp_path, options).results.run
+    run = simulate("closed-loop-ideal", tmp_path, options).results.run
     assert run["holds"] == {
         "virtual_mechanism.x -> controller.x_S": "zoh",
         "virtual_mechanism.v -> controller.v_S": "zoh",
@@ -151,7 +155,7 @@ def test_clocks_that_a_phase_parts_hold_the_newest_sample_unless_named(tmp_path)
 
 def test_a_sweep_varies_phases():
     points = [{"phases.virtual_mechanism": text} for text in ("0.0005", "1/1024", "0.002")]
-    made = jobs("closed-loop", [], points)
+    made = jobs("closed-loop-ideal", [], points)
     phases = [j.scene and j.scene.phases["virtual_mechanism"] for j in made]
     assert phases == [0.0005, "1/1024", None]
     assert "within a period, 1/512 s" in made[2].refusal

@@ -47,7 +47,7 @@ def test_a_hand_that_lets_go_leaves_a_mass_at_its_speed(bar, options, happened):
 
 
 def test_without_events_nothing_runs_in_python():
-    found = hl.run("closed-loop", ["duration=0.1"])
+    found = hl.run("closed-loop-ideal", ["duration=0.1"])
     assert found.run["events"] == []
     assert found.run["in_python"] == {}
 
@@ -62,7 +62,7 @@ def test_an_input_is_frozen_overridden_or_noisy_for_a_while():
     at = f"""at=[{{ time = 0.1, until = 0.15, freeze = ["{x}"] }},
         {{ time = 0.2, until = 0.25, override = {{ "{x}" = {given} }} }},
         {{ time = 0.3, until = 0.4, noise = {{ "{x}" = 1e-6 }}, seed = 7 }}]"""
-    run = hl.run("closed-loop", ["duration=0.5", at, "stop_when="]).haptics
+    run = hl.run("closed-loop-ideal", ["duration=0.5", at, "stop_when="]).haptics
     x_D = vectors(run, "haptic_device.x")
     frozen, overridden, noisy = (
         around(run, *times) for times in ((0.1, 0.15), (0.2, 0.25), (0.3, 0.4))
@@ -77,7 +77,7 @@ def test_an_input_is_frozen_overridden_or_noisy_for_a_while():
 
 def test_graphics_go_on_at_another_rate():
     at = 'at=[{time=0.5, set={"graphics.rate"=10}}, {time=0.75, set={"graphics.rate"=60}}]'
-    run = hl.run("closed-loop", ["duration=1.0", at])
+    run = hl.run("closed-loop-ideal", ["duration=1.0", at])
     times = run.graphics["time"]
     assert math.isclose(times[times <= 0.5][-1], 0.5)
     slow, fast = (np.diff(times[(times >= a) & (times <= b)]) for a, b in ((0.5, 0.79), (0.85, 1)))
@@ -88,7 +88,7 @@ def test_graphics_go_on_at_another_rate():
 
 def test_lines_in_the_figures():
     at = 'at=[{time=0.25, set={"graphics.rate"=15}}]'
-    found = hl.run("closed-loop", ["duration=0.6", at])
+    found = hl.run("closed-loop-ideal", ["duration=0.6", at])
     axes = found.figures()["distance"].axes[0]
     assert any(list(line.get_xdata()) == [found.run["events"][0][0]] * 2 for line in axes.lines)
 

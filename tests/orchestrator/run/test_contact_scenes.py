@@ -66,7 +66,7 @@ def test_the_first_hand_feels_the_second(tmp_path):
     the first tick on."""
     point = "linkage.point=[{name='left', body='link4', at=[0.02, 0.0]}]"
     options = ["duration=0.05", point, "hands.left={wrench=[0.5, 0.0, 0.0]}"]
-    rows = simulate("closed-loop", tmp_path, [*options, "hand.wrench=[0.0, 0.0, 0.0]"])
+    rows = simulate("closed-loop-ideal", tmp_path, [*options, "hand.wrench=[0.0, 0.0, 0.0]"])
     mechanism, handle = (
         rows.results.haptics[name] for name in ("virtual_mechanism.v", "haptic_device.v_true")
     )

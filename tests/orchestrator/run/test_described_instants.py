@@ -79,13 +79,13 @@ def test_ages_count_from_what_a_sample_describes(tmp_path, slow, more):
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 def test_the_graphics_copy_shows_where_the_mechanism_was(tmp_path, hold):
     options = ["duration=0.5", "graphics.rate=512/16", f"hold={hold}"]
-    experiment = simulate("closed-loop", tmp_path / "out", options)
+    experiment = simulate("closed-loop-ideal", tmp_path / "out", options)
     haptics, graphics = experiment.results.haptics, experiment.results.graphics
     there = haptics["virtual_mechanism.q"][::16]
     shown = graphics["virtual_environment.q"][1:]
     assert np.abs(shown - there[: len(shown)]).max() < 1e-13  # they are put on the closures
     assert np.abs(shown - there[1 : len(shown) + 1]).max() > 0.01
-    with build_system(open_scene.load("closed-loop", options)) as system:
+    with build_system(open_scene.load("closed-loop-ideal", options)) as system:
         age = delays(Plan(system))["virtual_environment.Lambda_inv -> controller.Lambda_inv"]
     assert (age.min, age.max) == (16 / 512, 31 / 512)
 

@@ -77,7 +77,7 @@ def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path):
     assert str(outcome.fault).startswith(said)
     assert "J were put in: the loop is unstable" in str(outcome.fault)
     options = ["controller.topology=false", "hand.wrench=[0, 1, 0]"]
-    pushed = simulate("closed-loop", tmp_path / "pushed", options).outcome
+    pushed = simulate("closed-loop-ideal", tmp_path / "pushed", options).outcome
     assert (pushed.reason, pushed.fault) == ("stop_when", None)
 
 

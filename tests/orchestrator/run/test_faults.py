@@ -357,7 +357,7 @@ def test_a_python_fmu_without_its_module_is_told(tmp_path, gone):
 
 def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path):
     python_fmu(tmp_path, "Gives")
-    text = 'extends = "closed-loop"\n' + fmu_table("one", "Gives")
+    text = 'extends = "closed-loop-ideal"\n' + fmu_table("one", "Gives")
     (tmp_path / "scene.toml").write_text(text + wire_table("one.y", "controller.x_D[1]"))
     with pytest.raises(InputFault, match=r"line 7: .*x_D lose their source, haptic_device.x"):
         simulate(str(tmp_path / "scene.toml"), tmp_path / "out")

@@ -11,7 +11,7 @@ from hapticlink.orchestrator.experiment import Experiment, simulate
 from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
 
-SCENE, SHORT = "closed-loop", ("duration=0.5",)
+SCENE, SHORT = "closed-loop-ideal", ("duration=0.5",)
 TOLD = ("end", "fault", "energies", "energies_within_a_rate", "step_errors", "delays", "unstable")
 
 

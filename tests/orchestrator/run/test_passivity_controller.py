@@ -73,8 +73,8 @@ def test_the_handle_comes_to_rest_at_ten_times_the_limit():
 
 def test_where_it_never_acts_the_bits_are_those_without():
     short = {"duration": 1.0}
-    plain = run_once("closed-loop", short)
-    guarded = run_once("closed-loop", short | {"controller.passivity": True})
+    plain = run_once("closed-loop-ideal", short)
+    guarded = run_once("closed-loop-ideal", short | {"controller.passivity": True})
     assert not np.any(guarded["controller.passivity_damping"])
     for signal in ("haptic_device.x_true", "controller.F_motor", "virtual_mechanism.q"):
         assert np.array_equal(plain[signal], guarded[signal])
@@ -88,7 +88,7 @@ def test_a_coupling_beyond_its_limit_gives_the_handle_little():
     }
     given = {}
     for guard in (False, True):
-        run = hl.run("closed-loop", stiff | {"controller.passivity": guard}, figures=False)
+        run = hl.run("closed-loop-ideal", stiff | {"controller.passivity": guard}, figures=False)
         x, F = run["haptic_device.x_true"], run["controller.F_motor"]
         given[guard] = np.cumsum((F[:-1] * np.diff(x, axis=0)).sum(axis=1)).max()
     assert given[True] < 0.1 * given[False]
@@ -160,9 +160,9 @@ LATE = "passivity controller"
 @pytest.mark.parametrize(
     ("scene", "guarded", "late", "connection"),
     [
-        ("closed-loop", "controller.passivity", {"coupling": "jacobi"},
+        ("closed-loop-ideal", "controller.passivity", {"coupling": "jacobi"},
          "controller.F_motor -> haptic_device.F_motor"),
-        ("closed-loop", "controller.passivity", {"delays.controller.x_D": 0.002},
+        ("closed-loop-ideal", "controller.passivity", {"delays.controller.x_D": 0.002},
          "haptic_device.x -> controller.x_D"),
         *(("virtual-wall", "fmu.wall.settings.passivity", {f"delays.'{end}'": link}, end)
           for end in ("wall.F", "wall.x") for link in (T, {"loss": 0.2})),
@@ -171,7 +171,7 @@ LATE = "passivity controller"
 def test_a_run_warns_where_force_or_pose_of_what_is_guarded_is_late(
     scene, guarded, late, connection
 ):
-    on = {guarded: True if scene == "closed-loop" else MASS}
+    on = {guarded: True if scene == "closed-loop-ideal" else MASS}
     assert not warned(scene, on, LATE)
     (line,) = warned(scene, on | late, LATE)
     assert connection in line
@@ -197,9 +197,9 @@ def test_it_warns_of_motors_at_their_limit():
         "hand.wrench": [1.0, 0.0, 0.0],
         "stop_when": "",
     }
-    (line,) = warned("closed-loop", weak, "passivity controller counts forces")
+    (line,) = warned("closed-loop-ideal", weak, "passivity controller counts forces")
     assert "motors of controller were at their limit" in line
-    assert not warned("closed-loop", weak | {"controller.passivity": False}, "passivity")
+    assert not warned("closed-loop-ideal", weak | {"controller.passivity": False}, "passivity")
 
 
 @pytest.mark.parametrize("rate", [10, 30])
@@ -219,12 +219,14 @@ def test_it_warns_where_it_damps_counts_of_the_encoders():
     says: the energy of one count."""
     encoders = {"sensing": "encoders", "duration": 1.0, "controller.passivity": True}
     why = "damps counts"
-    (line,) = warned("closed-loop", encoders, why)
+    (line,) = warned("closed-loop-ideal", encoders, why)
     noise = float(line.rpartition("=")[2])
-    assert not warned("closed-loop", encoders | {"controller.passivity": {"noise": noise}}, why)
-    assert not warned("closed-loop", encoders | {"sensing": "ideal"}, why)
+    assert not warned(
+        "closed-loop-ideal", encoders | {"controller.passivity": {"noise": noise}}, why
+    )
+    assert not warned("closed-loop-ideal", encoders | {"sensing": "ideal"}, why)
     enough = encoders | {"controller.passivity": {"energy": 1.0}}
-    assert not warned("closed-loop", enough, why)  # where it never acts
+    assert not warned("closed-loop-ideal", enough, why)  # where it never acts
 
 
 def test_the_energy_of_a_count_is_that_of_the_pose_that_fits_it():

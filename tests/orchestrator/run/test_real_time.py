@@ -31,7 +31,9 @@ FAST = ("duration=0.3", "graphics.rate=60")
 Made = tuple[dict[str, Any], dict[str, bytes]]
 
 
-def made(folder: Path, clock: WallClock | None, *options: str, scene: str = "closed-loop") -> Made:
+def made(
+    folder: Path, clock: WallClock | None, *options: str, scene: str = "closed-loop-ideal"
+) -> Made:
     """The run.json and the tables of a run, in real time if there is a clock."""
     run = simulate(scene, folder, options, real_time=clock and clock.run()).run
     assert run["fault"] is None
@@ -126,7 +128,7 @@ def test_quantiles_are_within_a_bin_of_those_of_the_numbers():
 def test_a_schedule_waits_by_the_clock_of_the_machine(tmp_path):
     """A run of 0.1 s does not end before that."""
     began = perf_counter_ns()
-    run = simulate("closed-loop", tmp_path, ["duration=0.11"], real_time=RealTimeRun()).run
+    run = simulate("closed-loop-ideal", tmp_path, ["duration=0.11"], real_time=RealTimeRun()).run
     assert perf_counter_ns() - began > 100 * MS
     samples = run["real_time"]["samples"]["graphics"]
     assert samples["taken"] == 3 or (samples["late"] and 1 <= samples["taken"] < 3)
@@ -198,7 +200,7 @@ def test_a_run_that_ends_early_leaves_its_rows_and_no_thread(tmp_path, how):
     came: list[int] = []
     options = ["duration=0.2"]
     options += ["stop_when='haptic_device.x[1] < 1e9'"] if how == "stop_when" else []
-    ended = simulate("closed-loop", tmp_path, options, real_time=RealTimeRun(turn))
+    ended = simulate("closed-loop-ideal", tmp_path, options, real_time=RealTimeRun(turn))
     assert ended.outcome.reason == how
     assert len(ended.results.haptics["time"]) >= 1
     assert (tmp_path / "graphics_samples.csv").exists()
@@ -213,7 +215,7 @@ def test_the_figure_shows_the_share_of_ticks_above_each_time():
 
 def test_a_run_says_how_it_has_kept_its_schedule(tmp_path):
     clock = WallClock(lambda k: 25 * MS, {205 * MS: 250 * MS})
-    found = simulate("closed-loop", tmp_path, FAST, real_time=clock.run()).results
+    found = simulate("closed-loop-ideal", tmp_path, FAST, real_time=clock.run()).results
     said = [*summary.lines(found)]
     assert "512 Hz in real time: 1 of 154 deadlines missed; largest step time 0 ms" in said[0]
     assert said[1].startswith("warning: the schedule was moved by 0.25 s")

@@ -24,7 +24,7 @@ ROCKER = "linkage.start.rocker=2.9"
 
 def test_a_run_replaces_the_files_of_the_one_before_and_no_others(tmp_path):
     out = tmp_path / "out"
-    assert status("run", "closed-loop", "--out", out, *SHORT) == 0
+    assert status("run", "closed-loop-ideal", "--out", out, *SHORT) == 0
     first = {p.name for p in out.iterdir()}
     assert set(read_results.load(out).run["files"]) == first
     assert {"graphics.csv", "constraints.png"} <= first
@@ -94,7 +94,7 @@ def test_a_scene_of_given_fmus_has_nothing_to_build(tmp_path, capsys):
 
 
 def test_a_signal_of_another_rate_is_told_where_it_is():
-    found = run_once("closed-loop", {"duration": 0.2, "phases.virtual_mechanism": 0.0005})
+    found = run_once("closed-loop-ideal", {"duration": 0.2, "phases.virtual_mechanism": 0.0005})
     (table,) = (n for n, t in found.tables.items() if "virtual_mechanism.x" in t)
     assert table != "haptics"
     with pytest.raises(KeyError, match=rf"it is in tables\['{table}'\]"):
@@ -102,7 +102,7 @@ def test_a_signal_of_another_rate_is_told_where_it_is():
 
 
 def test_a_reader_that_has_enough_is_no_fault():
-    command, pipe = [*COMMAND, "run", "closed-loop", "--explain"], subprocess.PIPE
+    command, pipe = [*COMMAND, "run", "closed-loop-ideal", "--explain"], subprocess.PIPE
     with subprocess.Popen(command, stdout=pipe, stderr=pipe) as told:
         assert told.stdout.readline().startswith(b"Time is counted in ticks")
         told.stdout.close()
@@ -154,7 +154,7 @@ SOON = "stop_when='virtual_mechanism.energy > 1e-5'"
     ids=["exact", "aligned", "phases", "drawn latencies"],
 )
 def test_a_run_of_1e5_s_has_rows(tmp_path, options):
-    experiment = simulate("closed-loop", tmp_path, [LONG, SOON, *options])
+    experiment = simulate("closed-loop-ideal", tmp_path, [LONG, SOON, *options])
     outcome = experiment.outcome
     assert (outcome.fault, outcome.reason) == (None, "stop_when")
     assert 0 < outcome.end_time < 1

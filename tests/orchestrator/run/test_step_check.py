@@ -105,7 +105,7 @@ def test_light_coupler_under_its_drive_is_told(tmp_path):
     assert not too_long(hl.run("four-bar", light | {"mechanism.substeps": 20}))
 
 
-@pytest.mark.parametrize("scene", ["closed-loop", "obstacles", "trammel"])
+@pytest.mark.parametrize("scene", ["closed-loop-ideal", "obstacles", "trammel"])
 def test_results_do_not_depend_on_the_check(scene, tmp_path, monkeypatch):
     checked = hl.run(scene, {"duration": 0.5}, out=tmp_path / "checked", figures=False)
     monkeypatch.setattr(step_check.StepCheck, "possible", lambda description: False)

@@ -58,7 +58,7 @@ NO_VALUE = r"graphics\.rate: .* is no value of a scene"
 )
 def test_what_is_no_option_is_refused(given, message):
     with pytest.raises(InputFault, match=message):
-        open_scene.load("closed-loop", given)
+        open_scene.load("closed-loop-ideal", given)
 
 
 def test_a_scene_object_takes_options_as_its_name_does(tmp_path):

@@ -26,12 +26,12 @@ NATIVE = (*SHORT, "packaging=native")
 def native(tmp_path_factory):
     """The folder of a native run of the report's experiment."""
     folder = tmp_path_factory.mktemp("native")
-    assert simulate("closed-loop", folder, NATIVE).outcome.fault is None
+    assert simulate("closed-loop-ideal", folder, NATIVE).outcome.fault is None
     return folder
 
 
 def test_a_run_gives_the_same_bytes_and_says_what_ran(native, tmp_path):
-    assert simulate("closed-loop", tmp_path, SHORT).outcome.fault is None
+    assert simulate("closed-loop-ideal", tmp_path, SHORT).outcome.fault is None
     assert (native / "haptics.csv").read_text().count("\n") > 100
     assert tables_of(native) == tables_of(tmp_path)
     told = json.loads((native / "run.json").read_text())
@@ -65,8 +65,8 @@ assert hl.run(sys.argv[1], out=sys.argv[2], figures=False).fault is None
 
 def test_an_exported_scene_runs_again_without_what_built_it(native, tmp_path):
     """The SSP holds the compiled FMUs, and says nothing of how they were made."""
-    assert status("export", "closed-loop", *sets(NATIVE), "--out", tmp_path) == 0
-    path = tmp_path / "closed-loop.ssp"
+    assert status("export", "closed-loop-ideal", *sets(NATIVE), "--out", tmp_path) == 0
+    path = tmp_path / "closed-loop-ideal.ssp"
     with zipfile.ZipFile(path) as archive:
         assert b"packaging" not in archive.read("SystemStructure.ssd")
         archive.extract("resources/virtual_mechanism.fmu", tmp_path)

@@ -71,7 +71,7 @@ REFUSED = {
         ('delays."a.b"={ los = 0.05 }', "delays.a.b.los: unknown key; did you mean 'loss'?"),
         (DRIVE, "drive.effort: `effort` belongs to type 'constant', not 'pd'"),
     ],
-    "closed-loop": [
+    "closed-loop-ideal": [
         ("device.handle_mass=-1", f"device.handle_mass: -1 {OUT} number > 0 (kg)"),
         ("device.rotor_inertia=-1e-3", f"device.rotor_inertia: -0.001 {OUT} number >= 0 (kg.m2)"),
         ("device.encoder_resolution=-1", f"device.encoder_resolution: -1 {OUT} number > 0 (rad)"),
@@ -259,7 +259,7 @@ def test_what_is_refused(scene, options, message):
 )
 @pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
 def test_rates_and_times_out_of_any_range(key, value):
-    assert f"--set {key}={value}: {key}: " in refused("closed-loop", f"{key}={value}")
+    assert f"--set {key}={value}: {key}: " in refused("closed-loop-ideal", f"{key}={value}")
 
 
 def test_a_key_that_is_gone_says_what_to_do() -> None:

@@ -142,9 +142,9 @@ def test_lines_of_keys_after_texts_and_arrays_over_several_lines():
 
 def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
     base, top = tmp_path / "base.toml", tmp_path / "top.toml"
-    base.write_text(find_scene.find_scene("closed-loop")[1])
+    base.write_text(find_scene.find_scene("closed-loop-ideal")[1])
     top.write_text(f'extends = "{base}"\nduration = 1.0\n[hand]\nwrench = [1.0, 0.0, 0.0]\n')
     scene = open_scene.load(str(top))
     assert scene.duration == 1.0
     assert scene.hand.wrench == (1.0, 0.0, 0.0)
-    assert scene.linkage == open_scene.load("closed-loop").linkage
+    assert scene.linkage == open_scene.load("closed-loop-ideal").linkage

@@ -20,7 +20,7 @@ from tests.orchestrator.foreign_scenes import scene as foreign_scene
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.shared_fixtures import status
 
-CLOSED = 'title = "t"\nextends = "closed-loop"\n'
+CLOSED = 'title = "t"\nextends = "closed-loop-ideal"\n'
 
 
 def told(text: str, *options: str, folder: Path | None = None) -> str:
@@ -124,7 +124,7 @@ def test_what_a_base_extends_in_vain_names_the_base(tmp_path):
     with pytest.raises(InputFault) as refused:
         open_scene.load(str(top))
     assert f"{base}, line 2: extends: closed-lop: neither a file" in str(refused.value)
-    assert "did you mean 'closed-loop'?" in str(refused.value)
+    assert "did you mean 'closed-loop-ideal'?" in str(refused.value)
 
 
 def test_scenes_in_two_folders_that_extend_each_other_are_a_circle(tmp_path):
@@ -209,8 +209,8 @@ def test_native_where_no_block_is_ours():
     ("options", "place"), [([], (11, None)), (["hold=foh"], (None, "--set hold=foh"))]
 )
 def test_a_changed_copy_still_knows_where_it_was_written(tmp_path, options, place):
-    """`closed-loop` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 11."""
-    changed = replace(open_scene.load("closed-loop", options), hold="pspm")
+    """`closed-loop-ideal` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 11."""
+    changed = replace(open_scene.load("closed-loop-ideal", options), hold="pspm")
     with pytest.raises(SceneFault) as refused:
         simulate(changed, tmp_path)
     (found,) = refused.value.findings

@@ -30,18 +30,20 @@ def same(one: Table, other: Table, tolerance: float = 0.0) -> None:
 
 def test_a_graphics_block_that_nothing_depends_on_changes_no_bit(tmp_path, monkeypatch):
     options = ("controller.topology=false", "controller.impedance=false")
-    without = haptics("closed-loop", tmp_path / "without", *options)
-    assert "graphics" not in {b.rate for b in blocks(open_scene.load("closed-loop", options)).built}
+    without = haptics("closed-loop-ideal", tmp_path / "without", *options)
+    assert "graphics" not in {
+        b.rate for b in blocks(open_scene.load("closed-loop-ideal", options)).built
+    }
     monkeypatch.setattr(FromGraphics, "names", ["to look at"])
-    shown = simulate("closed-loop", tmp_path / "with", [SHORT, *options])
+    shown = simulate("closed-loop-ideal", tmp_path / "with", [SHORT, *options])
     assert "virtual_environment.x[1]" in shown.results.graphics.columns
     same(without, shown.results.haptics)
 
 
 def test_directions_without_a_topology_controller_change_no_bit(tmp_path):
     off = "controller.topology=false"
-    without = haptics("closed-loop", tmp_path / "without", off)
-    shown = haptics("closed-loop", tmp_path / "with", off, "mechanism.directions=true")
+    without = haptics("closed-loop-ideal", tmp_path / "without", off)
+    shown = haptics("closed-loop-ideal", tmp_path / "with", off, "mechanism.directions=true")
     assert "virtual_mechanism.P_c[1,1]" in shown.columns
     assert "virtual_mechanism.P_c[1,1]" not in without.columns
     same(without, shown)

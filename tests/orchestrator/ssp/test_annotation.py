@@ -47,7 +47,7 @@ def test_an_annotation_says_rates(tmp_path):
         ({"graphics": []}, "graphics: should be a table"),
         ({"connection": {}}, "connection: should be a list"),
         ({**RUN, "connection": [3]}, "connection"),
-        ({"extends": "closed-loop"}, "extends: does not belong here"),
+        ({"extends": "closed-loop-ideal"}, "extends: does not belong here"),
         ({"linkage": {}}, "linkage: does not belong here"),
         ({"": {}}, "does not belong here"),
         ({**RUN, "title": "\ud800"}, "is no Unicode text"),

@@ -14,7 +14,7 @@ import hapticlink as hl
 
 STEPS = 128
 OPTIONS = {"coupling": "jacobi", "duration": STEPS / 512}
-SCENES = ("closed-loop", "closed-loop-direct", "two-users", "two-hands", "enclosure")
+SCENES = ("closed-loop-ideal", "closed-loop-direct", "two-users", "two-hands", "enclosure")
 SAMPLED = ("controller", "hand")
 AT_ONCE = ("qdd", "lambda", "F_env", "F_hand_observed")
 """Outputs that depend on inputs at once: hapticlink reads them before it sets these, Ecos after."""
@@ -74,7 +74,7 @@ def ecos():
 
 @pytest.mark.parametrize(
     ("scene", "parameters"),
-    [("closed-loop", None), *((s, "start") for s in SCENES if s != "closed-loop-direct")],
+    [("closed-loop-ideal", None), *((s, "start") for s in SCENES if s != "closed-loop-direct")],
 )
 def test_ecos_runs_one_rate_to_the_bytes_of_our_jacobi(scene, parameters, tmp_path, ecos):
     """All outputs but those AT_ONCE, with and without the set of parameters, which Ecos applies
@@ -100,9 +100,9 @@ def test_ecos_runs_one_rate_to_the_bytes_of_our_jacobi(scene, parameters, tmp_pa
 
 def test_built_fmus_start_where_the_scene_does(tmp_path):
     """The handle is where the mechanism's operational point is, in a tool that knows no scene."""
-    files = hl.build("closed-loop", {"linkage.start.shoulder1": 0.9}, out=tmp_path)
+    files = hl.build("closed-loop-ideal", {"linkage.start.shoulder1": 0.9}, out=tmp_path)
     device = read_model_description(str(files["haptic_device"]))
     starts = [float(v.start) for v in device.modelVariables if v.name.startswith("x_start[")]
-    run = hl.run("closed-loop", {"linkage.start.shoulder1": 0.9, "duration": 0.01})
+    run = hl.run("closed-loop-ideal", {"linkage.start.shoulder1": 0.9, "duration": 0.01})
     np.testing.assert_array_equal(starts, run.haptics["virtual_mechanism.x"][0])
     assert np.abs(starts).min() > 0.01

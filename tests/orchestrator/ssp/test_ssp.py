@@ -42,10 +42,11 @@ TICKS = "graphics.align=tick"
 @pytest.mark.parametrize(
     ("name", "options", "tables"),
     [
-        ("closed-loop", (), 2),
-        ("closed-loop", ("graphics.rate={ min = 20, max = 60, seed = 3 }", "hold=foh"), 2),
-        ("closed-loop", ("coupling=jacobi", TICKS, "holds.virtual_environment.P_c=delayed"), 2),
-        ("closed-loop", ("graphics.phase=0.01", "phases.virtual_mechanism='1/1024'",
+        ("closed-loop-ideal", (), 2),
+        ("closed-loop-ideal", ("graphics.rate={ min = 20, max = 60, seed = 3 }", "hold=foh"), 2),
+        ("closed-loop-ideal", ("coupling=jacobi", TICKS, "holds.virtual_environment.P_c=delayed"),
+         2),
+        ("closed-loop-ideal", ("graphics.phase=0.01", "phases.virtual_mechanism='1/1024'",
                          "phases.controller=0.0005"), 4),
         ("two-hands", (), 1),
         ("local-model", (), 2),
@@ -56,7 +57,7 @@ def test_a_shipped_scene_comes_back_to_the_bit(tmp_path, name, options, tables):
 
 
 def test_others_read_it_and_the_same_scene_gives_the_same_bytes(tmp_path):
-    path = export("closed-loop", tmp_path)
+    path = export("closed-loop-ideal", tmp_path)
     content = path.read_bytes()
     ssd = read_ssd(str(path), validate=True)
     names = [e.name for e in ssd.system.elements]
@@ -67,7 +68,7 @@ def test_others_read_it_and_the_same_scene_gives_the_same_bytes(tmp_path):
     with zipfile.ZipFile(path) as archive:
         assert archive.testzip() is None
         assert {f"resources/{n}.fmu" for n in names} < set(archive.namelist())
-    assert export("closed-loop", tmp_path).read_bytes() == content
+    assert export("closed-loop-ideal", tmp_path).read_bytes() == content
 
 
 def test_starts_factors_units_and_own_rates_come_back(tmp_path):

@@ -241,6 +241,6 @@ def test_an_ssp_whose_components_are_renamed_runs_to_the_same_bits(tmp_path):
 def test_none_is_a_kind_too(tmp_path):
     """Mobility, its entries held each for itself; P_c stays what it is."""
     option = 'kinds."virtual_environment.Lambda_inv"="none"'
-    made = system_of("closed-loop", "hold=foh", option)
+    made = system_of("closed-loop-ideal", "hold=foh", option)
     kinds = {c.source_port: c.kind for c in made.connections if c.source == "virtual_environment"}
     assert kinds == {"Lambda_inv": None, "P_c": "projector"}

@@ -1,4 +1,4 @@
-"""Blocks of closed-loop by FMUs that other tools make: docs/foreign-fmus.md has the table."""
+"""Blocks of closed-loop-ideal by FMUs that other tools make: docs/foreign-fmus.md has the table."""
 
 import shutil
 from pathlib import Path
@@ -40,8 +40,8 @@ class Pull(Fmi3Slave):
 @pytest.fixture(scope="module")
 def own(tmp_path_factory):
     """The FMU of each block, with its sources in C, and the tables of their run."""
-    files = hl.build("closed-loop", NATIVE, out=tmp_path_factory.mktemp("native"))
-    run = hl.run("closed-loop", NATIVE, out=tmp_path_factory.mktemp("run"), figures=False)
+    files = hl.build("closed-loop-ideal", NATIVE, out=tmp_path_factory.mktemp("native"))
+    run = hl.run("closed-loop-ideal", NATIVE, out=tmp_path_factory.mktemp("run"), figures=False)
     return files, tables_of(run.folder)
 
 
@@ -73,7 +73,7 @@ def contained(file, folder):
 
 def run_with(block, file, folder):
     swap = {"fmu.+": {"replaces": block, "path": str(file)}}
-    return hl.run("closed-loop", NATIVE | swap, out=folder / "run", figures=False)
+    return hl.run("closed-loop-ideal", NATIVE | swap, out=folder / "run", figures=False)
 
 
 @pytest.mark.skipif(not shutil.which("cmake"), reason="FMPy needs CMake to compile")
@@ -95,4 +95,4 @@ def test_a_hand_of_pythonfmu3_changes_no_byte(tmp_path, own):
 def test_mujoco_is_refused_where_it_has_no_such_block(block):
     said = rf"--swap {block}=mujoco: .*give `path`, an FMU with the ports of {block}"
     with pytest.raises(SceneFault, match=said):
-        hl.scene("closed-loop", SceneOptions(swap=[f"{block}=mujoco"]).options)
+        hl.scene("closed-loop-ideal", SceneOptions(swap=[f"{block}=mujoco"]).options)

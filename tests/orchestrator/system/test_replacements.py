@@ -34,22 +34,22 @@ def spring(folder: Path, size: int = 3, output: str = "F_motor") -> Path:
 @pytest.fixture(scope="module")
 def own_files(tmp_path_factory):
     """The FMU of each block."""
-    return hl.build("closed-loop", SHORT, out=tmp_path_factory.mktemp("fmus"))
+    return hl.build("closed-loop-ideal", SHORT, out=tmp_path_factory.mktemp("fmus"))
 
 
 @pytest.fixture(scope="module")
 def own_run(tmp_path_factory):
-    return hl.run("closed-loop", SHORT, out=tmp_path_factory.mktemp("run"), figures=False)
+    return hl.run("closed-loop-ideal", SHORT, out=tmp_path_factory.mktemp("run"), figures=False)
 
 
 def test_native_fmus_of_fmi3_in_the_place_of_all_blocks_change_no_byte(tmp_path, own_run):
     """Arrays have the units of their entries, and meters, holds and clocks are those of the run."""
     native = {**SHORT, "packaging": "native"}
-    files = hl.build("closed-loop", native, out=tmp_path / "fmus", fmi=3)
+    files = hl.build("closed-loop-ideal", native, out=tmp_path / "fmus", fmi=3)
     assert files.keys() == own_run.run["fmus"].keys()
     swaps = [f'fmu.+={{replaces="{name}", path="{file}"}}' for name, file in files.items()]
     swapped = hl.run(
-        "closed-loop", [*overrides.write_options(SHORT), *swaps], out=tmp_path, figures=False
+        "closed-loop-ideal", [*overrides.write_options(SHORT), *swaps], out=tmp_path, figures=False
     )
     assert swapped.run["energies"] == own_run.run["energies"]
     assert tables_of(own_run.folder) == tables_of(tmp_path)
@@ -62,7 +62,7 @@ def test_native_fmus_of_fmi3_in_the_place_of_all_blocks_change_no_byte(tmp_path,
 def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path, own_files, own_run, block):
     """Connections, order, rate and timing are those of the block."""
     swap = {**SHORT, "fmu.+": {"replaces": block, "path": str(own_files[block])}}
-    swapped = hl.run("closed-loop", swap, out=tmp_path, figures=False)
+    swapped = hl.run("closed-loop-ideal", swap, out=tmp_path, figures=False)
     assert swapped.run["replaced"] == {block: {"lost": [], "unfed": [], "mapped": {}}}
     assert swapped.run["connections"] == own_run.run["connections"]
     assert swapped.run["stop_when"] == own_run.run["stop_when"] != ""
@@ -71,7 +71,7 @@ def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path, own_files, own
 
 def test_by_one_option_and_what_does_not_meet_is_listed(tmp_path, capsys):
     out, file = tmp_path / "run", spring(tmp_path)
-    command = ["run", "closed-loop", "--set", "duration=0.2", "--swap", f"controller={file}"]
+    command = ["run", "closed-loop-ideal", "--set", "duration=0.2", "--swap", f"controller={file}"]
     command += ["--set", "fmu.controller.start.own=[1.0, 2.0, 3.0]"]  # acts after the swap
     assert status(*command, "--no-figures", "--out", out) == 0
     told = capsys.readouterr().out
@@ -91,7 +91,7 @@ def test_by_one_option_and_what_does_not_meet_is_listed(tmp_path, capsys):
 def test_a_port_of_another_size_is_refused_by_its_connection(tmp_path):
     swap = {"fmu.+": {"replaces": "controller", "path": str(spring(tmp_path, 2))}}
     with pytest.raises(SceneFault, match=r"virtual_mechanism\.x has 3 .* controller\.x_S takes 2"):
-        hl.run("closed-loop", {**SHORT, **swap})
+        hl.run("closed-loop-ideal", {**SHORT, **swap})
 
 
 @pytest.mark.parametrize("block", ["hand", "controller", "virtual_mechanism"])
@@ -99,7 +99,7 @@ def test_an_fmu_that_fits_nothing_is_refused(tmp_path, block, capsys):
     """With what the block has and what the FMU has, as every command says it."""
     swap = f"{block}={spring(tmp_path, output='z')}"
     for command in ("run", "info"):
-        assert status(command, "closed-loop", "--swap", swap) == 2
+        assert status(command, "closed-loop-ideal", "--swap", swap) == 2
         told = " ".join(capsys.readouterr().err.split())
         assert "none of its outputs reaches another FMU" in told
         assert "the FMU has outputs z and inputs x_S, x_D, own." in told
@@ -120,7 +120,7 @@ def test_ports_are_held_as_those_of_the_block_and_carry_its_power(tmp_path):
     files = {"virtual_environment": copy, "haptic_device": device}
     swaps = [f'fmu.+={{replaces="{name}", path="{file}"}}' for name, file in files.items()]
     with build_system(
-        open_scene.load("closed-loop", ["controller.topology=false", *swaps])
+        open_scene.load("closed-loop-ideal", ["controller.topology=false", *swaps])
     ) as system:
         about = {name: system.fmu[name].description for name in files}
         assert system.ends_when is None  # this device has no workspace_margin
@@ -132,7 +132,7 @@ def test_ports_are_held_as_those_of_the_block_and_carry_its_power(tmp_path):
 
 
 def pull(folder: Path, *names: str) -> Path:
-    """The constant hand of closed-loop."""
+    """The constant hand of closed-loop-ideal."""
     return slave(folder, "Pull", ("output", dict(zip(names, (-0.5, 0.0, -0.0025), strict=True))))
 
 
@@ -149,9 +149,9 @@ def test_an_fmu_of_other_names_acts_as_the_block(tmp_path, names, given, capsys)
     """As the scene's own hand, which pushes with the same constant wrench, in signals of its
     names, which figures and measures know."""
     file = pull(tmp_path, *names)
-    own = hl.run("closed-loop", SHORT)
+    own = hl.run("closed-loop-ideal", SHORT)
     sets = [f"--set={key}={value}" for key, value in SHORT.items()]
-    command = ["run", "closed-loop", *sets, "--swap", f"hand={file}", *given]
+    command = ["run", "closed-loop-ideal", *sets, "--swap", f"hand={file}", *given]
     assert status(*command, "--no-figures", "--out", tmp_path / "run") == 0
     assert f"hand: F is what the FMU calls {', '.join(names)}" in capsys.readouterr().out
     found = hl.load(tmp_path / "run")
@@ -173,7 +173,7 @@ def test_an_fmu_of_other_names_acts_as_the_block(tmp_path, names, given, capsys)
 )
 def test_a_map_that_does_not_fit_is_refused(tmp_path, given, said, capsys):
     file = pull(tmp_path, "force0", "force1", "force2")
-    command = ["info", "closed-loop", "--swap", f"hand={file}", "--map", given]
+    command = ["info", "closed-loop-ideal", "--swap", f"hand={file}", "--map", given]
     assert status(*command) == 2
     told = " ".join(capsys.readouterr().err.split())
     assert said in told
@@ -183,10 +183,10 @@ def test_a_map_that_does_not_fit_is_refused(tmp_path, given, said, capsys):
 def test_a_scene_has_map_and_connections_too(tmp_path):
     file = pull(tmp_path, "pull0", "pull1", "pull2")
     swap = {"replaces": "hand", "path": str(file), "map": {"F": ["pull0", "pull1", "pull2"]}}
-    assert hl.run("closed-loop", {**SHORT, "fmu.+": swap})["hand.F"][0, 0] == -0.5
+    assert hl.run("closed-loop-ideal", {**SHORT, "fmu.+": swap})["hand.F"][0, 0] == -0.5
     swap = {"replaces": "hand", "path": str(spring(tmp_path, output="z"))}
     wire = {"from": "hand.z", "to": "haptic_device.F_hand"}
-    made = hl.run("closed-loop", {**SHORT, "fmu.+": swap, "connection.+": wire})
+    made = hl.run("closed-loop-ideal", {**SHORT, "fmu.+": swap, "connection.+": wire})
     assert "hand.z -> haptic_device.F_hand" in made.run["connections"]
 
 
@@ -201,9 +201,9 @@ def test_what_replaces_no_block_is_refused(tmp_path):
     ):
         options = [text for table in tables for text in overrides.write_options({"fmu.+": table})]
         with pytest.raises(SceneFault, match=message):
-            hl.scene("closed-loop", options)
+            hl.scene("closed-loop-ideal", options)
     with pytest.raises(SceneFault) as raised:  # as it was typed
-        hl.scene("closed-loop", SceneOptions(swap=["controler=/missing.fmu"]).options)
+        hl.scene("closed-loop-ideal", SceneOptions(swap=["controler=/missing.fmu"]).options)
     said = "--swap controler=/missing.fmu: fmu[0]"
     assert f"{said}.path: there is no file" in str(raised.value)
     assert f"{said}.replaces: no block 'controler'" in str(raised.value)
@@ -212,7 +212,7 @@ def test_what_replaces_no_block_is_refused(tmp_path):
 def test_info_does_not_run_another_s_mechanism(tmp_path, capsys):
     """Its coordinates are its own, and it may hang."""
     swap = f"virtual_mechanism={spring(tmp_path, output='x')}"
-    assert status("info", "closed-loop", "--swap", swap) == 0
+    assert status("info", "closed-loop-ideal", "--swap", swap) == 0
     said = capsys.readouterr().out
     assert "virtual_mechanism has no ports for" in said
     assert "needed by the scene's own virtual_mechanism" in said

@@ -23,8 +23,13 @@ from tests.shared_fixtures import status
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     found = tmp_path_factory.mktemp("runs")
-    hl.run("closed-loop", {"graphics.rate": 10, "duration": 1.0}, out=found / "slow", figures=False)
-    hl.run("closed-loop", {"duration": 0.7}, out=found / "fast", figures=False)
+    hl.run(
+        "closed-loop-ideal",
+        {"graphics.rate": 10, "duration": 1.0},
+        out=found / "slow",
+        figures=False,
+    )
+    hl.run("closed-loop-ideal", {"duration": 0.7}, out=found / "fast", figures=False)
     hl.run("parallelogram", {"duration": 0.3}, out=found / "other", figures=False)
     return found
 
@@ -256,7 +261,7 @@ def test_a_table_without_rows_beside_one_with_rows(root: Path, tmp_path: Path) -
 def test_a_run_without_a_linkage_and_one_that_failed_have_a_page(tmp_path: Path) -> None:
     hl.run("virtual-wall", {"duration": 0.1}, out=tmp_path / "wall", figures=False)
     push = {"hand.wrench": [1e6, 0.0, 0.0], "stop_when": ""}
-    failed = hl.run("closed-loop", push, out=tmp_path / "failed", figures=False)
+    failed = hl.run("closed-loop-ideal", push, out=tmp_path / "failed", figures=False)
     html = page.page(load_by_name([tmp_path / "wall", tmp_path / "failed"]))
     assert failed.fault
     assert f'<td class="bad">{failed.fault.splitlines()[0]}' in html
@@ -265,7 +270,7 @@ def test_a_run_without_a_linkage_and_one_that_failed_have_a_page(tmp_path: Path)
 @pytest.mark.parametrize(
     ("name", "options"),
     [
-        ("closed-loop", {"sensing": "encoders"}),
+        ("closed-loop-ideal", {"sensing": "encoders"}),
         ("virtual-wall", {}),
         ("two-hands", {}),
         ("two-users", {"sensing": "encoders"}),

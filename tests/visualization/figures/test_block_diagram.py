@@ -7,7 +7,7 @@ from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.visualization.figures import block_diagram
 
 
-@pytest.mark.parametrize("scene", ["pendulum", "closed-loop", "two-hands"])
+@pytest.mark.parametrize("scene", ["pendulum", "closed-loop-ideal", "two-hands"])
 def test_every_connection_is_in_the_cell_of_its_source_and_target(scene: str) -> None:
     with build_system(hl.scene(scene)) as system:
         (axes,) = block_diagram.figure(system, scene).axes

@@ -30,7 +30,7 @@ def drawn(results: Results) -> dict[str, Any]:
 
 
 def test_an_early_end_stands_in_every_title() -> None:
-    found = drawn(run_once("closed-loop", ["stop_when='virtual_mechanism.x[1]<0.044'"]))
+    found = drawn(run_once("closed-loop-ideal", ["stop_when='virtual_mechanism.x[1]<0.044'"]))
     assert {*found} == {
         "mechanism", "distance", "forces", "constraints", "energies", "user_port",
     }  # fmt: skip
@@ -43,7 +43,7 @@ def test_an_early_end_stands_in_every_title() -> None:
 def test_the_drawing_says_what_happened_and_shows_the_device_whole() -> None:
     """The numbers are those of the tables; the arrow points along the wrench of the hand."""
     options = "graphics.rate=10", "controller.topology=false"
-    found = run_once("closed-loop", options)
+    found = run_once("closed-loop-ideal", options)
     figure = run_figures.figures(found)["mechanism"]
     axes, whole = figure.axes
     x = found.haptics["virtual_mechanism.x"][:, :2] * 1e3
@@ -54,7 +54,7 @@ def test_the_drawing_says_what_happened_and_shows_the_device_whole() -> None:
     assert title.endswith("until the device left its workspace at 2.08 s")
     (arrow,) = (text for text in axes.texts if text.arrow_patch)
     assert arrow.xyann == pytest.approx((-run_figures.ARROW, 0.0))
-    device = hl.scene("closed-loop").device
+    device = hl.scene("closed-loop-ideal").device
     assert device
     arms = [line for line in whole.lines if line.get_label() == "arms of the device"]
     assert arms
@@ -64,7 +64,7 @@ def test_the_drawing_says_what_happened_and_shows_the_device_whole() -> None:
 
 
 def test_the_energy_at_the_port_stands_beside_the_work_of_the_hand() -> None:
-    found = run_once("closed-loop", ["duration=0.6"])
+    found = run_once("closed-loop-ideal", ["duration=0.6"])
     axes = drawn(found)["user_port"]
     curves = {line.get_label(): line.get_ydata() for line in axes.lines}
     F, pose = found.haptics["hand.F"], found.haptics["haptic_device.x_true"]

@@ -13,4 +13,4 @@ def test_the_mouse_takes_the_place_of_the_hand() -> None:
     assert scene.packaging == "native"
     two = load_viewed_scene("two-users")
     assert two.hands["left"] == two.hand
-    assert load_viewed_scene("closed-loop", ["packaging=python"]).packaging == "python"
+    assert load_viewed_scene("closed-loop-ideal", ["packaging=python"]).packaging == "python"

@@ -28,7 +28,7 @@ def test_the_energy_at_the_users_port_is_that_of_the_results() -> None:
         if live.time > 0.3 and "booked" in seen[-1]:
             live.stop()
 
-    made = hl.RealTime(load_viewed_scene("closed-loop", ["haptics.rate=512"])).run(turn)
+    made = hl.RealTime(load_viewed_scene("closed-loop-ideal", ["haptics.rate=512"])).run(turn)
     x = made["virtual_mechanism.x"][made.time("virtual_mechanism.x") == seen[-1]["t"]]
     assert seen[-1]["x"] == x[0].tolist()
     shown = [{"t": f["t"], "booked": f["booked"], "stored": f["stored"], "states": []}

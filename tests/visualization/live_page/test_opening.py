@@ -18,9 +18,9 @@ from tests.visualization.browser_code.served_page import Served
 
 @pytest.fixture
 def lock_of_last_block(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """In an empty cache, the lock of the FMU of closed-loop that is built last."""
+    """In an empty cache, the lock of the FMU of closed-loop-ideal that is built last."""
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "cache"))
-    last = blocks(load_viewed_scene("closed-loop")).built[-1]
+    last = blocks(load_viewed_scene("closed-loop-ideal")).built[-1]
     with monkeypatch.context() as patched:
         patched.setattr(cache, "get_or_build", lambda material, *_: cache.key(material))
         key = block_fmus.build_block(last.block, last.settings, tmp_path, packaging="native")
@@ -33,7 +33,7 @@ def test_the_mechanism_is_seen_and_the_blocks_are_told_before_they_are_built(
     with ExitStack() as stack:
         browser = stack.enter_context(chromium())
         with lock.hold_lock(lock_of_last_block, lambda: None):
-            served = Served(tmp_path, scene="closed-loop")
+            served = Served(tmp_path, scene="closed-loop-ideal")
             stack.callback(served.__exit__)
             page = Page(browser, served.url, shown="view.stage.frame && view.building")
             page.until("document.getElementById('note').textContent.includes('block 5 of 5')")

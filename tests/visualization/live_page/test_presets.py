@@ -69,7 +69,7 @@ def test_presets_are_calm_buzz_and_a_passive_hold_that_mends(
 
 
 @pytest.mark.parametrize(
-    "name", ["closed-loop", "closed-loop-direct", "enclosure", "two-users", "serial"]
+    "name", ["closed-loop-ideal", "closed-loop-direct", "enclosure", "two-users", "serial"]
 )
 def test_buzz_is_a_vibration_that_is_seen(name: str) -> None:
     """In the mouse's hand, as the lifted map has it: it grows, at a few Hz."""

@@ -163,5 +163,5 @@ def test_ctrl_c_ends_everything(tmp_path: Path) -> None:
 def test_a_port_in_use_is_told(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert status("view", "closed-loop", "--no-browser", "--port", port) == 2
+        assert status("view", "closed-loop-ideal", "--no-browser", "--port", port) == 2
     assert f"--port {port}: " in capfd.readouterr().err

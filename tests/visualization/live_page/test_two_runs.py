@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.visualization.browser_code.chromium import Page, differ_without_topology
 from tests.visualization.browser_code.served_page import Served, values
 
-SERVED = "closed-loop"
+SERVED = "closed-loop-ideal"
 NAME = "hapticlink.commands.view_second_run"
 
 

@@ -60,7 +60,7 @@ def test_a_cut_joint_beneath_the_operational_point_has_its_name_beside_it() -> N
 @pytest.mark.parametrize(
     ("scene", "files"),
     [
-        ("closed-loop", {"blocks.png", "start.png", "workspace.png"}),
+        ("closed-loop-ideal", {"blocks.png", "start.png", "workspace.png"}),
         ("trammel", {"blocks.png", "start.png"}),
     ],
 )
@@ -73,7 +73,7 @@ def test_info_draws_and_names_what_it_drew(
 
 
 def test_what_is_printed_of_a_run_has_the_numbers_of_its_tables() -> None:
-    run = run_once("closed-loop", {"duration": 0.2})
+    run = run_once("closed-loop-ideal", {"duration": 0.2})
     told = str(run)
     apart = run.haptics["virtual_mechanism.x"] - run.haptics["haptic_device.x_true"]
     largest = np.hypot(apart[:, 0], apart[:, 1]).max() * 1e3
@@ -84,7 +84,9 @@ def test_what_is_printed_of_a_run_has_the_numbers_of_its_tables() -> None:
     assert f"loops close within {closure:.2g} m" in told
 
 
-@pytest.mark.parametrize(("scene", "reaches"), [("closed-loop", True), ("remote-centre", False)])
+@pytest.mark.parametrize(
+    ("scene", "reaches"), [("closed-loop-ideal", True), ("remote-centre", False)]
+)
 def test_what_the_device_cannot_reach_is_shaded(scene: str, reaches: bool) -> None:
     """The whole picture of the one is within 0.1 m of the device's middle; the posts of the other
     stand beyond the reach of an arm, 0.95 (proximal + distal) + crank/2."""

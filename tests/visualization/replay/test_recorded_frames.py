@@ -26,7 +26,7 @@ LINK = 0.042
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("runs") / "run"
-    hl.run("closed-loop", {"duration": 0.5}, out=out, figures=False)
+    hl.run("closed-loop-ideal", {"duration": 0.5}, out=out, figures=False)
     return out
 
 
@@ -84,7 +84,9 @@ def test_signals_that_are_not_recorded_are_named_and_nothing_stands_in_for_them(
     tmp_path: Path,
 ) -> None:
     kept = ["virtual_mechanism.q", "virtual_mechanism.x", "controller.F_drift"]
-    hl.run("closed-loop", {"duration": 0.1, "record.signals": kept}, out=tmp_path, figures=False)
+    hl.run(
+        "closed-loop-ideal", {"duration": 0.1, "record.signals": kept}, out=tmp_path, figures=False
+    )
     run = Recorded(str(tmp_path))
     assert {"haptic_device.x_true", "hand.F", "virtual_environment.q"} <= {*run.missing}
     (frame, *_) = run.frames()
@@ -93,7 +95,7 @@ def test_signals_that_are_not_recorded_are_named_and_nothing_stands_in_for_them(
 
 def test_the_picture_of_a_frame_marks_what_the_episodes_of_its_run_have(tmp_path: Path) -> None:
     options = {"graphics.rate": 10, "controller.topology": False, "device.torque_limit": 0.02}
-    hl.run("closed-loop", options, out=tmp_path, figures=False)
+    hl.run("closed-loop-ideal", options, out=tmp_path, figures=False)
     run = Recorded(str(tmp_path))
     marked = [(t, f["states"]) for t, f in zip(run.times, run.frames(), strict=True)]
     for kind in ("saturated", "energy"):
@@ -133,7 +135,7 @@ def test_a_malformed_folder_is_bad_input(
 
 def test_text_of_a_scene_cannot_end_the_data(tmp_path: Path) -> None:
     title = "</script><script>alert(1)</script><!--"
-    hl.run("closed-loop", {"duration": 0.05, "title": title}, out=tmp_path, figures=False)
+    hl.run("closed-loop-ideal", {"duration": 0.05, "title": title}, out=tmp_path, figures=False)
     html = replay_page.html([Recorded(str(tmp_path))])
     assert html.count("<script") == html.count("</script>") == 2
     assert told_by(html)["runs"][0]["title"] == title

@@ -32,9 +32,11 @@ SECOND = """([x, y]) => {
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     root = tmp_path_factory.mktemp("replay")
-    hl.run("closed-loop", {"graphics.rate": 10, "duration": 1.2}, out=root / "on", figures=False)
+    hl.run(
+        "closed-loop-ideal", {"graphics.rate": 10, "duration": 1.2}, out=root / "on", figures=False
+    )
     off = {"graphics.rate": 10, "duration": 1.0, "controller.topology": False}
-    hl.run("closed-loop", off, out=root / "off", figures=False)
+    hl.run("closed-loop-ideal", off, out=root / "off", figures=False)
     return root / "on", root / "off"
 
 

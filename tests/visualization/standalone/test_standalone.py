@@ -21,7 +21,7 @@ Window = Callable[..., Page]
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("standalone") / "demo.html"
-    assert status("view", "closed-loop", "--standalone", path) == 0
+    assert status("view", "closed-loop-ideal", "--standalone", path) == 0
     return path
 
 
@@ -57,7 +57,7 @@ def test_a_drag_gives_the_numbers_of_a_run_with_the_same_forces(
     assert np.abs(rows[:, force]).max() > 1
     hand = {"type": "profile", "table": rows[:, [0, *force]].tolist()}
     changes = {"hand": hand, "duration": 1.0, "stop_when": "", "record": {"signals": "all"}}
-    table = hl.run("closed-loop", changes)["haptics"]
+    table = hl.run("closed-loop-ideal", changes)["haptics"]
     assert np.array_equal(rows[:, 0], table["time"])
     columns = [name for name in table.columns[1:] if not name.startswith("hand.")]
     assert len(columns) > 40
