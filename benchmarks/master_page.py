@@ -96,8 +96,8 @@ def closed(rows: Sequence[Row]) -> Iterator[str]:
     """What a haptic tick of `closed-loop-ideal` costs."""
     yield (
         "Microseconds of processor time per haptic tick of `closed-loop-ideal` with holds,\n"
-        "energies, checks and every output recorded, beside a C loop that only sets, steps and gets\n"
-        "its FMUs (all rounds in [closed-loop-ideal.csv](closed-loop-ideal.csv)):\n"
+        "energies, checks and every output recorded, beside a C loop that only sets, steps and\n"
+        "gets its FMUs (all rounds in [closed-loop-ideal.csv](closed-loop-ideal.csv)):\n"
     )
     cells = []
     for kind in dict.fromkeys(row["packaging"] for row in rows):

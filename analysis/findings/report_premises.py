@@ -26,8 +26,8 @@ CHAPTER_6 = (
         "graphics.sync",
         "operational",
         {
-            "exact": "the graphics copy is placed on the mechanism's coordinates, not pulled at its "
-            "operational point (graphics.sync)",
+            "exact": "the graphics copy is placed on the mechanism's coordinates, not pulled at "
+            "its operational point (graphics.sync)",
             "joint": "the graphics copy is pulled at every joint (graphics.sync)",
         },
     ),

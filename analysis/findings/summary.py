@@ -187,12 +187,12 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from _start(results)
     off, frames = measures.folded
     if off:
-        held = record.scene[
-            "local_model"
-        ]  # whose loops are open: no copy that closes them is there
+        remedy = ": take graphics.sync = 'exact'"
+        if record.scene["local_model"]:
+            remedy = ""  # its mechanism's loops are open: a copy that closes them is elsewhere
         yield (
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
-            f"Lambda_inv, P_c and contacts{'' if held else ': take graphics.sync = ' + repr('exact')}"
+            f"Lambda_inv, P_c and contacts{remedy}"
         )
     yield from record.without_effect
     yield from describe_replacements(record.replaced)

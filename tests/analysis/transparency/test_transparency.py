@@ -85,8 +85,8 @@ def phasor(t: NDArray[np.float64], y: NDArray[np.float64], hertz: float) -> NDAr
 
 @pytest.mark.parametrize("options", [{}, ENCODERS])
 def test_the_compliance_is_that_of_shaken_runs(options: dict[str, Any]) -> None:
-    """At the start of closed-loop-ideal, in a firm grip that is shaken by .1 mm along x and y: poses
-    and forces of the FMUs at the frequency, within .1 %. Of encoders
+    """At the start of closed-loop-ideal, in a firm grip that is shaken by .1 mm along x and y:
+    poses and forces of the FMUs at the frequency, within .1 %. Of encoders
     with counts so fine that they are not seen."""
     start = hl.run("closed-loop-ideal", {"duration": 0.01}, figures=False)
     pose = start.tables["haptics"]["virtual_mechanism.x"][0].tolist()
