@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 
@@ -41,6 +42,7 @@ MEASURED = (
     hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.programs,
     hapticlink.analysis, benchmarks,
 )  # fmt: skip
+MADE = re.compile(r"^Made from commit .*\n\n?", re.MULTILINE)
 MADE_FROM = "made_from.json"
 """In results/: of each benchmark the commit of its tables, and the hashes of its packages."""
 
@@ -60,22 +62,30 @@ def sign(results: Path, what: str, page: Path) -> None:
     record = json.loads(path.read_text()) if path.exists() else {}
     record[what] = {"commit": commit, "sources": _hashes()}
     path.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n")
-    with page.open("a", encoding="utf-8") as file:
-        file.write(f"\nMade from commit {commit}.\n")
+    _mark(page, f"commit {commit}.")
 
 
-def status(results: Path, benchmarks: Sequence[str]) -> Iterator[str]:
-    """A line for each benchmark: whether its tables are those of the code that is there."""
+def status(results: Path, pages: Mapping[str, Path]) -> Iterator[str]:
+    """A line for each benchmark, by its page: whether its tables are those of the code that is
+    there. Pages of others say so below their title."""
     path, now = results / MADE_FROM, _hashes()
     record = json.loads(path.read_text()) if path.exists() else {}
-    for what in benchmarks:
-        if what not in record:
-            yield f"{what}: made from a commit that is not recorded"
-            continue
-        made = record[what]
+    for what, page in pages.items():
+        made = record.get(what, {"commit": "unknown", "sources": {}})
         changed = [name for name, sha in now.items() if made["sources"].get(name) != sha]
-        since = f", since when {', '.join(changed)} changed" if changed else ": current"
-        yield f"{what}: made from {made['commit']}{since}"
+        since = f"; changed since then: {', '.join(changed)}" if changed else ""
+        if page.exists():
+            _mark(page, f"commit {made['commit']}{since}.")
+        yield f"{what}: made from commit {made['commit']}{since or ', current'}"
+
+
+def _mark(page: Path, made_from: str) -> None:
+    """Write below the title of a page what it was made from, in the place of what stood there."""
+    text = MADE.sub("", page.read_text(encoding="utf-8"))
+    title, _, body = text.partition("\n")
+    page.write_text(
+        f"{title}\n\nMade from {made_from}\n\n{body.strip()}".rstrip() + "\n", encoding="utf-8"
+    )
 
 
 def _hashes() -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 from cyclopts import Parameter
@@ -42,7 +43,7 @@ def bench(
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
 ) -> int:
     """Measure run time, error and limits. Without WHAT, list which tables in results/ were made
-    from the code that is there. WHAT is one of
+    from the code that is there, and say on the pages of others what changed since. WHAT is one of
 
     - mechanism: run time against error, beside the multibody codes that are installed
     - singular: errors over many rates on motions through singular poses
@@ -66,10 +67,12 @@ def bench(
     results = checkout.folder("bench") / "results"
     if what is None:
         status = checkout.function("bench", "benchmarks.code_version:status")
-        print(*status(results, get_args(Benchmark)), sep="\n")
+        print(
+            *status(results, {each: _page(results, each) for each in get_args(Benchmark)}), sep="\n"
+        )
         return 0
     make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
-    page = results / PAGES.get(what, f"{what}/README.md")
+    page = _page(results, what)
     page = (out or page.parent) / page.name
     page.parent.mkdir(parents=True, exist_ok=True)
     command = f"hapticlink bench {what}{' --quick' * quick}"
@@ -85,3 +88,7 @@ def bench(
         checkout.function("bench", "benchmarks.code_version:sign")(results, what, page)
     print(page)
     return 0
+
+
+def _page(results: Path, what: str) -> Path:
+    return results / PAGES.get(what, f"{what}/README.md")

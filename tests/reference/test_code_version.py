@@ -16,12 +16,15 @@ def test_tables_are_current_until_a_package_changes(
     code_version.sign(tmp_path, "master", page)
     commit = json.loads((tmp_path / code_version.MADE_FROM).read_text())["master"]["commit"]
     assert page.read_text() == f"# Masters\n\nMade from commit {commit}.\n"
-    assert [*code_version.status(tmp_path, ["master", "skip"])] == [
-        f"master: made from {commit}: current",
-        "skip: made from a commit that is not recorded",
-    ]
+    pages = {"master": page, "skip": tmp_path / "skip.md"}
+    current, unknown = code_version.status(tmp_path, pages)
+    assert current == f"master: made from commit {commit}, current"
+    assert unknown.startswith("skip: made from commit unknown; changed since then: components, ")
     hashes = code_version._hashes()
     monkeypatch.setattr(code_version, "_hashes", lambda: hashes | {"orchestrator": "other"})
-    assert [*code_version.status(tmp_path, ["master"])] == [
-        f"master: made from {commit}, since when orchestrator changed"
-    ]
+    page.write_text(page.read_text() + "\nThe finding.\n")
+    for _ in range(2):
+        (told,) = code_version.status(tmp_path, {"master": page})
+        assert told == f"master: made from commit {commit}; changed since then: orchestrator"
+    made = f"Made from commit {commit}; changed since then: orchestrator."
+    assert page.read_text() == f"# Masters\n\n{made}\n\nThe finding.\n"
