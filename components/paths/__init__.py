@@ -1,5 +1,5 @@
 """Signals over time as a scene gives them to hands and drives: rows joined by lines or by a cubic
-spline, and sines."""
+spline, or held, and sines."""
 
 from __future__ import annotations
 
@@ -99,6 +99,36 @@ class TimeSpline(TimeSignal):
         return ca.vertcat(c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2 * c2 + 3 * s * c3))
 
 
+class TimeSteps(TimeSignal):
+    """Rows (time, k values), of which each is held until the next; the first one before it, too.
+
+    An integration method takes the value at the beginning of its step for all of it, so that a row
+    within a step acts from the next one on. One look-up finds the row, another one its numbers.
+    Raises ValueError, with `name`, where TimeTable does.
+    """
+
+    def __init__(self, rows: Rows, name: str) -> None:
+        data = check_rows(rows, name)
+        self.rows, self.size = rows, data.shape[1] - 1
+        self.size_over = self.size
+        if len(rows) > 1:
+            number = np.arange(len(rows), dtype=float)
+            self.look_ups = (LookUp(data[:, 0], number[:, None]), LookUp(number, data[:, 1:]))
+
+    def at(self, t: ca.SX) -> ca.SX:
+        if not self.look_ups:
+            return ca.vertcat(ca.DM(self.rows[0][1:]), ca.SX.zeros(self.size, 1))
+        row, values = self.look_ups
+        t = ca.fmin(ca.fmax(t, self.rows[0][0]), self.rows[-1][0])
+        return ca.vertcat(values.value(ca.floor(row.value(t))), ca.SX.zeros(self.size, 1))
+
+    def over(self, t: ca.SX, h: ca.SX) -> ca.SX:
+        return self.value(t)
+
+    def within(self, over: ca.SX, start: ca.SX, t: ca.SX) -> ca.SX:
+        return ca.vertcat(over, ca.SX.zeros(self.size, 1))
+
+
 class TimeSine(TimeSignal):
     """y = mean + amplitude sin(2 pi frequency t + phase), each of k values with its own numbers.
     Raises ValueError, with `name`, for numbers that are not finite."""
@@ -127,4 +157,5 @@ def signal(given: Rows | AnySine, interpolation: Interpolation, name: str) -> Ti
                 f"`{name}`: a sine has no rows: give rows, or leave `interpolation` out"
             )
         return TimeSine(given, name)
-    return TimeSpline(given, name) if interpolation == "spline" else TimeTable(given, name)
+    kinds = {"linear": TimeTable, "spline": TimeSpline, "hold": TimeSteps}
+    return kinds[interpolation](given, name)

@@ -32,9 +32,9 @@ class ProfileDrive:
     type: Literal["profile"] = "profile"
     """An effort over time."""
     table: tuple[tuple[Time, Effort], ...] | EffortSine
-    """Rows of time and effort, sorted by time, the ends held; or a sine."""
+    """Rows of time and effort, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,9 +44,9 @@ class PDDrive:
     type: Literal["pd"] = "pd"
     """A servo that follows a target."""
     table: tuple[tuple[Time, Coordinate], ...] | CoordinateSine
-    """Rows of time and target, sorted by time, the ends held; or a sine."""
+    """Rows of time and target, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
     stiffness: JointStiffness
     """Gain on the position error."""
     damping: JointDamping

@@ -40,9 +40,10 @@ class ProfileHand:
     type: Literal["profile"] = "profile"
     """A wrench over time."""
     table: tuple[tuple[Time, Force, Force, Torque], ...] | WrenchSine
-    """Rows of time, force and moment, sorted by time, the ends held; or a sine."""
+    """Rows of time, force and moment, sorted by time, the ends held; a sine; or a recorded log,
+    `{ path, columns, units }`: [recorded hands](scenes.md#recorded-hands)."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
     damping: Damping | None = None
     """Damping of the handle to ground."""
 
@@ -64,9 +65,9 @@ class ArmHand:
     grip_damping: Damping = (20.0, 20.0, 0.05)
     """B_gr, arm to handle."""
     target: Path | PoseSine
-    """Rows of time and pose, sorted by time, the ends held; or a sine."""
+    """Rows of time and pose, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
     timing: Literal["sampled", "continuous"] = "sampled"
     """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
     that at the end of its step."""
@@ -83,9 +84,9 @@ class SpringHand:
     damping: Damping | None = None
     """Damping, handle to target; by default none."""
     target: Path | PoseSine = ((0.0, 0.0, 0.0, 0.0),)
-    """Rows of time and pose, sorted by time, the ends held; or a sine."""
+    """Rows of time and pose, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, or the cubic spline whose rate is 0 at both ends."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
     timing: Literal["sampled", "continuous"] = "sampled"
     """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
     that at the end of its step."""

@@ -15,7 +15,7 @@ from hapticlink.components.specs.quantities import (
     Wrench,
 )
 
-Interpolation = Literal["linear", "spline"]
+Interpolation = Literal["linear", "spline", "hold"]
 Frequency = Annotated[float, Quantity("Hz", ge=0)]
 Frequencies = tuple[Frequency, Frequency, Frequency]
 Angles = tuple[Angle, Angle, Angle]

@@ -11,6 +11,7 @@ from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault,
 from hapticlink.orchestrator.scene import families, toml_keys
 from hapticlink.orchestrator.scene.find_scene import find_scene
 from hapticlink.orchestrator.scene.rates import find_traces
+from hapticlink.orchestrator.scene.recorded_tables import find_recorded_tables
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import (
     Path,
@@ -62,6 +63,8 @@ def document(
             fmu["path"] = str(folder / fmu["path"])
     for _, table in find_traces(data) if folder else ():
         table["rate"] = {"trace": str(folder / table["rate"]["trace"])}
+    for _, holder, key in find_recorded_tables(data) if folder else ():
+        holder[key] = {**holder[key], "path": str(folder / str(holder[key]["path"]))}
     base, dropped = data.pop("extends", None), data.pop("drop", [])
 
     def refuse(message: str, key: str = "extends") -> SceneFault:

@@ -15,6 +15,10 @@ from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
 from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
 from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
 from hapticlink.orchestrator.scene.rates import find_traces, read_frame_times
+from hapticlink.orchestrator.scene.recorded_tables import (
+    find_recorded_tables,
+    read_recorded_table,
+)
 from hapticlink.orchestrator.scene.refused_keys_and_values import (
     explain_errors,
     find_further_problems,
@@ -60,6 +64,9 @@ def from_source(source: Source) -> Scene:
         with collect_problem(wrong, (*path, "rate")):
             file = recorded.pop("rate")["trace"]
             recorded["rate"] = read_frame_times(FilePath(file))
+    for path, holder, key in [*find_recorded_tables(data)]:
+        with collect_problem(wrong, (*path, key)):
+            holder[key] = read_recorded_table(holder.pop(key))
     for fmu in tables_of(data, "fmu"):
         for key in ("start", "derivatives"):
             if isinstance(fmu.get(key), dict):

@@ -1,0 +1,110 @@
+"""A recorded log in the place of a table over time, of a hand or a drive:
+
+    [hand]
+    type = "profile"
+    table = { path = "log.csv", columns = ["t", "Fx", "Fy", "Tz"], units = ["ms", "N", "N", "N.mm"] }
+
+The file is a CSV of numbers; a first line that is none has the names of its columns. Times count
+from the first row. A column that is named `F` stands for `F[1]`, `F[2]`, ... where these are there,
+so that a run's own `haptics.csv` is a log: columns = ["time", "hand.F"].
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import count, takewhile
+from pathlib import Path
+from typing import Any
+
+from hapticlink.orchestrator.base import text_files
+from hapticlink.orchestrator.base.errors import unknown
+
+LARGEST = 2**26
+"""Bytes: 10 min at 1 kHz, of four columns."""
+UNITS = {
+    **{"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
+    **{"rad": 1.0, "deg": math.pi / 180, "N": 1.0, "mN": 1e-3, "kN": 1e3, "N.m": 1.0},
+    **{"mN.m": 1e-3, "N.mm": 1e-3, "N.cm": 1e-2},
+}
+"""Factors to SI."""
+_KEYS = {"path", "columns", "units"}
+
+
+def find_recorded_tables(
+    data: Mapping[str, Any],
+) -> Iterator[tuple[tuple[str | int, ...], dict[str, Any], str]]:
+    """The tables of hands and drives of which `table` or `target` is a recorded log, each with its
+    path in the scene and that key."""
+    holders: list[tuple[tuple[str | int, ...], Any]] = [(("hand",), data.get("hand"))]
+    if isinstance(hands := data.get("hands"), dict):
+        holders += [(("hands", name), hand) for name, hand in hands.items()]
+    linkage = data.get("linkage")
+    joints = linkage.get("joint") if isinstance(linkage, dict) else None
+    for i, joint in enumerate(joints if isinstance(joints, list) else ()):
+        if isinstance(joint, dict):
+            holders.append((("linkage", "joint", i, "drive"), joint.get("drive")))
+    for path, holder in holders:
+        for key in ("table", "target"):
+            given = holder.get(key) if isinstance(holder, dict) else None
+            if isinstance(given, dict) and "path" in given:
+                yield path, holder, key
+
+
+def read_recorded_table(given: Mapping[str, Any]) -> list[list[float]]:
+    """The rows (time, values) in SI units. Raises ValueError for unknown keys, columns and units,
+    and for what is no number, with its line; InputFault for a file that cannot be read."""
+    if odd := given.keys() - _KEYS:
+        raise ValueError(unknown("key of a recorded table", min(odd), _KEYS))
+    path = Path(str(given["path"]))
+    text = text_files.read_text(path, "a log", LARGEST)
+    lines = list(csv.reader(text.splitlines()))
+    names = [name.strip() for name in lines[0]] if lines else []
+    headed = any(_number(name) is None for name in names)
+    places = [*_places(given, names if headed else [str(i + 1) for i in range(len(names))])]
+    factors = _factors(given.get("units"), len(places))
+    rows = [
+        [_entry(path, number, fields, place) * f for place, f in zip(places, factors, strict=True)]
+        for number, fields in enumerate(lines[headed:], 1 + headed)
+        if any(field.strip() for field in fields)
+    ]
+    if not rows:
+        raise ValueError(f"{path}: it has no rows")
+    begin = rows[0][0]
+    return [[row[0] - begin, *row[1:]] for row in rows]
+
+
+def _places(given: Mapping[str, Any], names: Sequence[str]) -> Iterator[int]:
+    """The places of the columns that are asked for, by default all."""
+    for column in map(str, given.get("columns", names)):
+        entries = takewhile(names.__contains__, (f"{column}[{i}]" for i in count(1)))
+        found = [column] if column in names else [*entries]
+        if not found:
+            raise ValueError(unknown(f"column of {given['path']}", column, names))
+        yield from map(names.index, found)
+
+
+def _factors(units: Any, size: int) -> list[float]:
+    if units is None:
+        return [1.0] * size
+    for unit in units:
+        if unit not in UNITS:
+            raise ValueError(unknown("unit", unit, UNITS))
+    if len(units) != size:
+        raise ValueError(f"{len(units)} units for {size} columns: give one for each")
+    return [UNITS[unit] for unit in units]
+
+
+def _entry(path: Path, number: int, fields: Sequence[str], place: int) -> float:
+    field = fields[place] if place < len(fields) else ""
+    if (value := _number(field)) is None:
+        raise ValueError(f"{path}: line {number}, column {place + 1}: {field[:100]!r} is no number")
+    return value
+
+
+def _number(field: str) -> float | None:
+    try:
+        return float(field)
+    except ValueError:
+        return None
