@@ -157,5 +157,6 @@ def signal(given: Rows | AnySine, interpolation: Interpolation, name: str) -> Ti
                 f"`{name}`: a sine has no rows: give rows, or leave `interpolation` out"
             )
         return TimeSine(given, name)
-    kinds = {"linear": TimeTable, "spline": TimeSpline, "hold": TimeSteps}
-    return kinds[interpolation](given, name)
+    if interpolation == "hold":
+        return TimeSteps(given, name)
+    return TimeSpline(given, name) if interpolation == "spline" else TimeTable(given, name)

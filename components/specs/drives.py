@@ -34,7 +34,8 @@ class ProfileDrive:
     table: tuple[tuple[Time, Effort], ...] | EffortSine
     """Rows of time and effort, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or each row held until
+    the next."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +47,8 @@ class PDDrive:
     table: tuple[tuple[Time, Coordinate], ...] | CoordinateSine
     """Rows of time and target, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or each row held until
+    the next."""
     stiffness: JointStiffness
     """Gain on the position error."""
     damping: JointDamping

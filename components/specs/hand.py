@@ -43,7 +43,8 @@ class ProfileHand:
     """Rows of time, force and moment, sorted by time, the ends held; a sine; or a recorded log,
     `{ path, columns, units }`: [recorded hands](scenes.md#recorded-hands)."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or each row held until
+    the next."""
     damping: Damping | None = None
     """Damping of the handle to ground."""
 
@@ -67,7 +68,8 @@ class ArmHand:
     target: Path | PoseSine
     """Rows of time and pose, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or each row held until
+    the next."""
     timing: Literal["sampled", "continuous"] = "sampled"
     """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
     that at the end of its step."""
@@ -86,7 +88,8 @@ class SpringHand:
     target: Path | PoseSine = ((0.0, 0.0, 0.0, 0.0),)
     """Rows of time and pose, sorted by time, the ends held; a sine; or a recorded log."""
     interpolation: Interpolation = "linear"
-    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or the row before, held."""
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or each row held until
+    the next."""
     timing: Literal["sampled", "continuous"] = "sampled"
     """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
     that at the end of its step."""

@@ -63,8 +63,9 @@ def document(
             fmu["path"] = str(folder / fmu["path"])
     for _, table in find_traces(data) if folder else ():
         table["rate"] = {"trace": str(folder / table["rate"]["trace"])}
-    for _, holder, key in find_recorded_tables(data) if folder else ():
-        holder[key] = {**holder[key], "path": str(folder / str(holder[key]["path"]))}
+    if folder:
+        for _, holder, key in find_recorded_tables(data):
+            holder[key] = {**holder[key], "path": str(folder / str(holder[key]["path"]))}
     base, dropped = data.pop("extends", None), data.pop("drop", [])
 
     def refuse(message: str, key: str = "extends") -> SceneFault:

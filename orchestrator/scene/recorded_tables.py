@@ -2,7 +2,7 @@
 
     [hand]
     type = "profile"
-    table = { path = "log.csv", columns = ["t", "Fx", "Fy", "Tz"], units = ["ms", "N", "N", "N.mm"] }
+    table = { path = "log.csv", columns = ["t", "Fx", "Fy", "Tz"], units = ["ms", "N", "N", "N.m"] }
 
 The file is a CSV of numbers; a first line that is none has the names of its columns. Times count
 from the first row. A column that is named `F` stands for `F[1]`, `F[2]`, ... where these are there,
