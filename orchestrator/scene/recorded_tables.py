@@ -14,6 +14,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,22 @@ UNITS = {
     **{"mN.m": 1e-3, "N.mm": 1e-3, "N.cm": 1e-2},
 }
 """Factors to SI."""
-_KEYS = {"path", "columns", "units"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedTable:
+    """A recorded log, in place of rows of time."""
+
+    path: str
+    """A CSV file, relative to the scene's file."""
+    columns: tuple[str, ...] = ()
+    """The names of its columns: time, then the values; "1", "2", ... where it names none. By
+    default all."""
+    units: tuple[str, ...] = ()
+    """The unit of each column; by default SI."""
+
+
+_KEYS = {field.name for field in fields(RecordedTable)}
 
 
 def find_recorded_tables(
@@ -77,7 +93,7 @@ def read_recorded_table(given: Mapping[str, Any]) -> list[list[float]]:
 
 def _places(given: Mapping[str, Any], names: Sequence[str]) -> Iterator[int]:
     """The places of the columns that are asked for, by default all."""
-    for column in map(str, given.get("columns", names)):
+    for column in map(str, given.get("columns") or names):
         entries = takewhile(names.__contains__, (f"{column}[{i}]" for i in count(1)))
         found = [column] if column in names else [*entries]
         if not found:
@@ -86,7 +102,7 @@ def _places(given: Mapping[str, Any], names: Sequence[str]) -> Iterator[int]:
 
 
 def _factors(units: Any, size: int) -> list[float]:
-    if units is None:
+    if not units:
         return [1.0] * size
     for unit in units:
         if unit not in UNITS:

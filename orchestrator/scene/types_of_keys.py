@@ -11,11 +11,13 @@ from typing import Any
 
 from hapticlink.components.registry import Names
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.paths import AnySine
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.scene import registry_tables
 from hapticlink.orchestrator.scene.extends import SceneFile
 from hapticlink.orchestrator.scene.families import FamilyLinkage
 from hapticlink.orchestrator.scene.rates import Trace, VariableRate
+from hapticlink.orchestrator.scene.recorded_tables import RecordedTable
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, value
 
@@ -84,6 +86,8 @@ def find_quantities(
         yield kind, quantity
         if kind is VariableRate:
             yield Trace, None
+        if kind in typing.get_args(AnySine):
+            yield RecordedTable, None
 
 
 def is_needed(path: Path, of: Any = None) -> bool:

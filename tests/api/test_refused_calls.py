@@ -41,7 +41,7 @@ REFUSED: list[tuple[Callable[[Path, Path], object], str]] = [
     (lambda bar, out: hl.sweep(bar, {"duration": [0.1]}, jobs=0), "jobs 0: give 1 or more"),
     # what is shown
     (lambda bar, out: load_viewed_scene(str(written(out / "device.toml", DEVICE))),
-     r"device.toml: has no \[linkage\].*closed-loop-ideal"),
+     r"device.toml: has no \[linkage\].*closed-loop"),
 ]  # fmt: skip
 
 

@@ -124,7 +124,7 @@ def test_what_a_base_extends_in_vain_names_the_base(tmp_path):
     with pytest.raises(InputFault) as refused:
         open_scene.load(str(top))
     assert f"{base}, line 2: extends: closed-lop: neither a file" in str(refused.value)
-    assert "did you mean 'closed-loop-ideal'?" in str(refused.value)
+    assert "did you mean 'closed-loop'?" in str(refused.value)
 
 
 def test_scenes_in_two_folders_that_extend_each_other_are_a_circle(tmp_path):
@@ -206,10 +206,10 @@ def test_native_where_no_block_is_ours():
 
 
 @pytest.mark.parametrize(
-    ("options", "place"), [([], (11, None)), (["hold=foh"], (None, "--set hold=foh"))]
+    ("options", "place"), [([], (15, None)), (["hold=foh"], (None, "--set hold=foh"))]
 )
 def test_a_changed_copy_still_knows_where_it_was_written(tmp_path, options, place):
-    """`closed-loop-ideal` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 11."""
+    """`closed-loop` sets no spring, so that `pspm` fits nowhere; its `hold` is on line 15."""
     changed = replace(open_scene.load("closed-loop-ideal", options), hold="pspm")
     with pytest.raises(SceneFault) as refused:
         simulate(changed, tmp_path)

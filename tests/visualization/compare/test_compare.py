@@ -82,7 +82,7 @@ def test_errors_are_compared_until_the_first_end(root: Path) -> None:
 def test_other_scenes_are_told(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert status("compare", str(root / "slow"), str(root / "other")) == 0
     said = capsys.readouterr().out
-    assert "warning: different mechanisms: Five-bar in the hand; " in said
+    assert "warning: different mechanisms: Five-bar in the hand, idealised; " in said
     assert "operational point from that of the first run" not in said
 
 
