@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 4738,
+    "components": 4758,
     "fmus": 2618,
-    "orchestrator": 11524,
+    "orchestrator": 11606,
     "programs": 1098,
-    "analysis": 6446,
+    "analysis": 6491,
     "visualization": 3127,
     "api": 400,
-    "commands": 1325,
+    "commands": 1329,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
