@@ -19,6 +19,7 @@ from fuzz import (
     folders,
     hostile,
     loop_memory,
+    messages,
     misuse,
     options,
     page,
@@ -44,6 +45,7 @@ ATTACKS: dict[str, tuple[Callable[[int, int], Iterator[cases.Made]], int, tuple[
     "special_files": (special_files.attack, 300, OUTCOMES),
     "plugins": (plugins.attack, 200, WITH_BELIEVED),
     "misuse": (misuse.attack, 500, OUTCOMES),
+    "messages": (messages.attack, 300, OUTCOMES),
     "loop_memory": (loop_memory.attack, 100, WITH_BELIEVED),
     "page": (page.attack, 120, OUTCOMES),
 }
