@@ -32,8 +32,6 @@ from hapticlink.orchestrator.results.write_files import (
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
 RUN = "run.json"
-MAX_HEADER_BYTES = 1 << 28
-"""Of the names of a table's columns."""
 
 
 class RunFolder(RunResults):
@@ -132,7 +130,7 @@ def _has_rows(folder: Path) -> bool:
 
 def _is_longer_than_a_line(path: Path) -> bool:
     with path.open("rb") as file:
-        return bool(file.readline(MAX_HEADER_BYTES) and file.read(1))
+        return bool(file.readline(rows_file.MAX_HEADER) and file.read(1))
 
 
 def _list_files(folder: Path) -> set[str]:
