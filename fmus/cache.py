@@ -130,6 +130,13 @@ def _whole_file(entry: Path) -> Path | None:
     return None
 
 
+def forget(path: Path) -> None:
+    """Removes a file that `get_or_build` gave, which nobody can use."""
+    with suppress(OSError):
+        path.unlink()
+        path.parent.rmdir()
+
+
 _held: set[Path] = set()
 
 
