@@ -25,7 +25,8 @@ def record_duration(what: str) -> Iterator[float | None]:
     took, begun = known.get(what), monotonic()
     yield None if took is None else 60 * took
     if folder:
-        folder.mkdir(parents=True, exist_ok=True)
         known[what] = max((monotonic() - begun) / 60, took or 0.0)
-        with suppress(OSError), atomic_file(folder / FILE) as unfinished:
-            unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")
+        with suppress(OSError):
+            cache.private(folder)
+            with atomic_file(folder / FILE) as unfinished:
+                unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")

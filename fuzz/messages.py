@@ -1,5 +1,5 @@
-"""Messages of somebody who has the key, to a server of FMUs: calls in any order, with arguments that
-a run may send and others, mutated and cut; the server's own loop is not needed for that.
+"""Messages of somebody who has the key, to a server of FMUs: calls in any order, with arguments
+that a run may send and others, mutated and cut; the server's own loop is not needed for that.
 
 Whatever comes, each message gets an answer or is dropped, the server lives, its memory is bounded,
 and another run that comes afterwards steps the FMU as ever.

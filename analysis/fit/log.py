@@ -112,8 +112,8 @@ def _require_rate(path: Path, period: float) -> None:
     likely = [f"{rate:g} Hz in {u}" for u, rate in rates.items() if SLOWEST <= rate <= FASTEST]
     hint = f" (it would be {' or '.join(likely)})" if likely else ""
     raise InputFault(
-        f"{path}: its samples are {period:.4g} s apart, {1.0 / period:.4g} Hz, where {SLOWEST:g} to "
-        f"{FASTEST:g} Hz can be fitted: write time in s{hint}, or resample the log"
+        f"{path}: its samples are {period:.4g} s apart, {1.0 / period:.4g} Hz, where {SLOWEST:g} "
+        f"to {FASTEST:g} Hz can be fitted: write time in s{hint}, or resample the log"
     )
 
 

@@ -243,7 +243,8 @@ def _only_xml(text: bytes) -> BytesIO:
     """An archive with modelDescription.xml alone, since FMPy reads an archive or a file."""
     file = BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
-        archive.writestr("modelDescription.xml", text)
+        # By a record, which has a date of its own: a zip file holds none before 1980.
+        archive.writestr(zipfile.ZipInfo("modelDescription.xml"), text)
     return file
 
 

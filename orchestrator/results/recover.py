@@ -43,6 +43,7 @@ def recover(
 
 
 def _recover_tables(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
+    temporary_folders.clear_unfinished(folder)
     record = load(folder).record
     recovered = {}
     for name in record.rates:

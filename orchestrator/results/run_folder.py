@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.orchestrator.base import interrupt, text_files
+from hapticlink.orchestrator.base import interrupt, temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_record import (
@@ -44,6 +44,7 @@ class RunFolder(RunResults):
 
     def __init__(self, folder: Path, setup: RunSetup, csv: bool = True) -> None:
         super().__init__(folder)
+        temporary_folders.clear_unfinished(folder)
         self._csv, self._setup = csv, content(setup)
         # What the first row needs, before the time of the loop is taken.
         self._earlier = _list_files(folder)

@@ -75,7 +75,7 @@ class FileRecorder(Recorder):
             self._published = True
 
     def finish(self) -> None:
-        if self._file and self.last is not None:
+        if self._published:
             make_csv(self.path, rows_file.RowsFile(self.target))
 
     def discard(self) -> None:

@@ -47,8 +47,8 @@ is named: two files that name each other twice double with each level."""
 
 @dataclass
 class DocumentSize:
-    """What an SSP has unfolded to so far: files in files, parts, bytes of XML, and bytes of archives
-    in archives."""
+    """What an SSP has unfolded to so far: files in files, parts, bytes of XML, and bytes of
+    archives in archives."""
 
     files: int = 0
     parts: int = 0

@@ -44,7 +44,7 @@ def test_files_of_others_stay_as_they_are(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "KEY", 'public-key = "KEY"\nsecret-key = "KEY"', "\0" * 500])
 def test_what_is_no_key_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "key").write_text(text)
-    with pytest.raises(InputFault, match="no key: .*`hapticlink serve` has made"):
+    with pytest.raises(InputFault, match=r"no key: .*`hapticlink serve` has made"):
         key_file.read_key(tmp_path / "key")
 
 
@@ -60,7 +60,7 @@ def test_halves_of_two_keys_are_refused(tmp_path: Path) -> None:
 def test_what_has_no_end_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
-        with pytest.raises(InputFault, match="no key: .*: not a regular file"):
+        with pytest.raises(InputFault, match=r"no key: .*: not a regular file"):
             key_file.read_key(path)
     (tmp_path / "large").write_text("x" * (key_file.LARGEST + 1))
     with pytest.raises(InputFault, match="more than"):
