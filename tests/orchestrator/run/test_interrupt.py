@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-import hapticlink as hl
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.experiment import simulate
@@ -74,23 +73,6 @@ def test_a_signal_during_a_build_speaks_of_no_run(bar, tmp_path):
     environment = os.environ | {"HAPTICLINK_CACHE": "off"}
     ended = subprocess.run(command, capture_output=True, check=False, env=environment)
     assert (ended.returncode, ended.stderr.splitlines()[-1]) == (1, b"hapticlink: interrupted")
-
-
-def test_after_ctrl_c_no_handler_of_exceptions_goes_on(bar):
-    """As of a loop over runs that shall survive one that fails, and of a progress of one's own."""
-    runs, signals = [], [signal.SIGINT]
-
-    def progress(time: float) -> None:
-        if time > 0.0 and signals:
-            signal.raise_signal(signals.pop())
-
-    with pytest.raises(KeyboardInterrupt, match="interrupted at t = "):
-        for _ in range(3):
-            try:
-                runs.append(hl.run(bar, {"duration": 60}, figures=False, progress=progress))
-            except Exception as error:
-                runs.append(error)
-    assert not runs
 
 
 def children(pid: int) -> list[str]:
@@ -226,7 +208,6 @@ def test_a_second_signal_leaves_no_unfinished_file(tmp_path):
 import signal
 from pathlib import Path
 from hapticlink.fmus.atomic_file import atomic_file
-import hapticlink as hl
 from hapticlink.orchestrator.base import interrupt
 with interrupt.defer_signals(interrupt.end_process):
     with atomic_file(Path({str(tmp_path)!r}) / "whole.txt") as unfinished:
