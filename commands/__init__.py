@@ -145,6 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _status(arguments: Sequence[str] | None) -> int:
     try:
         interrupt.raise_if_interrupted()
+        _require_directory()
         given = sys.argv[1:] if arguments is None else list(arguments)
         for each in given:
             _require_unicode(each)
@@ -180,6 +181,13 @@ def _status(arguments: Sequence[str] | None) -> int:
 
         say(f"hapticlink: {internal_error.report_error(error)}", file=sys.stderr)
         return 1
+
+
+def _require_directory() -> None:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise InputFault("the current directory has been deleted: go to another one") from None
 
 
 def _require_unicode(argument: str) -> None:

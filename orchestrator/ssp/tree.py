@@ -202,10 +202,13 @@ def _schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(file=str(Path(__file__).parent / "schema" / f"{name}.xsd"))
 
 
-def units(root: Element, space: str = SSD) -> dict[str, Unit]:
-    """The units that a file defines, by name."""
+def units(path: Path, root: Element, space: str = SSD) -> dict[str, Unit]:
+    """The units that a file defines, by name. Raises InputFault for one that measures nothing."""
     every = root.iterfind(f"{{{space}}}Units/{{{SSC}}}Unit")
-    return {unit.name: unit for unit in (Unit.read(e, f"{{{SSC}}}") for e in every)}
+    try:
+        return {unit.name: unit for unit in (Unit.read(e, f"{{{SSC}}}") for e in every)}
+    except ValueError as why:
+        raise InputFault(f"{path}: {why}") from None
 
 
 @dataclass(frozen=True)
@@ -220,7 +223,7 @@ class Tree:
         root = parse_xml(file.path, file.entry, text, "SystemStructureDescription")
         element = root.find(f"{{{SSD}}}System")
         assert element is not None  # required by the schema
-        return root, self._part(replace(file, units=units(root)), element, place, {})
+        return root, self._part(replace(file, units=units(file.path, root)), element, place, {})
 
     def _part(
         self, file: File, element: Element, place: Place, known: Mapping[str, Dictionary]
@@ -280,7 +283,7 @@ def _dictionaries(file: File, system: Element, place: Place) -> dict[str, Dictio
     for element in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
         name = element.get("name", "")
         read = content(file, element, join_place(place, name), SSB, "SignalDictionary")
-        own = {**file.units, **units(read, SSB)}
+        own = {**file.units, **units(file.path, read, SSB)}
         entries = {
             e.get("name", ""): _unit(e, own) for e in read.iterfind(f"{{{SSB}}}DictionaryEntry")
         }

@@ -294,6 +294,13 @@ def test_parts_and_bytes_are_those_of_the_whole_document(tmp_path, monkeypatch):
                 read.tables(path)
 
 
+def test_a_unit_of_nothing_is_refused(tmp_path):
+    tail = TAIL.replace('factor="0.001"', 'factor="0"')
+    path = ssp(tmp_path, system("top", "", component("g", "Gives"), line("g.y", "g.u")), tail)
+    with pytest.raises(InputFault, match=r"their\.ssp: unit 'mm' has factor 0 and offset 0"):
+        read.tables(Path(path))
+
+
 def test_a_refused_fmu_does_not_stay_in_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "cache"))
     path = Path(ssp(tmp_path, system("top", "", component("g", "none"), line("g.y", "g.u"))))
