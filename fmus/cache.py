@@ -154,7 +154,11 @@ def _whole_file(entry: Path) -> Path | None:
     with suppress(OSError):  # it cannot be read: built, which tells whether it can be written
         for path in entry.glob("[!.]*.fmu"):
             stat = path.stat()
-            if _is_of_user(stat) and is_whole(path, stat.st_mtime_ns, stat.st_size):
+            if (
+                _is_of_user(stat)
+                and path.is_file()
+                and is_whole(path, stat.st_mtime_ns, stat.st_size)
+            ):
                 return path
     return None
 

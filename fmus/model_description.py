@@ -1,5 +1,5 @@
-"""The files that describe an FMU: its icon, licenses and modelDescription.xml of FMI 2.0.5 co-simulation;
-those of FMI 3.0.2 are in `model_description_fmi3`.
+"""The files that describe an FMU: its icon, its licenses, and modelDescription.xml of FMI 2.0.5
+co-simulation; those of FMI 3.0.2 are in `model_description_fmi3`.
 
 Value references count scalars from 0; the index in ModelStructure is the value reference + 1.
 """

@@ -15,6 +15,7 @@ from pathlib import Path
 from fuzz import (
     archives,
     c_interface,
+    caches,
     cases,
     folders,
     hostile,
@@ -42,6 +43,7 @@ ATTACKS: dict[str, tuple[Callable[[int, int], Iterator[cases.Made]], int, tuple[
     "c_interface": (c_interface.attack, 500_000, c_interface.OUTCOMES),
     "signals": (signals.attack, 300, OF_SIGNALS),
     "hostile": (hostile.attack, 300, hostile.OUTCOMES),
+    "caches": (caches.attack, 80, OUTCOMES),
     "folders": (folders.attack, 60, OUTCOMES),
     "special_files": (special_files.attack, 300, OUTCOMES),
     "plugins": (plugins.attack, 200, WITH_BELIEVED),

@@ -21,7 +21,18 @@ KINDS = ("bytes", "text", "elements", "annotation", "description", "nested")
 STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"
 _SCENE = re.compile(r"(<hapticlink:Scene>)(.*?)(</hapticlink:Scene>)", re.DOTALL)
 XML = (
-    *('encoding="martian"', "<!DOCTYPE a>", "&#0;", "&lol;", "<a>", "]]>", "1e999", "NaN", "-1"),
+    *(
+        'encoding="martian"',
+        "<!DOCTYPE a>",
+        "&#0;",
+        "&lol;",
+        "<a>",
+        "]]>",
+        "1e999",
+        "NaN",
+        "-1",
+        "0",
+    ),
     *("4294967297", "2147483649", "9" * 5000, "x" * 5000, "../../etc/passwd", "/etc/passwd"),
 )
 """Words that hurt where an attribute or some text stands."""

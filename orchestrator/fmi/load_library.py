@@ -165,7 +165,7 @@ def _store(content: bytes, digest: str) -> Path:
     name = f"{digest}{sharedLibraryExtension}"
     path = _libraries(fmu_cache.folder()) / name
     with suppress(OSError):
-        if hashlib.sha256(path.read_bytes()).hexdigest() == digest:
+        if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == digest:
             return path
     try:
         _write(path, content)

@@ -303,6 +303,23 @@ def test_a_cache_that_cannot_be_read_is_passed_by(place, room, monkeypatch, capl
     assert "cannot be used (Permission denied): gain.fmu is not kept" in caplog.text
 
 
+@pytest.mark.skipif(os.name != "posix", reason="pipes are files of Unix")
+def test_a_pipe_in_the_cache_is_not_waited_for(place, room):
+    path = get_or_build(MATERIAL, Builder(), room)
+    path.unlink()
+    os.mkfifo(path)
+    assert get_or_build(MATERIAL, Builder(), room) == path
+    assert path.is_file()
+
+
+@pytest.mark.parametrize("text", ["[]", '{"this": "long"}', "{", "\0"])
+def test_durations_that_are_damaged_are_not_known(place, text):
+    place.mkdir()
+    (place / durations.FILE).write_text(text)
+    with durations.record_duration("this") as took:
+        assert took is None
+
+
 def test_durations_need_no_cache(place, monkeypatch):
     monkeypatch.setattr(cache, "private", unreadable)
     with durations.record_duration("this") as took:
