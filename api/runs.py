@@ -11,7 +11,7 @@ from hapticlink.analysis.findings import summary
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
-from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted, describe_os_error
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.network import key_file
 from hapticlink.orchestrator.network.served_part import NOWHERE, Servers
@@ -109,7 +109,7 @@ def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
 
 
 def _in_folder(simulated: Callable[..., Experiment], folder: Path, figures: bool) -> Run:
-    ended = simulated(folder, keep_rows=True)
+    ended = simulated(folder, keep_rows=True, locked=True)
     try:
         return _describe_run(folder, ended, figures)
     finally:
@@ -129,9 +129,11 @@ def _describe_run(folder: Path, ended: Experiment, figures: bool) -> Run:
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None
+    except InputFault as why:  # of run.json, which this run has written
+        raise ended.outcome.fault or Fault(f"the record of the run was changed: {why}") from None
     except OSError as error:  # a full disk; the rows are there, and why the run ended is told
         message = "%s has the results of the run, not all of its figures: %s"
-        logging.getLogger(__name__).warning(message, folder, error.strerror or error)
+        logging.getLogger(__name__).warning(message, folder, describe_os_error(error, folder))
     return Run(folder, run, without_rows(results), numbers=found.numbers)
 
 

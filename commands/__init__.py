@@ -11,7 +11,13 @@ from cyclopts import App, CycloptsError, Parameter
 
 from hapticlink.components.registry import Registry, no_function
 from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
-from hapticlink.orchestrator.base.errors import Fault, InputFault
+from hapticlink.orchestrator.base.errors import (
+    Fault,
+    InputFault,
+    Interrupted,
+    describe_memory_error,
+    describe_os_error,
+)
 from hapticlink.orchestrator.base.terminal_output import say
 
 app = App(
@@ -20,6 +26,8 @@ app = App(
     help_format="markdown",
     version_flags=["--version"],
 )
+app.suppress_keyboard_interrupt = app.meta.suppress_keyboard_interrupt = False
+"""An Interrupted has a message and a status of its own."""
 COMMANDS: Registry[str | Callable[..., Any]] = Registry(
     "command",
     {
@@ -137,6 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _status(arguments: Sequence[str] | None) -> int:
     try:
         interrupt.raise_if_interrupted()
+        _require_directory()
         given = sys.argv[1:] if arguments is None else list(arguments)
         for each in given:
             _require_unicode(each)
@@ -146,14 +155,18 @@ def _status(arguments: Sequence[str] | None) -> int:
         return status or 0
     except CycloptsError:  # cyclopts has printed it
         return 2
-    except Fault as fault:
+    except (Fault, Interrupted) as fault:
         say(f"hapticlink: {fault}", file=sys.stderr)
         return fault.exit_status
     except BrokenPipeError:  # the reader has closed the pipe, such as `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a full disk, a folder that may not be written
-        say(f"hapticlink: {error}", file=sys.stderr)
+        told = describe_os_error(error, error.filename) if error.filename else error
+        say(f"hapticlink: {told}", file=sys.stderr)
+        return 1
+    except MemoryError as error:
+        say(f"hapticlink: {describe_memory_error(error)}", file=sys.stderr)
         return 1
     except Exception as error:
         if message := plugins.blame_plugin(error):
@@ -168,6 +181,13 @@ def _status(arguments: Sequence[str] | None) -> int:
 
         say(f"hapticlink: {internal_error.report_error(error)}", file=sys.stderr)
         return 1
+
+
+def _require_directory() -> None:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise InputFault("the current directory has been deleted: go to another one") from None
 
 
 def _require_unicode(argument: str) -> None:

@@ -22,6 +22,11 @@ def recover(folder: Folder, /) -> int:
     tables = recover(folder)
     for name, table in tables.items():
         say(f"{folder / name}.csv: {table.rows} rows to {table.time:.6g} s")
+        if table.damaged:
+            say(
+                f"  the next of its rows has no time after that: {table.damaged} rows from it on "
+                f"stay in {folder / name}.rows"
+            )
     if not tables:
         say(f"{folder}: there is nothing to recover")
     return 0

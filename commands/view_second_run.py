@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from hapticlink.orchestrator.base.errors import Fault
+from hapticlink.orchestrator.base.errors import Fault, Interrupted
 from hapticlink.visualization.live_and_standalone.viewed_scene import unpack_scene
 from hapticlink.visualization.live_page.server_pipe import Pipe, read_message, to_caller
 
@@ -22,7 +22,7 @@ def main() -> None:
     from hapticlink.visualization.live_page.session import LiveSession
 
     root, scene, settings = arguments
-    with suppress(Fault):  # the page's server has ended
+    with suppress(Fault, Interrupted):  # the page's server has ended
         LiveSession(unpack_scene(scene), link, Path(root), hl.RealTime, settings, paused=True).run()
 
 

@@ -32,11 +32,12 @@ VERSIONS = ("hapticlink", "casadi", "pythonfmu")
 
 def folder() -> Path | None:
     """The cache folder: HAPTICLINK_CACHE, by default in the user's cache folder; None if
-    HAPTICLINK_CACHE is "off"."""
+    HAPTICLINK_CACHE is "off", or if other users may put files there."""
     chosen = os.environ.get("HAPTICLINK_CACHE")
     if chosen == "off":
         return None
-    return Path(chosen) if chosen else user_folder()
+    root = Path(chosen) if chosen else user_folder()
+    return root if is_own(root) else None
 
 
 def user_folder() -> Path:
@@ -48,6 +49,33 @@ def user_folder() -> Path:
     else:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "hapticlink"
+
+
+_told: set[Path] = set()
+
+
+def is_own(folder: Path) -> bool:
+    """Whether a folder of the cache, from which code is loaded, is this user's or root's, and not
+    open to all; one that is not is logged once. True of what is not there."""
+    try:
+        status = folder.stat()
+    except OSError:  # reported when it is used
+        return True
+    if os.name != "posix" or (_is_of_user(status) and not status.st_mode & 0o002):
+        return True
+    if folder not in _told:
+        _told.add(folder)
+        who = "everybody may write to it" if _is_of_user(status) else "it is another user's"
+        logging.getLogger(__name__).warning(
+            "the cache %s is not used, since %s and its files are run as code; name one of your "
+            "own by HAPTICLINK_CACHE",
+            folder, who,
+        )  # fmt: skip
+    return False
+
+
+def _is_of_user(status: os.stat_result) -> bool:
+    return sys.platform == "win32" or status.st_uid in (os.geteuid(), 0)
 
 
 def private(folder: Path) -> None:
@@ -123,11 +151,23 @@ def get_or_build(
 
 
 def _whole_file(entry: Path) -> Path | None:
-    for path in entry.glob("[!.]*.fmu"):
-        stat = path.stat()
-        if is_whole(path, stat.st_mtime_ns, stat.st_size):
-            return path
+    with suppress(OSError):  # it cannot be read: built, which tells whether it can be written
+        for path in entry.glob("[!.]*.fmu"):
+            stat = path.stat()
+            if (
+                _is_of_user(stat)
+                and path.is_file()
+                and is_whole(path, stat.st_mtime_ns, stat.st_size)
+            ):
+                return path
     return None
+
+
+def forget(path: Path) -> None:
+    """Removes a file that `get_or_build` gave, which nobody can use."""
+    with suppress(OSError):
+        path.unlink()
+        path.parent.rmdir()
 
 
 _held: set[Path] = set()
@@ -179,7 +219,7 @@ def _build(
         stored = _store(built, root, entry)
     except OSError as error:
         logging.getLogger(__name__).warning(
-            "the cache %s cannot be written (%s): %s is not kept; name another by HAPTICLINK_CACHE",
+            "the cache %s cannot be used (%s): %s is not kept; name another by HAPTICLINK_CACHE",
             root, error.strerror or error, built.name,
         )  # fmt: skip
         return built

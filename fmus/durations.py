@@ -20,12 +20,15 @@ def record_duration(what: str) -> Iterator[float | None]:
     known, and records how long it takes, unless an exception ends it."""
     folder, known = cache.folder(), dict[str, float]()
     if folder:
-        with suppress(OSError, ValueError):
-            known = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        with suppress(OSError, ValueError, AttributeError, TypeError):  # it may be damaged
+            if (folder / FILE).is_file():
+                read = json.loads((folder / FILE).read_text(encoding="utf-8"))
+                known = {name: float(minutes) for name, minutes in read.items()}
     took, begun = known.get(what), monotonic()
     yield None if took is None else 60 * took
     if folder:
-        folder.mkdir(parents=True, exist_ok=True)
         known[what] = max((monotonic() - begun) / 60, took or 0.0)
-        with suppress(OSError), atomic_file(folder / FILE) as unfinished:
-            unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")
+        with suppress(OSError):
+            cache.private(folder)
+            with atomic_file(folder / FILE) as unfinished:
+                unfinished.write_text(json.dumps(known, indent=1), encoding="utf-8")

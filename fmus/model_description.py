@@ -1,5 +1,5 @@
-"""The files that describe an FMU: its icon and modelDescription.xml of FMI 2.0.5 co-simulation;
-those of FMI 3.0.2 are in `model_description_fmi3`.
+"""The files that describe an FMU: its icon, its licenses, and modelDescription.xml of FMI 2.0.5
+co-simulation; those of FMI 3.0.2 are in `model_description_fmi3`.
 
 Value references count scalars from 0; the index in ModelStructure is the value reference + 1.
 """
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree as ET
 
-from hapticlink.fmus import model_description_fmi3
+from hapticlink.fmus import licenses, model_description_fmi3
 from hapticlink.fmus.description_common import Described, annotation, as_text, definitions, icon
 from hapticlink.fmus.scalar_variables import ScalarVariable
 
@@ -19,9 +19,10 @@ def files(
 ) -> dict[str, bytes]:
     """The files that describe an FMU, without a date, so that the same arguments give the same
     bytes. guid: of FMI 3.0 the instantiation token. sources: the C files in sources/ to compile."""
+    common = {licenses.ENTRY: licenses.licenses(about.needs_tool)}
     if fmi == 3:
-        return model_description_fmi3.files(about, guid, sources)
-    return {"modelDescription.xml": _text(about, guid, sources), "model.png": icon(about)}
+        return common | model_description_fmi3.files(about, guid, sources)
+    return common | {"modelDescription.xml": _text(about, guid, sources), "model.png": icon(about)}
 
 
 def _text(about: Described, guid: str, sources: Iterable[str]) -> bytes:

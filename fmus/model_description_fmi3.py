@@ -141,8 +141,8 @@ def _terminals(arrays: Iterable[ArrayVariable]) -> bytes:
 def _build_description(identifier: str, sources: Iterable[str]) -> bytes:
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
-    # A fused multiply-add rounds once, and would change the results.
-    options = {"language": "C11", "compilerOptions": "-ffp-contract=off"}
+    # A fused multiply-add rounds once, and would change the results. gcc has this option, too.
+    options = {"language": "C11", "compiler": "clang", "compilerOptions": "-ffp-contract=off"}
     listed = ET.SubElement(configuration, "SourceFileSet", options)
     for name in sources:
         ET.SubElement(listed, "SourceFile", name=name)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import socket
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -36,6 +37,15 @@ def _listing(path: Path) -> None:
     path.mkdir(exist_ok=True)
 
 
+def _rows(path: Path, content: bytes) -> None:
+    """As of a run that was killed, whatever was to be spoiled."""
+    for suffix in (".csv", ".rows"):
+        path.with_name(f"haptics{suffix}").unlink(missing_ok=True)
+    path.with_name("haptics.rows").write_bytes(content)
+
+
+HEADER = b"time,a.y\n".ljust(16, b"\n") + (3).to_bytes(8, "little")
+NAN, DISORDER = [0.0, 1.0, float("nan"), 1.0, 2.0, 1.0], [0.0, 1.0, 2.0, 1.0, 1.0, 1.0]
 KINDS: dict[str, Callable[[Path], object]] = {
     "a pipe": os.mkfifo,
     "a folder": Path.mkdir,
@@ -47,6 +57,11 @@ KINDS: dict[str, Callable[[Path], object]] = {
     "a socket": _socket,
     "brackets": lambda path: path.write_text("[" * 100_000),
     "one line": lambda path: path.write_text("x" * 2_000_000),
+    "rows of nothing": lambda path: _rows(path, b""),
+    "rows without a header": lambda path: _rows(path, bytes(100)),
+    "rows that are cut": lambda path: _rows(path, HEADER + bytes(20)),
+    "rows without a time": lambda path: _rows(path, HEADER + struct.pack("<6d", *NAN)),
+    "rows in disorder": lambda path: _rows(path, HEADER + struct.pack("<6d", *DISORDER)),
     "no text": lambda path: path.write_bytes(bytes(range(256)) * 40),
 }
 

@@ -17,11 +17,22 @@ from fuzz.commands import Place
 from fuzz.processes import own_folder
 
 SCENES = ("pendulum", "sampled-spring", "closed-loop-ideal")
-KINDS = ("bytes", "text", "elements", "annotation", "description")
+KINDS = ("bytes", "text", "elements", "annotation", "description", "nested")
 STRUCTURE, DESCRIPTION = "SystemStructure.ssd", "modelDescription.xml"
 _SCENE = re.compile(r"(<hapticlink:Scene>)(.*?)(</hapticlink:Scene>)", re.DOTALL)
 XML = (
-    *('encoding="martian"', "<!DOCTYPE a>", "&#0;", "&lol;", "<a>", "]]>", "1e999", "NaN", "-1"),
+    *(
+        'encoding="martian"',
+        "<!DOCTYPE a>",
+        "&#0;",
+        "&lol;",
+        "<a>",
+        "]]>",
+        "1e999",
+        "NaN",
+        "-1",
+        "0",
+    ),
     *("4294967297", "2147483649", "9" * 5000, "x" * 5000, "../../etc/passwd", "/etc/passwd"),
 )
 """Words that hurt where an attribute or some text stands."""
@@ -79,11 +90,40 @@ def annotation(content: bytes, draw: random.Random) -> bytes:
 CHANGES = {"text": text, "elements": elements, "annotation": annotation}
 
 
+def nested(files: dict[str, bytes], draw: random.Random) -> dict[str, bytes]:
+    """The document with further files in it that name each other, or it, once or more often."""
+    space = "http://ssp-standard.org/SSP1/SystemStructureDescription"
+    depth, width = draw.choice((1, 5, 12, 31, 40)), draw.choice((1, 2, 3, 50))
+    for i in range(depth):
+        after = draw.choice((f"{i + 1}.ssd", f"{i + 1}.ssd", f"{draw.randrange(depth)}.ssd"))
+        parts = "".join(
+            f'<ssd:Component name="c{k}" type="application/x-ssp-definition" source="{after}"/>'
+            for k in range(width)
+        )
+        files[f"{i}.ssd"] = (
+            f'<ssd:SystemStructureDescription xmlns:ssd="{space}" name="n" version="1.0">'
+            f'<ssd:System name="s"><ssd:Elements>{parts}</ssd:Elements></ssd:System>'
+            "</ssd:SystemStructureDescription>"
+        ).encode()
+    files[f"{depth}.ssd"] = draw.choice((files["0.ssd"], files[STRUCTURE], b"<a/>"))
+    inner = b'<ssd:Component name="inner" type="application/x-ssp-definition" source="0.ssd"/>'
+    end = b"</ssd:Elements>"
+    if draw.random() < 0.3:  # a package in a package, again and again
+        files["in.ssp"] = zipped(files)
+        inner = b"".join(
+            b'<ssd:Component name="p%d" type="application/x-ssp-package" source="in.ssp"/>' % k
+            for k in range(width)
+        )
+    return files | {STRUCTURE: files[STRUCTURE].replace(end, inner + end, 1)}
+
+
 def changed(kind: str, content: bytes, draw: random.Random) -> bytes:
     if kind == "bytes":
         return mutations.flipped(content, draw)
     files = entries(content)
-    if kind == "description":
+    if kind == "nested":
+        files = nested(files, draw)
+    elif kind == "description":
         name = draw.choice([name for name in files if name.endswith(".fmu")])
         inside = entries(files[name])
         change = draw.choice((text, elements))

@@ -14,7 +14,12 @@ import numpy as np
 
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import Fault
+from hapticlink.orchestrator.base.errors import (
+    Fault,
+    InputFault,
+    Interrupted,
+    describe_os_error,
+)
 from hapticlink.orchestrator.describe_run import setup
 from hapticlink.orchestrator.host import crash_monitor, host_state
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
@@ -76,7 +81,12 @@ class Experiment:
         if self.outcome.published:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
-                return load(self.folder, from_rows=True, record=record)
+                try:
+                    return load(self.folder, from_rows=True, record=record)
+                except InputFault as why:  # which this run has written
+                    raise self.outcome.fault or Fault(
+                        f"the results are gone, or were changed while the run wrote them: {why}"
+                    ) from None
             return with_record(Results(None, self.run, self.memory.tables()), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
@@ -130,6 +140,7 @@ def simulate(
     keep_rows: bool = False,
     in_memory: bool = False,
     remote: Servers = NOWHERE,
+    locked: bool = False,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -139,14 +150,18 @@ def simulate(
     rows of this one are written. Without `csv` the tables stay in the binary form in which a run
     writes them, with `keep_rows` beside the CSVs, until `remove_rows`. `in_memory`: nothing is
     written, unless the tables are too long (`IN_MEMORY`) or an FMU of others, which may crash the
-    process, runs in it. remote: the FMUs that run on other computers.
+    process, runs in it. remote: the FMUs that run on other computers. locked: the caller holds the
+    lock of the folder.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
     read = open_scene.load(scene, options)
     with ExitStack() as stack:
-        if not in_memory:
+        if not (in_memory or locked):
             stack.enter_context(folder_lock.lock_folder(folder))
-        every = stack.enter_context(build_system(read))
+        try:
+            every = stack.enter_context(build_system(read))
+        except Interrupted:
+            raise Interrupted(when="before the run") from None
         system = place_remote_fmus(choose_fetched(every), read, remote)
         plan = Plan(system)
         plan.check()
@@ -166,7 +181,8 @@ def simulate(
             return Experiment(
                 read, system, outcome, folder, before, outcome.ending(build_time), memory
             )
-        stack.enter_context(folder_lock.lock_folder(folder))
+        if in_memory:
+            stack.enter_context(folder_lock.lock_folder(folder))
         csv = csv and read.record.format == "csv"
         with RunFolder(folder, before, csv) as results:
             with (
@@ -179,7 +195,7 @@ def simulate(
                 results.end(outcome.ending(build_time), tables)
             except OSError as error:
                 if outcome.fault is None:
-                    outcome.fault = Fault(f"{folder}: {error.strerror or error}")
+                    outcome.fault = Fault(describe_os_error(error, folder))
                     outcome.reason = "fault"
                 results.end_in_place(outcome.ending(build_time))
             outcome.published = results.published

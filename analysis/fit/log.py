@@ -25,6 +25,11 @@ UNEVEN = 0.01
 """Of the sampling period, up to which samples are evenly spaced."""
 LEAST = 256
 """Samples."""
+SLOWEST, FASTEST = 20.0, 1e5
+"""Sampling rates (Hz): below, a log says nothing of a hand, and a window of the fit has four
+samples; above, a window has more than the fit has memory for, and no device is sampled so fast."""
+UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units in which labs write times (s)."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,8 @@ class Log:
 
 def read_log(path: Path | str) -> Log:
     """The log in a CSV or HDF5 file (`.h5`, `.hdf5`), or that of a run in its folder. Raises
-    InputFault for a file without the pose, or whose samples are not evenly spaced or finite."""
+    InputFault for a file without the pose, or whose samples are not finite, not evenly spaced, or
+    come at a rate that no device has."""
     path = Path(path)
     if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
         path = path / "haptics.csv"
@@ -67,9 +73,10 @@ def read_log(path: Path | str) -> Log:
         )
     signals = {name: table[name] for name, there in names.items() if there}
     for name, values in signals.items():
-        if name != "time" and values.shape[1:] != PLANE.pose.shape:
+        wanted = () if name == "time" else PLANE.pose.shape
+        if values.shape[1:] != wanted:
             raise InputFault(
-                f"{path}: {name} has {values.shape[1:]} entries a sample, not {PLANE.size}"
+                f"{path}: {name} has a shape of {values.shape[1:]} a sample, not {wanted}"
             )
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
@@ -78,6 +85,7 @@ def read_log(path: Path | str) -> Log:
     if len(steps) < LEAST:
         raise InputFault(f"{path}: {len(steps) + 1} samples; {LEAST + 1} are needed")
     period = float(np.mean(steps))
+    _require_rate(path, period)
     if np.abs(steps - period).max() > UNEVEN * period:
         row = int(np.argmax(np.abs(steps - period))) + 1
         raise InputFault(
@@ -91,6 +99,21 @@ def read_log(path: Path | str) -> Log:
         hand=signals.get(HAND_WRENCH),
         held=of_run,
         hand_type=_hand_type(run) if of_run else "",
+    )
+
+
+def _require_rate(path: Path, period: float) -> None:
+    """Raises InputFault for a mean time between samples (s) that no log of a device has."""
+    if not period > 0.0:
+        raise InputFault(f"{path}: its time does not grow from row to row: write when (s) each was")
+    if SLOWEST <= 1.0 / period <= FASTEST:
+        return
+    rates = {u: 1.0 / period / size for u, size in UNITS.items()}
+    likely = [f"{rate:g} Hz in {u}" for u, rate in rates.items() if SLOWEST <= rate <= FASTEST]
+    hint = f" (it would be {' or '.join(likely)})" if likely else ""
+    raise InputFault(
+        f"{path}: its samples are {period:.4g} s apart, {1.0 / period:.4g} Hz, where {SLOWEST:g} "
+        f"to {FASTEST:g} Hz can be fitted: write time in s{hint}, or resample the log"
     )
 
 

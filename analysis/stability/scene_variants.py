@@ -19,7 +19,12 @@ from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.errors import Fault, FmuFault, InputFault
+from hapticlink.orchestrator.base.errors import (
+    Fault,
+    FmuFault,
+    InputFault,
+    Interrupted,
+)
 from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.overrides import Options
@@ -74,7 +79,7 @@ class SceneVariants:
         try:
             if kind != self._kind or not self._moved(starts):
                 self._load(read, kind)
-        except Fault:
+        except (Fault, Interrupted):
             self._kind = None
             raise
         self._starts = starts

@@ -50,7 +50,9 @@ def work(job: Job, folder: Path | None, judge: Judge) -> Row:
         try:
             return judge(job, results)
         except Fault as fault:
-            return failed(REFUSED if _of_scene(fault) else _retried(fault), str(fault))
+            return failed(REFUSED if _of_scene(fault) else DIED, str(fault))
+        except Interrupted as interrupted:
+            return failed(INTERRUPTED, str(interrupted))
         except Exception as error:  # the other jobs of the sweep go on
             return failed(DIED, f"{type(error).__name__}: {error}")
         finally:
@@ -64,7 +66,10 @@ def run(job: Job, results: Path, measure: Measure = measure) -> Row:
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
     experiment = simulate(job.scene, results, csv=False, in_memory=True)
     row, fault = measure(experiment), experiment.outcome.fault
-    return row if fault is None or _of_scene(fault) else row | {"end": _retried(fault)}
+    if fault is None or _of_scene(fault):
+        return row
+    # The next sweep repeats it.
+    return row | {"end": INTERRUPTED if isinstance(fault, Interrupted) else DIED}
 
 
 @contextmanager
@@ -81,14 +86,9 @@ def _room(job: Job, folder: Path | None) -> Iterator[Path]:
         shutil.rmtree(room, ignore_errors=True)
 
 
-def _of_scene(fault: Fault) -> bool:
+def _of_scene(fault: Fault | Interrupted) -> bool:
     """Whether a repetition of the run would give the same fault."""
     return fault.repeatable and not isinstance(fault.__cause__, OSError)
-
-
-def _retried(fault: Fault) -> str:
-    """The end of a run whose fault is not caused by its scene, which the next sweep repeats."""
-    return INTERRUPTED if isinstance(fault, Interrupted) else DIED
 
 
 def sweep(

@@ -18,7 +18,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
@@ -207,21 +207,29 @@ def _zig(arguments: Iterable[str], folder: Path, target: str) -> None:
 
 @contextmanager
 def linker_cache(target: str) -> Iterator[dict[str, str]]:
-    """The environment variables to link for a target; none where no cache can be written."""
-    root = cache.user_folder() / "zig"
-    if ZIG_CACHE not in os.environ and _writable(root):
-        with lock.hold_lock(root / f"{target}.lock", lambda: None):
-            yield {ZIG_CACHE: str(root / target)}
-    else:
+    """The environment variables to link for a target: of a cache in the user's folder, else in that
+    of built FMUs, else of one for this once; none where the user has chosen zig's own."""
+    if ZIG_CACHE in os.environ:
         yield {}
+        return
+    with ExitStack() as stack:
+        for folder in (cache.user_folder(), cache.folder()):
+            if folder and cache.is_own(folder) and _is_writable(root := folder / "zig"):
+                with suppress(OSError):
+                    held = lock.hold_lock(root / f"{target}.lock", lambda: None)
+                    stack.enter_context(held)
+                    yield {ZIG_CACHE: str(root / target)}
+                    return
+        yield {ZIG_CACHE: stack.enter_context(tempfile.TemporaryDirectory())}
 
 
-def _writable(folder: Path) -> bool:
+def _is_writable(folder: Path) -> bool:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        cache.private(folder.parent)
+        cache.private(folder)
     except OSError:
         return False
-    return os.access(folder, os.W_OK)
+    return os.access(folder, os.W_OK | os.X_OK)
 
 
 _CPU = {0x01000007: 3, 0x0100000C: 0}  # x86-64 and ARM64, with the subtype "all" of each

@@ -17,6 +17,20 @@ def shorten(text: str, most: int = 100) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
+def describe_os_error(error: OSError, place: object) -> str:
+    """The file, or `place` where the system names none, and what is wrong there."""
+    return f"{error.filename or place}: {error.strerror or error}"
+
+
+def describe_memory_error(error: MemoryError) -> str:
+    """What was to be allocated, where that is told, and a remedy."""
+    what = f" ({error})" if str(error) else ""
+    return (
+        f"there is not enough memory{what}: end other programs, or take a shorter duration, a "
+        "smaller scene, or fewer outputs ([record])"
+    )
+
+
 class Fault(Exception):
     """A failure that is reported in one message, without a traceback.
 
@@ -92,10 +106,14 @@ class AsksToEnd(FmuFault):
     """An FMU requests the end of the simulation within a step; this is no error."""
 
 
-class Interrupted(Fault):
-    """The user ended the run (Ctrl-C), at a time (s) or before it began."""
+class Interrupted(KeyboardInterrupt):
+    """The user ended the work (Ctrl-C), `when`, or a run at a time (s). No Exception, so that no
+    `except Exception` of a caller goes on after it."""
 
-    def __init__(self, time: float | None = None) -> None:
+    exit_status = 1
+    repeatable = False
+
+    def __init__(self, time: float | None = None, when: str = "") -> None:
         self.time = time
-        when = "before the run" if time is None else f"at t = {time:.6g} s"
-        super().__init__(f"interrupted {when}")
+        when = when if time is None else f"at t = {time:.6g} s"
+        super().__init__(f"interrupted {when}".strip())

@@ -67,6 +67,23 @@ def clear(ended: int | None = None) -> None:
                 shutil.rmtree(entry.path, ignore_errors=True)
 
 
+UNFINISHED = re.compile(r"\..+\.(?:rows\.(\d+)|(\d+)\.[0-9a-f]{32}(?:\.\w+)?)")
+"""The names of files that a process of that number is writing: of `atomic_file`, and its rows."""
+
+
+def clear_unfinished(folder: Path, ended: int | None = None) -> None:
+    """Removes what processes that have ended were writing to a folder of results, whose lock is
+    held; ended: as in `clear`."""
+    if os.name != "posix":
+        return
+    for path in folder.iterdir():
+        if match := UNFINISHED.fullmatch(path.name):
+            owner = int(match[1] or match[2])
+            if owner == ended or not lives(owner):
+                with suppress(OSError):
+                    path.unlink()
+
+
 def lives(process: int) -> bool:
     """Whether a process exists. Not for Windows, where asking may end it."""
     try:

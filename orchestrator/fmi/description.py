@@ -3,6 +3,7 @@ and its timing."""
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -16,9 +17,10 @@ from xml.etree import ElementTree
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
 from hapticlink.components.ports import Kind, Power, SpringPorts
-from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.fmi import annotation, clocks
 from hapticlink.orchestrator.fmi.archive import open_archive, read_xml, require_whole
+from hapticlink.orchestrator.fmi.model_structure import check_structure
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import (
     TYPES,
@@ -155,6 +157,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         if sizes:
             content = _set_sizes(tree, sizes)
         try:
+            check_structure(tree, version)
             model = read_model_description(_only_xml(content), validate=False)
             variables = _variables(tree, model, version, resized=bool(sizes))
             ticking = tuple(clocks.read_clocks(tree))
@@ -195,11 +198,18 @@ def _version(path: Path, tree: ElementTree.Element) -> str:
             f"{path}: it is for scheduled execution only, where a scheduler activates its model "
             "partitions and preempts them; a run takes steps: export it for co-simulation"
         )
-    if version.partition(".")[0] not in ("2", "3") or not cosimulates:
+    needed = "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
+    if version.partition(".")[0] not in ("2", "3"):
+        raise InputFault(f"{path}: it is of FMI {version}: {needed}; export it again")
+    if not re.fullmatch(r"\d+(\.\d+)*", version):  # 3.0-beta.2
         raise InputFault(
-            f"{path}: FMI version {version}, co-simulation: {cosimulates}; "
-            "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
+            f"{path}: it is of FMI {version}, a draft of the standard, whose functions have "
+            f"changed since: {needed}; export it again with a newer tool"
         )
+    if not cosimulates:
+        model = tree.find("ModelExchange") is not None
+        what = "for model exchange, without a solver" if model else "without <CoSimulation>"
+        raise InputFault(f"{path}: it is {what}: {needed}; export it for co-simulation")
     return version[0]
 
 
@@ -243,7 +253,8 @@ def _only_xml(text: bytes) -> BytesIO:
     """An archive with modelDescription.xml alone, since FMPy reads an archive or a file."""
     file = BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
-        archive.writestr("modelDescription.xml", text)
+        # By a record, which has a date of its own: a zip file holds none before 1980.
+        archive.writestr(zipfile.ZipInfo("modelDescription.xml"), text)
     return file
 
 
@@ -258,7 +269,13 @@ def _require_binary(archive: zipfile.ZipFile, identifier: str, fmi: str) -> None
     if wanted in archive.NameToInfo:
         return
     parts = (name.split("/") for name in archive.namelist() if name.startswith("binaries/"))
-    there = sorted({p[1] for p in parts if len(p) > 2 and p[2]})
+    every = [(p[1], p[2]) for p in parts if len(p) > 2 and p[2]]
+    if named := sorted({name for platform, name in every if platform == here}):
+        raise InputFault(
+            f"{archive.filename}: its modelIdentifier is {identifier!r}, and binaries/{here} has "
+            f"{', '.join(named[:SHOWN])}, not {Path(wanted).name}: rename the one or the other"
+        )
+    there = sorted({platform for platform, _ in every})
     raise InputFault(
         f"{archive.filename}: no binary for this platform ({wanted}), only for "
         f"{', '.join(there) or 'none'}; take an FMU that was built for {here}"

@@ -162,14 +162,23 @@ def find_shared_library(folder: Path, library: Path) -> Path | None:
 
 
 def _store(content: bytes, digest: str) -> Path:
-    path = _libraries(fmu_cache.folder()) / f"{digest}{sharedLibraryExtension}"
+    name = f"{digest}{sharedLibraryExtension}"
+    path = _libraries(fmu_cache.folder()) / name
     with suppress(OSError):
-        if hashlib.sha256(path.read_bytes()).hexdigest() == digest:
+        if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == digest:
             return path
+    try:
+        _write(path, content)
+    except OSError:  # the cache is full, say
+        path = _libraries(None) / name
+        _write(path, content)
+    return path
+
+
+def _write(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)  # where the cache has been removed meanwhile
     with atomic_file(path) as unfinished:
         unfinished.write_bytes(content)
-    return path
 
 
 @cache

@@ -14,6 +14,7 @@ from threading import Lock
 
 from fmpy import extract
 
+from hapticlink.fmus.atomic_file import name_in_errors
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.description import PLATFORMS, Description, describe
 
@@ -86,7 +87,8 @@ def unpack(description: Description, folder: str) -> str:
 def _extract(path: Path, folder: str, own: bool) -> str:
     folder = folder or temporary_folders.make_folder()
     try:
-        extract(path, folder, _is_needed if own else None)
+        with name_in_errors(folder):
+            extract(path, folder, _is_needed if own else None)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise

@@ -27,12 +27,19 @@ class Unit:
 
     @classmethod
     def read(cls, element: Element, space: str = "") -> Unit:
-        """The unit of a Unit element of FMI, or of SSP, whose namespace is `space`."""
+        """The unit of a Unit element of FMI, or of SSP, whose namespace is `space`. Raises
+        ValueError for a factor or offset that measures nothing."""
         name, base = element.get("name", ""), element.find(f"{space}BaseUnit")
         if base is None:
             return cls(name)
         powers = tuple(int(base.get(b, "0")) for b in BASES)
-        return cls(name, powers, float(base.get("factor", "1")), float(base.get("offset", "0")))
+        factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+        if not (factor and math.isfinite(factor) and math.isfinite(offset)):
+            raise ValueError(
+                f"unit {name!r} has factor {factor:g} and offset {offset:g}: a unit is a finite "
+                "number of its base unit, and not 0"
+            )
+        return cls(name, powers, factor, offset)
 
 
 @dataclass(frozen=True)

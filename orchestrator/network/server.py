@@ -36,6 +36,8 @@ BOUNDED = {"sndhwm": 64, "rcvhwm": 64, "backlog": 16}
 """Messages of a connection that wait, and connections that are not accepted yet."""
 KINDS = 50
 """Kinds of refusals that are told apart: nobody fills the memory with them."""
+SETTERS, SLOTS = 1000, 4
+"""Groups of inputs that a run may connect to an FMU, and states of it that a run may save."""
 BACK = 1e-9
 """Seconds by which a step may begin before the end of the one before it: rounding."""
 PHASES = {
@@ -57,8 +59,11 @@ class ServedFmu(HostedFmu):
         self.newest: tuple[str, Any] | None = None
         self.heard = monotonic_ns()
         self.phase = "loaded"
-        self._reached, self._sizes = -np.inf, list[int]()
+        self._reached, self._saved = -np.inf, set[int]()
+        self._groups: dict[tuple[str, ...], int] = {}
+        """The inputs of each setter, and its key."""
         scalars = {s.name: s for s in fmu.description.outputs}
+        self._restores = fmu.description.restores_state
         outputs = request.arguments[1]
         if not all(type(name) is str and name in scalars for name in outputs):
             raise Malformed("hello: outputs that the FMU does not have")
@@ -69,31 +74,51 @@ class ServedFmu(HostedFmu):
         self.load(fmu.name, kept, fmu.starts, policy)
 
     def connect(self, names: Sequence[str]) -> int:
-        """Raises Malformed for what no run asks for."""
+        """The key of a setter, that which these inputs have where they have one. Raises Malformed
+        for what no run asks for."""
         if not all(type(name) is str and name in self._inputs for name in names):
             raise Malformed("connect: inputs that the FMU does not have")
-        key = super().connect(names)
-        self._sizes.append(len(names))
-        return key
+        group = tuple(names)
+        if len({*group}) < len(group):
+            raise Malformed("connect: an input twice")
+        if group not in self._groups:
+            if len(self._groups) == SETTERS:
+                raise Malformed(f"connect: more than {SETTERS} groups of inputs")
+            self._groups[group] = super().connect(group)
+        return self._groups[group]
 
     def carry_out(self, request: Request) -> Any:
         """What the call returns. Raises Malformed, or the fault of the FMU."""
         call, arguments = request.call, request.arguments
         if call not in PHASES[self.phase]:
             raise Malformed(f"{call} is not allowed now ({self.phase})")
+        sizes = [len(group) for group in self._groups]
         for key, values in request.pending:
-            if not (0 <= key < len(self._sizes) and len(values) == 8 * self._sizes[key]):
+            if not (0 <= key < len(sizes) and len(values) == 8 * sizes[key]):
                 raise Malformed("inputs of another size")
         if call == "step":
             time, _, size = arguments
             if not (time >= self._reached - BACK and size > 0):
                 raise Malformed(f"a step from {time:g} s, where the FMU is at {self._reached:g} s")
             self._reached = time + size
+        elif call in ("save", "rollback"):
+            self._require_slot(call, arguments[0])
+        result = self.called(request.pending, call, arguments)
+        if call == "save":
+            self._saved.add(arguments[0])
         elif call == "rollback":
             self._reached = -np.inf
-        result = self.called(request.pending, call, arguments)
         self.phase = NEXT.get(call, self.phase)
         return result
+
+    def _require_slot(self, call: str, slot: int) -> None:
+        """Raises Malformed where the FMU has no states, or no such one."""
+        if not self._restores:
+            raise Malformed(f"{call}: the FMU cannot save its state")
+        if not 0 <= slot < SLOTS:
+            raise Malformed(f"{call}: slot {slot}, where there are 0 to {SLOTS - 1}")
+        if call == "rollback" and slot not in self._saved:
+            raise Malformed(f"rollback: no state was saved in slot {slot}")
 
     def close(self) -> dict[str, int]:
         self.phase = "closed"
@@ -157,11 +182,23 @@ class Server:
         except (Malformed, InputFault) as why:
             self._refuse(str(why))
             return self._packed(request, received, "refused", str(why))
+        except Exception as error:  # a mistake of ours, which ends this run and no other
+            return self._packed(request, received, "refused", self._give_up(request, error))
         packed = self._packed(request, received, kind, content)
         if session := self._session(request):
             session.number, session.heard = request.number, received
             session.newest = kind, content
         return packed
+
+    def _give_up(self, request: Request, error: Exception) -> str:
+        """Close the FMU of a run whose call has raised what nobody foresaw; what to tell of it."""
+        why = f"{request.call} has failed in the server: {type(error).__name__}: {error}"[:1000]
+        self._refuse(why)
+        if session := self._session(request):
+            session.phase = "closed"
+            with suppress(Exception):
+                session.close()
+        return why
 
     def _packed(self, request: Request, received: int, kind: str, content: Any) -> bytes:
         times = request.number, request.sent, received, monotonic_ns()
@@ -239,7 +276,10 @@ def _bind(address: str, key: Key, say: Callable[[str], object]) -> Iterator[Any]
             socket.bind(f"tcp://{address}")
         except zmq.ZMQError as error:
             raise InputFault(f"--listen {address}: {error}: choose another") from None
-        say(f"serves at {address}")
+        host, _, port = address.rpartition(":")
+        if port == "0":  # the system has chosen one
+            port = socket.getsockopt_string(zmq.LAST_ENDPOINT).rpartition(":")[2]
+        say(f"serves at {host}:{port}")
         yield socket
     finally:
         authenticator.stop()

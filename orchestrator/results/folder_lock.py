@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,26 +13,18 @@ from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folders
 
-_holders: dict[tuple[int, int], int] = {}
-"""The thread that holds the lock of a folder of this process, by device and inode."""
-
 
 @contextmanager
 def lock_folder(folder: Path) -> Iterator[None]:
     """Within the context no other run, of this process or another one of this machine, writes to
     `folder`, which is created if necessary and removed again if it stays empty. The lock ends with
-    the process, and leaves no file. A thread may enter the context again.
+    the process, and leaves no file.
 
     Raises InputFault at once where another run holds the lock, or where the folder cannot be
     written to.
     """
     missing = [p for p in (folder, *folder.parents) if not os.path.exists(p)]
     folders.ensure(folder)
-    status = folder.stat()
-    key = status.st_dev, status.st_ino
-    if _holders.get(key) == threading.get_ident():
-        yield
-        return
     file = folder / ".run.lock"  # on Windows, where a folder has no lock of its own
     try:
         with lock.try_lock(file if sys.platform == "win32" else folder) as locked:
@@ -43,11 +34,7 @@ def lock_folder(folder: Path) -> Iterator[None]:
                     f"--out {folder}: another run writes there{known}; wait for its end, or name "
                     "another folder"
                 )
-            _holders[key] = threading.get_ident()
-            try:
-                yield
-            finally:
-                del _holders[key]
+            yield
         file.unlink(missing_ok=True)
     finally:
         with suppress(OSError):  # it has results

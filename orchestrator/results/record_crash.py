@@ -20,8 +20,7 @@ def record_crash(folder: Path, process: int) -> None:
     from hapticlink.orchestrator.results.recover import recover
 
     temporary_folders.clear(process)
-    for unfinished in folder.glob(f".*.{process}"):
-        unfinished.unlink()
+    temporary_folders.clear_unfinished(folder, process)
     remedy = (
         "an FMU may have crashed it: with isolate = true each FMU has a process of its own, and "
         "the run names the one that crashes"

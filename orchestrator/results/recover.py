@@ -13,6 +13,7 @@ from hapticlink.orchestrator.base import temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folder_lock, rows_file
 from hapticlink.orchestrator.results.read_results import load
+from hapticlink.orchestrator.results.rows_file import RowsFile
 from hapticlink.orchestrator.results.run_folder import RUN
 from hapticlink.orchestrator.results.write_files import make_csv, remove_rows, write_json
 
@@ -20,10 +21,12 @@ KILLED = "the process of the run was killed"
 
 
 class Recovered(NamedTuple):
-    """Rows of a table, and the time of the last one (s)."""
+    """Rows of a table, and the time of the last one (s); and how many behind it are damaged, which
+    stay where they are."""
 
     rows: int
     time: float
+    damaged: int = 0
 
 
 def recover(
@@ -40,16 +43,22 @@ def recover(
 
 
 def _recover_tables(folder: Path, kind: str, message: str) -> dict[str, Recovered]:
+    temporary_folders.clear_unfinished(folder)
     record = load(folder).record
     recovered = {}
     for name in record.rates:
         table = folder / f"{name}.csv"
         if table.with_suffix(rows_file.SUFFIX).is_file():
-            rows = make_csv(table)
+            rows = RowsFile(table.with_suffix(rows_file.SUFFIX))
+            damaged = rows.keep_ordered()
+            make_csv(table, rows)
             newest = rows[len(rows) - 1 :] if len(rows) else np.zeros((1, 1))
-            recovered[name] = Recovered(len(rows), float(newest[0, 0]))
-            remove_rows(table)
-    changes: dict[str, Any] = {"recovered": {name: r._asdict() for name, r in recovered.items()}}
+            recovered[name] = Recovered(len(rows), float(newest[0, 0]), damaged)
+            if not damaged:
+                remove_rows(table)
+    changes: dict[str, Any] = {
+        "recovered": {name: {"rows": r.rows, "time": r.time} for name, r in recovered.items()}
+    }
     if record.end.process is not None:
         last = load(folder).last_time  # its tables may be whole: an FMU may crash at its end
         changes["end"] = {"reason": "fault", "time": last}

@@ -26,6 +26,8 @@ AT_A_TIME = 1 << 16
 """Bytes of rows that are made text at a time."""
 RESERVED = 1 << 18
 """Bytes that a file grows by: fewer calls of Python and of the file system than with 64 kB."""
+MAX_HEADER = 1 << 28
+"""Bytes of the names of a table's columns."""
 COUNT = 8
 """Bytes of the number of rows."""
 Rows = NDArray[np.float64]
@@ -34,19 +36,33 @@ Rows = NDArray[np.float64]
 class RowsFile:
     """The rows of a table in a file, of which those that are asked for are mapped.
 
-    Raises InputFault for a file whose header names no columns.
+    Raises InputFault for a file whose header names no columns, `time` the first.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         with path.open("rb") as file:
-            line = file.readline()
+            line = file.readline(MAX_HEADER)
             self.columns = _columns(line, path)
             self._begin = _data(line)
             file.seek(self._begin - COUNT)
             count = int.from_bytes(file.read(COUNT), "little", signed=True)
             whole = (os.fstat(file.fileno()).st_size - self._begin) // (8 * len(self.columns))
         self._count = max(min(count, whole), 0)
+
+    def keep_ordered(self) -> int:
+        """Leave out the rows from the first on whose time is not finite or before that of the row
+        above, as a machine that failed may leave them; their number."""
+        before, last = self._count, -np.inf
+        step = max(AT_A_TIME // (8 * len(self.columns)), 1)
+        for first in range(0, before, step):
+            times = self[first : first + step][:, 0]
+            good = np.isfinite(times) & (times >= np.r_[last, times[:-1]])
+            if not good.all():
+                self._count = first + int(good.argmin())
+                break
+            last = times[-1]
+        return before - self._count
 
     def __len__(self) -> int:
         return self._count
@@ -172,9 +188,13 @@ def _data(line: bytes) -> int:
 
 def _columns(line: bytes, path: Path) -> tuple[str, ...]:
     try:
-        return tuple(next(csv.reader([line.decode()])))
-    except (csv.Error, UnicodeDecodeError, StopIteration) as error:
+        columns = tuple(next(csv.reader([line.decode()]), ()))
+    except (csv.Error, UnicodeDecodeError) as error:
         raise InputFault(f"{path}: its header names no columns: {error}") from error
+    if columns[:1] != ("time",):
+        first = columns[0][:40] if columns else ""
+        raise InputFault(f"{path}: its first column is {first!r}, not 'time'")
+    return columns
 
 
 def _quote(name: str) -> str:

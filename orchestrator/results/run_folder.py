@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
-from hapticlink.orchestrator.base import interrupt, text_files
+from hapticlink.orchestrator.base import interrupt, temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_record import (
@@ -32,8 +32,6 @@ from hapticlink.orchestrator.results.write_files import (
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
 RUN = "run.json"
-MAX_HEADER_BYTES = 1 << 28
-"""Of the names of a table's columns."""
 
 
 class RunFolder(RunResults):
@@ -46,6 +44,7 @@ class RunFolder(RunResults):
 
     def __init__(self, folder: Path, setup: RunSetup, csv: bool = True) -> None:
         super().__init__(folder)
+        temporary_folders.clear_unfinished(folder)
         self._csv, self._setup = csv, content(setup)
         # What the first row needs, before the time of the loop is taken.
         self._earlier = _list_files(folder)
@@ -132,7 +131,7 @@ def _has_rows(folder: Path) -> bool:
 
 def _is_longer_than_a_line(path: Path) -> bool:
     with path.open("rb") as file:
-        return bool(file.readline(MAX_HEADER_BYTES) and file.read(1))
+        return bool(file.readline(rows_file.MAX_HEADER) and file.read(1))
 
 
 def _list_files(folder: Path) -> set[str]:

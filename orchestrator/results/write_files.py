@@ -75,8 +75,8 @@ class FileRecorder(Recorder):
             self._published = True
 
     def finish(self) -> None:
-        if self._file and self.last is not None:
-            make_csv(self.path)
+        if self._published:
+            make_csv(self.path, rows_file.RowsFile(self.target))
 
     def discard(self) -> None:
         """Remove the rows, where they are not published."""
@@ -91,13 +91,10 @@ class FileRecorder(Recorder):
             self.discard()
 
 
-def make_csv(path: Path) -> rows_file.RowsFile:
-    """Make the CSV `path` of its rows, which stay and are returned. Raises OSError, as on a full
-    disk."""
-    table = rows_file.RowsFile(path.with_suffix(rows_file.SUFFIX))
+def make_csv(path: Path, table: rows_file.RowsFile) -> None:
+    """Make the CSV `path` of its rows, which stay. Raises OSError, as on a full disk."""
     with atomic_file(path) as unfinished, unfinished.open("xb") as file:
         rows_file.write_csv(table, file)
-    return table
 
 
 def remove_rows(path: Path) -> None:

@@ -10,7 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from hapticlink.orchestrator.base import interrupt, plugins
-from hapticlink.orchestrator.base.errors import AsksToEnd, Diverged, Fault, Interrupted
+from hapticlink.orchestrator.base.errors import (
+    AsksToEnd,
+    Diverged,
+    Fault,
+    Interrupted,
+    describe_memory_error,
+    describe_os_error,
+)
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.host import host_state
 from hapticlink.orchestrator.plan.plan import Plan
@@ -39,7 +46,7 @@ class Outcome:
 
     end_time: float = 0.0
     reason: str = "duration"
-    fault: Fault | None = None
+    fault: Fault | Interrupted | None = None
     asked: str = ""
     published: bool = False
     wall_time: float = 0.0
@@ -57,14 +64,19 @@ class Outcome:
             case AsksToEnd(fmu=fmu, what=what):
                 self.reason, self.asked = "terminated", f"{fmu} {what}"
             case Interrupted():
-                self.reason, self.fault = "interrupted", error
+                known = error.time is not None
+                self.reason = "interrupted"
+                self.fault = error if known else Interrupted(when="before the run")
             case Diverged():
                 self.reason, self.fault = "diverged", error
             case Fault():
                 self.reason, self.fault = "fault", error
             case OSError():  # a full disk, most of all
                 self.reason = "fault"
-                self.fault = Fault(f"{results.folder}: {error.strerror or error}")
+                self.fault = Fault(describe_os_error(error, results.folder))
+            case MemoryError():
+                self.reason = "fault"
+                self.fault = Fault(describe_memory_error(error))
             case KeyboardInterrupt():  # a second signal does not wait for the end of the event
                 self.reason, self.fault = "interrupted", Interrupted(results.last)
             case _:

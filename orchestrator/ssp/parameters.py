@@ -91,7 +91,9 @@ class Parameters:
             where = f"parameters of {join_place(part.place)}"
             set_ = content(file, binding, where, SSV, "ParameterSet")
             given = [
-                *self._values({**file.units, **units(set_, SSV)}, set_, binding.get("prefix", ""))
+                *self._values(
+                    {**file.units, **units(file.path, set_, SSV)}, set_, binding.get("prefix", "")
+                )
             ]
             mapping = binding.find(f"{{{SSD}}}ParameterMapping")
             if mapping is not None:

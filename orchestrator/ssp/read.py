@@ -128,7 +128,13 @@ def _describe_components(system: SsdElement, room: Path) -> dict[Place, Descript
         if part.source:
             file, entry = part.source
             if (file.path, entry) not in known:
-                known[file.path, entry] = describe(_unpack_fmu(room, file, entry, part.place))
+                unpacked = _unpack_fmu(room, file, entry, part.place)
+                try:
+                    known[file.path, entry] = describe(unpacked)
+                except InputFault as why:
+                    cache.forget(unpacked)
+                    where = f"{file.path}: {join_place(part.place)}: {entry}"
+                    raise InputFault(str(why).replace(str(unpacked), where)) from None
             fmus[part.place] = known[file.path, entry]
     return fmus
 

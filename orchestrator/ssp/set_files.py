@@ -56,7 +56,7 @@ def _binding(path: Path) -> tuple[File, Element]:
     archive = zipfile.ZipFile(BytesIO(), "a")
     archive.filename = str(path)
     try:
-        archive.writestr(path.name, path.read_bytes())
+        archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes())  # dated by no clock
     except OSError as error:
         raise InputFault(f"--set-file {path}: {error.strerror}; give an .ssv") from None
     return File(path, archive), Element("ParameterBinding", source=quote(path.name))

@@ -21,7 +21,12 @@ from lxml import etree
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import variables
-from hapticlink.orchestrator.fmi.archive import open_archive, read_xml
+from hapticlink.orchestrator.fmi.archive import (
+    MAX_BYTES,
+    MAX_XML_BYTES,
+    open_archive,
+    read_xml,
+)
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit
 from hapticlink.orchestrator.ssp.names import DEFINITION, FMU, PACKAGE, SSB, SSC, SSD, STRUCTURE
 
@@ -35,15 +40,55 @@ DEEPEST = 32
 """Systems in systems in which a component may be a file with further ones."""
 
 
+MOST_FILES, MOST_PARTS = 1000, 100_000
+"""Files in files of a document, and its systems, components and dictionaries, each as often as it
+is named: two files that name each other twice double with each level."""
+
+
+@dataclass
+class DocumentSize:
+    """What an SSP has unfolded to so far: files in files, parts, bytes of XML, and bytes of
+    archives in archives."""
+
+    files: int = 0
+    parts: int = 0
+    xml: int = 0
+    archives: int = 0
+
+    def grow(self, path: Path, **more: int) -> None:
+        """Add to it. Raises InputFault beyond a bound."""
+        bounds = {
+            "files": (MOST_FILES, "files in files"),
+            "parts": (MOST_PARTS, "systems and components"),
+            "xml": (MAX_XML_BYTES, "bytes of XML"),
+            "archives": (MAX_BYTES, "bytes in archives in it"),
+        }
+        for name, count in more.items():
+            setattr(self, name, total := getattr(self, name) + count)
+            most, what = bounds[name]
+            if total > most:
+                raise InputFault(
+                    f"{path}: the document has more than {most} {what}, counted as often as they "
+                    "are named: name each file in fewer places, or split the document"
+                )
+
+
 @dataclass(frozen=True)
 class File:
     """An .ssd, an entry of an archive, with the units that it defines. path: for errors, of the
-    archive, or of its place in another one."""
+    archive, or of its place in another one. size: of the document that it belongs to."""
 
     path: Path
     archive: zipfile.ZipFile
     entry: str = STRUCTURE
     units: Mapping[str, Unit] = field(default_factory=dict)
+    size: DocumentSize = field(default_factory=DocumentSize, compare=False)
+
+    def read_entry(self, entry: str) -> bytes:
+        """An XML entry of the archive, as `read_xml`."""
+        text = read_xml(self.archive, entry)
+        self.size.grow(self.path, xml=len(text))
+        return text
 
     def resolved(self, source: str) -> str:
         """The entry of the archive that a relative URI refers to."""
@@ -144,7 +189,7 @@ def content(file: File, element: Element, where: str, space: str, kind: str) -> 
     entry, schema = element.get("source"), space.rpartition("/")[2]
     if entry:
         entry = file.resolved(entry)
-        return parse_xml(file.path, entry, read_xml(file.archive, entry), schema)
+        return parse_xml(file.path, entry, file.read_entry(entry), schema)
     inside = next(element.iter(f"{{{space}}}{kind}"), None)
     if inside is None:
         raise InputFault(f"{file.path}: {where}: a {kind} has neither source nor content")
@@ -157,10 +202,13 @@ def _schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(file=str(Path(__file__).parent / "schema" / f"{name}.xsd"))
 
 
-def units(root: Element, space: str = SSD) -> dict[str, Unit]:
-    """The units that a file defines, by name."""
+def units(path: Path, root: Element, space: str = SSD) -> dict[str, Unit]:
+    """The units that a file defines, by name. Raises InputFault for one that measures nothing."""
     every = root.iterfind(f"{{{space}}}Units/{{{SSC}}}Unit")
-    return {unit.name: unit for unit in (Unit.read(e, f"{{{SSC}}}") for e in every)}
+    try:
+        return {unit.name: unit for unit in (Unit.read(e, f"{{{SSC}}}") for e in every)}
+    except ValueError as why:
+        raise InputFault(f"{path}: {why}") from None
 
 
 @dataclass(frozen=True)
@@ -171,11 +219,11 @@ class Tree:
 
     def root(self, file: File, place: Place = ()) -> tuple[Element, SsdElement]:
         """The content of an .ssd, and its root system as the element at `place`."""
-        text = read_xml(file.archive, file.entry)
+        text = file.read_entry(file.entry)
         root = parse_xml(file.path, file.entry, text, "SystemStructureDescription")
         element = root.find(f"{{{SSD}}}System")
         assert element is not None  # required by the schema
-        return root, self._part(replace(file, units=units(root)), element, place, {})
+        return root, self._part(replace(file, units=units(file.path, root)), element, place, {})
 
     def _part(
         self, file: File, element: Element, place: Place, known: Mapping[str, Dictionary]
@@ -184,6 +232,7 @@ class Tree:
         the systems around it. Raises InputFault for elements that are not supported and for names
         that are not unique."""
         path, where = file.path, join_place(place)
+        file.size.grow(path, parts=1)
         connectors = {
             c.get("name", ""): _connector(file, place, c)
             for c in element.iterfind(f"{{{SSD}}}Connectors/{{{SSD}}}Connector")
@@ -215,12 +264,16 @@ class Tree:
             raise InputFault(
                 f"{file.path}: {join_place(place)}: more than {DEEPEST} files in files"
             )
+        file.size.grow(file.path, files=1)
         if element.get("type") == PACKAGE:
             if entry not in file.archive.NameToInfo:
                 raise InputFault(f"{file.path}: {join_place(place)}: there is no {entry!r} in it")
-            path, content = file.path / entry, BytesIO(file.archive.read(entry))
+            path, packed = file.path / entry, file.archive.NameToInfo[entry].file_size
+            file.size.grow(path, archives=packed)
+            content = BytesIO(file.archive.read(entry))
             archive = self.archives.enter_context(open_archive(path, "SSP", content))
-            return self.root(File(path, archive), place)[1]
+            file.size.grow(path, archives=sum(e.file_size for e in archive.infolist()))
+            return self.root(File(path, archive, size=file.size), place)[1]
         return self.root(replace(file, entry=entry), place)[1]
 
 
@@ -230,7 +283,7 @@ def _dictionaries(file: File, system: Element, place: Place) -> dict[str, Dictio
     for element in system.iterfind(f"{{{SSD}}}SignalDictionaries/{{{SSD}}}SignalDictionary"):
         name = element.get("name", "")
         read = content(file, element, join_place(place, name), SSB, "SignalDictionary")
-        own = {**file.units, **units(read, SSB)}
+        own = {**file.units, **units(file.path, read, SSB)}
         entries = {
             e.get("name", ""): _unit(e, own) for e in read.iterfind(f"{{{SSB}}}DictionaryEntry")
         }

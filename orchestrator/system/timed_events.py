@@ -130,4 +130,20 @@ def _numbers(name: str, value: Value, scalars: tuple[Scalar, ...]) -> tuple[floa
         raise ValueError(f"{name} = {texts[0]!r}: give numbers")
     if len(numbers) != len(scalars):
         raise ValueError(f"{len(numbers)} values for the {len(scalars)} of {name}")
+    for scalar, number in zip(scalars, numbers, strict=True):
+        _require_type(scalar, number)
     return tuple(map(float, numbers))
+
+
+def _require_type(scalar: Scalar, number: bool | float) -> None:
+    """Raises ValueError for a value that the variable's type does not hold: none is rounded."""
+    if scalar.type == "Boolean":
+        takes = "" if number in (0, 1) else "true or false"
+    elif isinstance(number, bool):
+        takes = "a number"
+    else:
+        fits = scalar.type in ("Real", "Float64", "Float32") or float(number).is_integer()
+        takes = "" if fits else "a whole number"
+    if takes:
+        given = str(number).lower()
+        raise ValueError(f"{given}: {scalar.name}, of type {scalar.type}, takes {takes}")

@@ -308,3 +308,23 @@ def test_a_disk_that_is_full_for_the_figures_keeps_the_run(
     assert made.fault is None
     assert "No space left on device" in caplog.text
     assert hl.load(tmp_path).run["end"]["reason"] == "duration"
+
+
+def test_after_ctrl_c_no_handler_of_exceptions_goes_on():
+    """As of a loop over runs that shall survive one that fails, and of a progress of one's own."""
+    runs, signals = [], [signal.SIGINT]
+
+    def progress(time: float) -> None:
+        if time > 0.0 and signals:
+            signal.raise_signal(signals.pop())
+
+    def loop() -> None:
+        for _ in range(3):
+            try:
+                runs.append(hl.run("pendulum", {"duration": 60}, progress=progress))
+            except Exception as error:
+                runs.append(error)
+
+    with pytest.raises(KeyboardInterrupt, match="interrupted at t = "):
+        loop()
+    assert not runs

@@ -18,7 +18,7 @@ from fmpy.validation import validate_fmu
 
 from hapticlink.components.component import Block, Variable
 from hapticlink.fmus.blocks import build_block
-from hapticlink.fmus.build_fmu import build
+from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
 from hapticlink.fmus.python_fmu_entries import entries
 from hapticlink.fmus.write_fmu import findings, write_fmu
@@ -182,3 +182,15 @@ def test_another_name_is_refused_by_fmpy(name: str, tmp_path: Path) -> None:
     with pytest.raises(FmuError, match=r"(?s)`gain` fails validation.*is not a legal"):
         write_fmu(renamed(name), tmp_path, "gain")
     assert not [*tmp_path.iterdir()]
+
+
+def test_fmus_have_the_licenses_of_what_they_contain(tmp_path):
+    """pythonfmu's asks to be in all copies; native FMUs have none."""
+    for made, names in (
+        (build(sample_components.stateless(), tmp_path / "python"), ["hapticlink", "pythonfmu"]),
+        (build_native(sample_components.stateless(), tmp_path / "native"), ["hapticlink"]),
+    ):
+        with zipfile.ZipFile(made) as archive:
+            text = archive.read("documentation/licenses/license.txt").decode()
+        assert re.findall(r"^(\w+)\n-+$", text, re.M) == names
+        assert text.count("Permission is hereby granted") == len(names)

@@ -9,14 +9,17 @@ import time
 import zipfile
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 import hapticlink as hl
-from hapticlink.fmus import cache, lock
+from hapticlink.fmus import cache, durations, lock
 from hapticlink.fmus.build_fmu import build
 from hapticlink.fmus.cache import get_or_build
 from hapticlink.fmus.check import check_fmu
+from hapticlink.fmus.native import compiler
+from hapticlink.orchestrator.fmi import load_library
 from tests.fmus import sample_components
 
 MATERIAL = {"scene": {"mass": 1.0, "rates": [512, 30]}}
@@ -140,7 +143,7 @@ def test_a_cache_that_cannot_be_written_is_told_and_done_without(place, room, ca
     path = get_or_build(MATERIAL, Builder(), room)
     assert path.is_relative_to(room)
     assert check_fmu(path) == []
-    assert f"the cache {place} cannot be written" in caplog.text
+    assert f"the cache {place} cannot be used" in caplog.text
 
 
 def test_processes_of_two_machines_end_with_one_whole_file(place, room, monkeypatch):
@@ -259,3 +262,96 @@ def test_locks_and_libraries_lie_where_no_other_user_gets(
     for folder in (root, root / "locks", root / "libraries"):
         assert folder.stat().st_mode & 0o777 == 0o700
     assert not [*(root / "locks").iterdir()]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="owners and modes of Unix")
+@pytest.mark.parametrize("others", ["mode", "owner"])
+def test_a_cache_that_others_can_write_is_not_used(place, room, monkeypatch, caplog, others):
+    """What lies in it is run as code. It is told once."""
+    get_or_build(MATERIAL, Builder(), room)
+    if others == "mode":
+        place.chmod(0o777)
+    else:
+        monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+        monkeypatch.setattr(cache, "_is_of_user", lambda status: status.st_uid == os.geteuid())
+    builder = Builder()
+    for _ in range(2):
+        assert get_or_build(MATERIAL, builder, room).is_relative_to(room)
+    assert builder.calls == 2
+    assert caplog.text.count("is not used, since") == 1
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid(), reason="only root gives files away")
+def test_a_file_of_another_user_in_the_cache_is_built_again(place, room):
+    builder = Builder()
+    path = get_or_build(MATERIAL, builder, room)
+    os.chown(path, 12345, 12345)
+    assert get_or_build(MATERIAL, builder, room) == path
+    assert builder.calls == 2
+    assert path.stat().st_uid == 0
+
+
+def unreadable(*_: object) -> NoReturn:
+    raise PermissionError(13, "Permission denied")
+
+
+def test_a_cache_that_cannot_be_read_is_passed_by(place, room, monkeypatch, caplog):
+    monkeypatch.setattr(cache, "is_whole", unreadable)
+    get_or_build(MATERIAL, Builder(), room)
+    monkeypatch.setattr(cache, "private", unreadable)
+    assert get_or_build(MATERIAL, Builder(), room).is_relative_to(room)
+    assert "cannot be used (Permission denied): gain.fmu is not kept" in caplog.text
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes are files of Unix")
+def test_a_pipe_in_the_cache_is_not_waited_for(place, room):
+    path = get_or_build(MATERIAL, Builder(), room)
+    path.unlink()
+    os.mkfifo(path)
+    assert get_or_build(MATERIAL, Builder(), room) == path
+    assert path.is_file()
+
+
+@pytest.mark.parametrize("text", ["[]", '{"this": "long"}', "{", "\0"])
+def test_durations_that_are_damaged_are_not_known(place, text):
+    place.mkdir()
+    (place / durations.FILE).write_text(text)
+    with durations.record_duration("this") as took:
+        assert took is None
+
+
+def test_durations_need_no_cache(place, monkeypatch):
+    monkeypatch.setattr(cache, "private", unreadable)
+    with durations.record_duration("this") as took:
+        assert took is None
+
+
+def test_a_library_of_python_fmus_needs_no_room_in_the_cache(place, monkeypatch):
+    """Where the cache is full it lies in a folder of this process."""
+    real, full = load_library._write, []
+
+    def write(path: Path, content: bytes) -> None:
+        if path.is_relative_to(place):
+            full.append(path)
+            raise OSError(28, "No space left on device")
+        real(path, content)
+
+    monkeypatch.setattr(load_library, "_write", write)
+    stored = load_library._store(b"a library", "0" * 64)
+    assert stored.read_bytes() == b"a library"
+    assert full
+
+
+@pytest.mark.parametrize("cached", [True, False])
+def test_the_linker_has_a_cache_where_the_home_is_read_only(tmp_path, monkeypatch, cached):
+    """In the folder of HAPTICLINK_CACHE, else for this once."""
+    monkeypatch.delenv(compiler.ZIG_CACHE, raising=False)
+    home, own = tmp_path / "home", tmp_path / "own"
+    home.write_text("a file, in which nothing can be made")
+    monkeypatch.setattr(cache, "user_folder", lambda: home / "hapticlink")
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(own) if cached else "off")
+    with compiler.linker_cache("here") as chosen:
+        folder = Path(chosen[compiler.ZIG_CACHE])
+        assert folder.is_relative_to(own) == cached
+        (folder / "inside").mkdir(parents=True)
+    assert folder.exists() == cached

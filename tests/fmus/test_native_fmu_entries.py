@@ -47,6 +47,7 @@ from hapticlink.fmus.blocks import component
 from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.fmus.errors import FmuError
+from hapticlink.fmus.licenses import ENTRY
 from hapticlink.fmus.native import compile_library, compiler, split_functions
 from hapticlink.fmus.native.compiler import linker_cache
 from hapticlink.fmus.native.source import component_source
@@ -331,7 +332,13 @@ def test_the_archive_is_self_contained(native_fmus, tmp_path):
         archive.extractall(tmp_path)
     (library,) = (n for n in names if n.startswith("binaries/"))
     others = {n for n in names if not n.startswith("sources/")}
-    assert others == {library, "documentation/index.html", "model.png", "modelDescription.xml"}
+    assert others == {
+        library,
+        ENTRY,
+        "documentation/index.html",
+        "model.png",
+        "modelDescription.xml",
+    }
     assert b"python" not in (tmp_path / library).read_bytes().lower()
     description = (tmp_path / "modelDescription.xml").read_text()
     assert 'needsExecutionTool="false"' in description

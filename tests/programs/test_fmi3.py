@@ -174,6 +174,8 @@ def test_terminals_and_description_of_the_build_fit_the_standard() -> None:
         schema = etree.XMLSchema(file=str(SCHEMAS / f"fmi3{name[0].upper()}{name[1:]}.xsd"))
         assert schema.validate(text), schema.error_log
     assert {file.get("name") for file in read["buildDescription"].iter("SourceFile")} == files
+    (set_of_files,) = read["buildDescription"].iter("SourceFileSet")
+    assert set_of_files.get("compiler") == "clang"  # whose the options are
     members = {
         (terminal.get("name"), member.get("memberName"))
         for terminal in read["terminalsAndIcons"].iter("Terminal")

@@ -207,6 +207,35 @@ def test_a_log_that_determines_nothing_is_refused(change, message, log: Log, tmp
         hl.fit(csv(change(log), tmp_path / "log.csv"))
 
 
+@pytest.mark.parametrize(
+    ("unit", "message"),
+    [
+        (0.0, "its time does not grow"),
+        (1e3, r"samples are 1\.953 s apart, 0\.512 Hz.*it would be 512 Hz in ms\)"),
+        (1e6, r"would be 512 Hz in us\)"),
+        (1e9, r"would be 512 Hz in ns\)"),
+        (1e-6, r"1\.953e-09 s apart, 5\.12e\+08 Hz, where 20 to 100000 Hz.*write time in s, or"),
+        (1e-318, r"s apart, inf Hz"),
+    ],
+)
+def test_times_in_another_unit_are_refused_by_it(unit: float, message, log: Log, tmp_path) -> None:
+    with pytest.raises(hl.InputFault, match=message):
+        hl.fit(csv(replace(log, period=unit * log.period), tmp_path / "log.csv"))
+
+
+def test_times_that_are_no_numbers_are_named(log: Log, tmp_path: Path) -> None:
+    """Infinite in a CSV, two in a row of an HDF5 file."""
+    path = csv(log, tmp_path / "log.csv")
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *rows[:-1], "inf" + rows[-1][rows[-1].index(",") :]]))
+    with pytest.raises(hl.InputFault, match=f"time is not finite in row {len(rows)}"):
+        hl.fit(path)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["time"], file["haptic_device.x"] = np.zeros((300, 2)), np.zeros((300, 3))
+    with pytest.raises(hl.InputFault, match=r"time has a shape of \(2,\) a sample, not \(\)"):
+        hl.fit(tmp_path / "log.h5")
+
+
 def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> None:
     path = csv(log, tmp_path / "log.csv")
     lines = path.read_text().splitlines()

@@ -2,11 +2,13 @@
 
 import os
 import stat
+import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from fmpy import platform, sharedLibraryExtension
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.archive import open_archive, read_xml
@@ -65,6 +67,8 @@ def changed(old: str, new: str) -> Callable[[Path], Path]:
     return lambda path: fmu(path, DESCRIPTION.replace(old, new))
 
 
+UNIT = """<UnitDefinitions><Unit name="mm"><BaseUnit m="1" factor="{}"/></Unit>
+</UnitDefinitions>"""
 OUTSIDE = ["/tmp/x", "../x", "a/b", "a\\b", ""]
 NO_LINES = ["a&#10;b", "a&#13;", "a&#9;b", "a&#x202e;b"]
 REFERENCES = [2**32, 2**32 + 1, -1, 2**64]
@@ -93,9 +97,18 @@ REFERENCES = [2**32, 2**32 + 1, -1, 2**64]
         (link, "is a symbolic link"),
         (lambda p: fmu(p), "no binary for this platform .* only for none"),
         (lambda p: fmu(p, **{"binaries/win95/hostile.dll": "x"}), "only for win95"),
-        (changed('"2.0"', '"1.0"'), "FMI version 1.0"),
-        (changed("CoSimulation ", "ModelExchange "), "co-simulation"),
-        (changed('index="2"', 'index="9"'), "cannot be used"),
+        (lambda p: fmu(p, **{f"binaries/{platform}/other{sharedLibraryExtension}": "x"}),
+         r"is 'hostile', and binaries/\w+ has other\.\w+, not hostile\.\w+: rename"),
+        (changed('"2.0"', '"1.0"'), "it is of FMI 1.0: a co-simulation FMU of FMI 2.0 or 3.0"),
+        (changed('"2.0"', '"3.0-beta.2"'), "of FMI 3.0-beta.2, a draft of the standard"),
+        (changed("CoSimulation ", "ModelExchange "), "for model exchange, without a solver: a "),
+        (changed("CoSimulation ", "Simulation "), "it is without <CoSimulation>: a co-simulation"),
+        (changed('index="2"', 'index="9"'), "Outputs of index 9, where there are from 1 to"),
+        (changed('index="2"', 'index="0"'), "Outputs of index 0, where there are from 1 to"),
+        (changed('<Unknown index="2"/>', '<Unknown index="2"/>' * 2), "index 2 stands twice"),
+        (changed('index="2"', 'index="2" dependencies="0"'), "index 2 depends on 0, where"),
+        *((changed("<ModelVariables>", UNIT.format(factor) + "<ModelVariables>"), "unit 'mm' has f")
+          for factor in ("0", "-0.0", "INF", "NaN", "1e-400")),
         (changed('start="0"', 'start="zero"'), "cannot be used"),
         *((changed('r="hostile"', f'r="{name}"'), "is no name of a library") for name in OUTSIDE),
         *((changed('name="y"', f'name="{name}"'), "printable characters") for name in NO_LINES),
@@ -161,3 +174,32 @@ def test_malformed_ssps(tmp_path, make, message):
     with pytest.raises(InputFault, match=message):
         read.tables(path)
     assert {p.name for p in tmp_path.iterdir()} <= {"system.ssp"}
+
+
+TWO = """<Float64 name="u" valueReference="1" causality="input" start="0"/>
+<Float64 name="y" valueReference="7" causality="output"/>"""
+OUTPUT = '<Output valueReference="7"'
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ('<InitialUnknown valueReference="7" dependencies="1"/>', "no binary for this platform"),
+        ('<InitialUnknown valueReference="2"/>', "InitialUnknown of valueReference 2, where"),
+        ('<Output valueReference="7"/>', "Output of valueReference 7 stands twice"),
+        ('<InitialUnknown valueReference="7" dependencies="0"/>', "7 depends on 0, where"),
+    ],
+)
+def test_the_structure_of_fmi_3_names_its_variables(tmp_path, more, message):
+    text = description3("two", TWO, (7,)).replace("</ModelStructure>", f"{more}</ModelStructure>")
+    with pytest.raises(InputFault, match=message):
+        describe(fmu(tmp_path / "model.fmu", text))
+
+
+def test_a_clock_before_1980_reads_fmus(tmp_path, monkeypatch):
+    """A zip file holds no date before that, and ours, of a description, needs none of today."""
+    path = fmu(tmp_path / "model.fmu")
+    epoch = time.gmtime(0)
+    monkeypatch.setattr(time, "localtime", lambda *_: epoch)
+    with pytest.raises(InputFault, match="no binary for this platform"):
+        describe(path)

@@ -59,9 +59,9 @@ class Run:
 
 
 @contextmanager
-def serving(folder: Path, body: str) -> Iterator[Run]:
+def serving(folder: Path, body: str, **options: bool) -> Iterator[Run]:
     """The first run of a server of an FMU."""
-    python_fmu(folder, "Slow", body)
+    python_fmu(folder, "Slow", body, **options)
     read = open_scene.load(scene(folder, fmu_table("slow", "Slow")), ())
     with build_system(read) as system:
         fmu = system.fmu["slow"]
@@ -157,3 +157,45 @@ def test_a_flood_changes_nothing_and_fills_no_memory(run: Run) -> None:
     assert run.of.refused.total() == 15000
     assert len(run.of.refused) <= server.KINDS + 1
     assert run.step(0.25) == [0.5, 2]
+
+
+def test_states_are_those_that_were_saved(tmp_path: Path) -> None:
+    def steps(call: str, *arguments: Any) -> Any:
+        return run.call(call, *arguments).content
+
+    with serving(tmp_path, "self.y = time + size", canGetAndSetFMUstate=True) as run:
+        run.started()
+        assert steps("rollback", 3) == "rollback: no state was saved in slot 3"
+        assert steps("save", 2) is None
+        first = run.step(0.0)
+        assert steps("rollback", 2) is None
+        assert run.step(0.0) == first
+        for slot in (-1, server.SLOTS, 2**63):
+            assert "where there are 0 to" in steps("save", slot)
+
+
+def test_an_fmu_without_states_is_not_asked_for_them(run: Run) -> None:
+    run.started()
+    assert "cannot save its state" in run.call("save", 0).content
+    assert run.step(0.0) == [0.25, 1]
+
+
+def test_setters_are_bounded(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same inputs have one setter; no input stands twice in it."""
+    run.started()
+    for _ in range(50):
+        assert run.call("connect", ["u"]).content == 0
+    assert run.call("connect", ["u", "u"]).content == "connect: an input twice"
+    monkeypatch.setattr(server, "SETTERS", 1)
+    assert "more than 1 groups" in run.call("connect", []).content
+    assert run.step(0.0, [[0, struct.pack("<d", 2.0)]]) == [2.25, 1]
+
+
+def test_a_mistake_of_ours_ends_one_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    run.started()
+    monkeypatch.setattr(server.ServedFmu, "read", lambda self: 1 / 0)
+    answer = run.call("read")
+    assert (answer.kind, "ZeroDivisionError" in answer.content) == ("refused", True)
+    assert run.call("step", 0.0, 0.25, 0.25).kind == "refused"
+    monkeypatch.undo()
+    assert Run(run.of, TWO, run.identity).started().step(0.0) == [0.25, 1]

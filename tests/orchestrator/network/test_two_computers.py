@@ -308,3 +308,13 @@ def test_without_the_extra_the_message_says_how(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setitem(sys.modules, "zmq", None)
     with pytest.raises(InputFault, match=r'two computers need zmq: pip install "hapticlink'):
         key_file.require_libraries()
+
+
+def test_the_port_that_the_system_chose_is_told(tmp_path: Path) -> None:
+    log = tmp_path / "serve.log"
+    asked = command("serve", "pendulum", "--part", "virtual_mechanism", "--key", tmp_path / "key")
+    with process([*asked, "--listen", "127.0.0.1:0"], log, tmp_path) as running:
+        until(lambda: "serves at" in log.read_text(), running, log)
+        host, _, port = log.read_text().rpartition("serves at ")[2].strip().rpartition(":")
+        assert int(port) > 0
+        socket.create_connection((host, int(port)), 5.0).close()

@@ -46,7 +46,24 @@ def test_a_thread_of_this_process_is_refused_too(tmp_path):
         thread.start()
         thread.join()
         assert "another run writes there" in str(outcomes[0])
-        assert simulate("pendulum", tmp_path / "out").outcome.reason == "duration"  # this thread's
+        ours = simulate("pendulum", tmp_path / "out", locked=True)
+        assert ours.outcome.reason == "duration"
+
+
+def test_a_run_from_the_progress_of_another_is_refused_too(tmp_path):
+    """Of the same thread: it would take the place of the tables that the first one writes."""
+    out, refusals = tmp_path / "out", list[str]()
+
+    def nested(time):
+        if not refusals:
+            with pytest.raises(InputFault, match="another run writes there") as refused:
+                hl.run("pendulum", {"duration": 0.1}, out=out, figures=False)
+            refusals.append(str(refused.value))
+
+    made = hl.run("pendulum", {"duration": 20}, out=out, figures=False, progress=nested)
+    assert refusals
+    assert made.fault is None
+    assert read_results.load(out).haptics["time"][-1] == 20
 
 
 @pytest.mark.parametrize("wrong", [{"duration": -1}, {"stop_when": "no.such > 1"}])

@@ -102,3 +102,31 @@ def test_a_table_without_a_row_is_recovered(tmp_path):
     (tmp_path / "run.json").write_text(json.dumps(run))
     write_empty(tmp_path / "haptics.rows", ("time", "y"), as_csv=False)
     assert recover(tmp_path, ended=True) == {"haptics": Recovered(0, 0.0)}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"\n", bytes(100), b"y,z\n" + bytes(100), b'"' + bytes(100), b"\xff\xfe\n" + bytes(100)],
+    ids=["empty", "no name", "zeros", "no time", "no end", "no text"],
+)
+def test_rows_whose_header_is_damaged_are_refused_and_stay(tmp_path, content):
+    (tmp_path / "haptics.rows").write_bytes(content)
+    run = run_json(rates=["haptics"], files=["haptics.csv"])
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    with pytest.raises(InputFault, match=r"haptics\.rows: its (header|first column)"):
+        recover(tmp_path, ended=True)
+    assert (tmp_path / "haptics.rows").read_bytes() == content
+
+
+@pytest.mark.parametrize("lost", [0.0, np.nan, np.inf])
+def test_rows_behind_a_damaged_one_stay_where_they_are(tmp_path, lost):
+    """A block of the file that never came to the disk is one of zeros."""
+    table = RowsBeingWritten(tmp_path / "haptics.rows", ("time", "y"), 20_000)
+    table.rows[:, 0], table.filled.value = np.arange(len(table.rows)), 20_000
+    table.rows[15_000:15_010, 0] = lost
+    table.close()
+    run = run_json(rates=["haptics"], files=["haptics.csv"])
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    assert recover(tmp_path, ended=True) == {"haptics": Recovered(15_000, 14_999, 5_000)}
+    assert len(RowsFile(tmp_path / "haptics.rows")) == 20_000
+    assert read_results.load(tmp_path).haptics["time"][-1] == 14_999

@@ -68,8 +68,8 @@ def test_a_run_replaces_them(out, spoil):
 
 def test_a_folder_in_the_place_of_run_json_is_told(out, capsys):
     folder_as_story(out)
-    assert status("run", "pendulum", "--out", out, "--no-figures") != 0
-    assert "not a regular file" in capsys.readouterr().err
+    assert status("run", "pendulum", "--out", out, "--no-figures") == 1
+    assert capsys.readouterr().err == f"hapticlink: {out}/run.json: Is a directory\n"
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
+from tests.little_fmus import slave
+from tests.orchestrator.foreign_scenes import fmu_table, scene
 
 K, B = np.array([100.0, 100.0, 0.5]), np.array([70.0, 70.0, 0.375])  # of F_drift, by default
 
@@ -44,6 +46,31 @@ def test_a_hand_that_lets_go_leaves_a_mass_at_its_speed(bar, options, happened):
     np.testing.assert_allclose(speed, np.minimum(time, happened or 0.5) / 2.0, atol=1e-12)
     events = [(happened, "hand.wrench = (0.0, 0.0, 0.0)")]
     assert found.run["events"] == (events if happened else [])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "takes"),
+    [
+        ("gain", "true", "true: gain, of type Real, takes a number"),
+        ("u", "[true]", "true: u, of type Real, takes a number"),
+        ("n", "true", "true: n, of type Integer, takes a number"),
+        ("n", "2.5", "2.5: n, of type Integer, takes a whole number"),
+        ("on", "2", "2: on, of type Boolean, takes true or false"),
+        ("n", "2.0", ""),
+        ("on", "1", ""),
+        ("gain", "2", ""),
+    ],
+)
+def test_values_are_of_the_type_of_their_variable(tmp_path, name, value, takes):
+    inputs = ("input", {"u": 0.0, "n": 0, "on": False})
+    slave(tmp_path, "Typed", inputs, ("tunable", {"gain": 1.0}), ("output", {"y": 0.0}))
+    event = f'[[at]]\ntime = 0.25\nset = {{ "one.{name}" = {value} }}\n'
+    path = scene(tmp_path, fmu_table("one", "Typed") + event)
+    if not takes:
+        assert hl.run(path, figures=False).fault is None
+        return
+    with pytest.raises(InputFault, match=takes):
+        hl.run(path, figures=False)
 
 
 def test_without_events_nothing_runs_in_python():

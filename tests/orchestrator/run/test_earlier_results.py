@@ -113,7 +113,7 @@ def test_a_disk_without_room_for_a_row_keeps_the_earlier_ones(tmp_path):
     code = limit + "import sys; from hapticlink.__main__ import main; main()"
     command = [sys.executable, "-c", code, "run", path, "--no-figures", "--out", out]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert f"{out}: File too large\n" in ended.stderr
+    assert f"{out / 'run.json'}: File too large\n" in ended.stderr
     assert files(out) == before
 
 

@@ -68,6 +68,13 @@ def test_a_signal_before_the_run_says_so(bar, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_signal_during_a_build_speaks_of_no_run(bar, tmp_path):
+    command = [sys.executable, "-c", INTERRUPTED, "build", str(bar), "--out", str(tmp_path / "out")]
+    environment = os.environ | {"HAPTICLINK_CACHE": "off"}
+    ended = subprocess.run(command, capture_output=True, check=False, env=environment)
+    assert (ended.returncode, ended.stderr.splitlines()[-1]) == (1, b"hapticlink: interrupted")
+
+
 def children(pid: int) -> list[str]:
     """The processes that a process has started, where there is /proc."""
     tasks = Path(f"/proc/{pid}/task").glob("*/children")

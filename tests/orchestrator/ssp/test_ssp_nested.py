@@ -1,5 +1,6 @@
 """SSPs with systems in systems: every number follows from SSP 1.0 by hand."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi.description import describe
-from hapticlink.orchestrator.ssp import read
-from tests.little_fmus import edited, python_fmu
+from hapticlink.orchestrator.ssp import read, tree
+from tests.little_fmus import edited, edited_entries, python_fmu
 from tests.orchestrator.run.test_energy import fmus
 from tests.orchestrator.ssp.parameter_sets import ON, TABLE, binding, bindings, linear, values
 from tests.orchestrator.ssp.ssps import HEAD, TAIL, component, connectors, line, ssp, system
@@ -129,6 +130,7 @@ def test_an_fmu_of_many_components_is_read_once(tmp_path, monkeypatch):
     assert len(opened) == 1
 
 
+DESCRIPTION = "modelDescription.xml"
 PACKAGE, DEFINITION = "application/x-ssp-package", "application/x-ssp-definition"
 
 
@@ -261,3 +263,50 @@ def test_what_cannot_be_wired_is_refused(tmp_path, old, new, message):
     path = ssp(tmp_path, CHAIN.replace(old, new), TAIL.replace(old, new), Text_fmu=text)
     with pytest.raises(InputFault, match=message):
         simulate(path, tmp_path / "out", ["haptics.rate=50"])
+
+
+def test_files_that_name_each_other_twice_end(tmp_path):
+    """They double with each of 32 levels that are allowed."""
+    both = connectors(u="input", y="output")
+    deep = {"20_ssd": HEAD + system("any", both, component("p", "Plain"), line("u", "y")) + TAIL}
+    for i in range(20):
+        twice = "".join(as_component(n, DEFINITION, f"{i + 1}.ssd") for n in "ab")
+        deep[f"{i}_ssd"] = HEAD + system("any", both, twice, line("a.y", "b.u")) + TAIL
+    root = system("top", both, as_component("c", DEFINITION, "resources/0.ssd"), line("u", "c.u"))
+    with pytest.raises(InputFault, match="more than 1000 files in files, counted as often"):
+        open_scene.load(ssp(tmp_path, root, **deep))
+
+
+def test_parts_and_bytes_are_those_of_the_whole_document(tmp_path, monkeypatch):
+    inside = system("any", connectors(out="output"), component("g", "Gives"), line("g.y", "out"))
+    given = inner_ssp(tmp_path / "in", inside)
+    many = "".join(as_component(f"c{i}", PACKAGE, "resources/in.ssp") for i in range(9))
+    path = Path(ssp(tmp_path, system("top", "", many, line("c1.out", "c2.out")), in_ssp=given))
+    for bound, most in (
+        ("MOST_FILES", 8),
+        ("MOST_PARTS", 25),
+        ("MAX_XML_BYTES", 9 * len(inside)),
+        ("MAX_BYTES", 9 * len(given)),
+    ):
+        with monkeypatch.context() as lower:
+            lower.setattr(tree, bound, most)
+            with pytest.raises(InputFault, match=f"more than {most} "):
+                read.tables(path)
+
+
+def test_a_unit_of_nothing_is_refused(tmp_path):
+    tail = TAIL.replace('factor="0.001"', 'factor="0"')
+    path = ssp(tmp_path, system("top", "", component("g", "Gives"), line("g.y", "g.u")), tail)
+    with pytest.raises(InputFault, match=r"their\.ssp: unit 'mm' has factor 0 and offset 0"):
+        read.tables(Path(path))
+
+
+def test_a_refused_fmu_does_not_stay_in_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "cache"))
+    path = Path(ssp(tmp_path, system("top", "", component("g", "none"), line("g.y", "g.u"))))
+    damaged = edited_entries(tmp_path / "Gives.fmu", lambda all_: all_ | {DESCRIPTION: b"<a/>"})
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.write(damaged, "resources/none.fmu")
+    with pytest.raises(InputFault, match=r"their\.ssp: g: resources/none\.fmu: "):
+        read.tables(path)
+    assert not [*(tmp_path / "cache").rglob("*.fmu")]
