@@ -248,6 +248,14 @@ static fmi2Status settle(Model *m) {
     return fmi2OK;
 }
 
+static int are_finite(const Model *m) {
+    const double *values = m->now.scene.loop.values;
+    for (int i = 0; i < N_SIGNALS; i++)
+        if (!isfinite(values[i]))
+            return !fail(m, fmi2Error, "output %s is %.17g after initialisation", signals[i], values[i]);
+    return 1;
+}
+
 /* Bounds of the outputs, and the samples of t = 0 for holds and meters. */
 static int begin(Model *m) {
     Loop *l = &m->now.scene.loop;
@@ -475,15 +483,15 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Model *m = c;
     if (out_of_order(m, __func__, INITIALIZATION)) return fmi2Error;
-    if (settle(m) != fmi2OK) return fmi2Error;
-    for (int i = 0; i < N_SIGNALS; i++)
-        if (!isfinite(m->now.scene.loop.values[i]))
-            return fail(m, fmi2Error, "output %s is %.17g after initialisation", signals[i],
-                        m->now.scene.loop.values[i]);
+    if (settle(m) != fmi2OK || !are_finite(m)) return fmi2Error;
     m->now.mode = FAILURE;
     for (int i = 0; i < N_MEMBERS; i++)
         if (members[i].exit(m->members[i]) > fmi2Warning)
             return fail(m, fmi2Error, "%s does not leave initialisation mode", members[i].name);
+    At at = {0};
+    for (int i = 0; i < N_FMUS; i++) /* a block may compute outputs in leaving it */
+        if (fmu_get(m->now.scene.loop.fmus + i, 0, &at)) return unsettled(m, i);
+    if (!are_finite(m)) return fmi2Error;
     if (begin(m)) return fail(m, fmi2Error, "holds and meters cannot take the samples of t = 0");
     m->now.mode = STEP_MODE;
     return fmi2OK;

@@ -190,11 +190,17 @@ class Instance(ABC):
 
     @abstractmethod
     def exit_initialization(self) -> None:
-        """Leave initialisation mode and enter step mode."""
+        """Leave initialisation mode, enter step mode, and read all outputs again: an FMU may
+        compute them in this call."""
 
     @abstractmethod
     def read(self) -> None:
         """Read all outputs without checking that they are finite."""
+
+    @abstractmethod
+    def read_some(self, places: Sequence[int]) -> None:
+        """Read the outputs at these indices, whole arrays of FMI 3.0, and others only where they
+        come with them."""
 
     @abstractmethod
     def step(self, time: float, end: float, size: float) -> None:
