@@ -36,13 +36,13 @@ class Slave3(FMU3Slave):
         super().__init__(**about)
         self._sizes = sizes
         self._first = {first + i: first for first, size in sizes.items() for i in range(size)}
-        self._start = 0.0
+        self._times: dict[str, float | None] = {}
 
-    def setupExperiment(self, startTime: float = 0.0) -> None:
-        self._start = startTime
+    def setupExperiment(self, startTime: float = 0.0, stopTime: float | None = None) -> None:
+        self._times = {"startTime": startTime, "stopTime": stopTime}
 
     def enterInitializationMode(self) -> None:
-        super().enterInitializationMode(startTime=self._start)
+        super().enterInitializationMode(**self._times)
 
     def getReal(self, references: Sequence[int]) -> list[float]:
         arrays = {self._first.get(r, r): list[float]() for r in references}

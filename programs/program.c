@@ -75,17 +75,18 @@ typedef struct {
 #define FIELD(id, function, field) fmi2##function##TYPE *field;
 typedef struct {
     const char *id, *name, *guid;
+    double tolerance; /* 0 where there is none */
     FUNCTIONS(FIELD, )
 } Member;
 
 #include "scene.h"
 
 #define DECLARE_ONE(id, function, field) extern fmi2##function##TYPE id##_fmi2##function;
-#define DECLARE(id, name, guid) FUNCTIONS(DECLARE_ONE, id)
+#define DECLARE(id, name, guid, tolerance) FUNCTIONS(DECLARE_ONE, id)
 MEMBERS(DECLARE)
 
 #define NAME(id, function, field) id##_fmi2##function,
-#define ROW(id, name, guid) {#id, name, guid, FUNCTIONS(NAME, id)},
+#define ROW(id, name, guid, tolerance) {#id, name, guid, tolerance, FUNCTIONS(NAME, id)},
 static const Member members[] = {MEMBERS(ROW)};
 
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP_MODE = 4, ENDED = 8, FAILURE = 16, TERMINATED = 32 };
@@ -115,6 +116,7 @@ typedef struct {
     fmi2Component members[N_MEMBERS];
     fmi2FMUstate slots[N_SLOTS + 1]; /* states that the loop saves */
     double before[N_VALUES];
+    double stop; /* INFINITY where none is defined */
     char name[];
 } Model;
 
@@ -190,6 +192,7 @@ static fmi2Status restart(Model *m) {
     memcpy(m->now.guid, GUID, sizeof GUID);
     memcpy(&m->now.scene, &initial, sizeof initial);
     m->now.mode = INSTANTIATED;
+    m->stop = INFINITY;
     relocate(m);
     for (int i = 0; i < N_SETTABLE; i++) {
         const Variable *v = variables + i;
@@ -466,6 +469,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
     Model *m = c;
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
     if (start != 0.0) return fail(m, fmi2Error, "a scene starts at 0 s, not at %.17g s", start);
+    m->stop = has_stop ? stop : INFINITY;
     return fmi2OK;
 }
 
@@ -473,7 +477,8 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     Model *m = c;
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
     for (int i = 0; i < N_MEMBERS; i++)
-        if (members[i].setup(m->members[i], fmi2False, 0.0, 0.0, fmi2False, 0.0) > fmi2Warning ||
+        if (members[i].setup(m->members[i], members[i].tolerance > 0.0, members[i].tolerance, 0.0,
+                             fmi2False, 0.0) > fmi2Warning ||
             members[i].enter(m->members[i]) > fmi2Warning)
             return fail(m, fmi2Error, "%s does not enter initialisation mode", members[i].name);
     m->now.mode = INITIALIZATION;
@@ -594,6 +599,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     if (!(end > m->now.time))
         return fail(m, fmi2Error, "a step from t = %.17g s to %.17g s goes back: the program stands at "
                     "%.17g s", start, end, m->now.time);
+    if (end > m->stop + NEAR * tick)
+        return fail(m, fmi2Error, "a step to t = %.17g s, beyond the stop time %.17g s", end, m->stop);
     const int64_t until = (int64_t)floor(end * l->denominator / l->numerator + NEAR);
     if (until > m->now.tick && !advance(m, until)) {
         if (m->now.mode == ENDED) {

@@ -186,9 +186,15 @@ class InProcess(Instance):
         self._carry_out(transfers, "sets")
 
     def enter_initialization(self, stop_time: float) -> None:
-        self._call("fmi2SetupExperiment", False, 0.0, 0.0, True, stop_time)
+        self._call("fmi2SetupExperiment", *self._tolerance, 0.0, True, stop_time)
         self._set_starts()
         self._call("fmi2EnterInitializationMode")
+
+    @property
+    def _tolerance(self) -> tuple[bool, float]:
+        """Whether there is a tolerance for its solver, and which."""
+        tolerance = self.description.tolerance
+        return tolerance is not None, tolerance or 0.0
 
     def exit_initialization(self) -> None:
         self._call(f"fmi{self.description.fmi}ExitInitializationMode")

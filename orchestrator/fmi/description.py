@@ -3,8 +3,10 @@ and its timing."""
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
@@ -62,6 +64,8 @@ class Description:
     """The capabilities of its CoSimulation element that are true."""
     step_size: str | None = None
     """Of its default experiment (s), as it is written."""
+    tolerance: float | None = None
+    """The relative tolerance that its solver is told: of its default experiment, or the scene."""
     dependencies: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """By output: the variables that it depends on directly. An output that is not here may depend
     on every input."""
@@ -191,6 +195,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         fmi=version,
         flags=frozenset(capable),
         step_size=model.defaultExperiment and model.defaultExperiment.stepSize,
+        tolerance=_read_tolerance(model.defaultExperiment),
         clocks=ticking,
         block=None if annotation.block(tree) is None else model.modelName,
         **variables,
@@ -254,6 +259,14 @@ def _read_dependencies(unknowns: Iterable[Any]) -> dict[str, frozenset[str]]:
         for unknown in unknowns
         if unknown.dependencies is not None
     }
+
+
+def _read_tolerance(experiment: Any) -> float | None:
+    """The tolerance of a default experiment, None where it is no positive number."""
+    with suppress(TypeError, ValueError):
+        if experiment and 0.0 < (tolerance := float(experiment.tolerance)) < math.inf:
+            return tolerance
+    return None
 
 
 def _only_xml(text: bytes) -> BytesIO:

@@ -186,7 +186,8 @@ class Instance(ABC):
 
     @abstractmethod
     def enter_initialization(self, stop_time: float) -> None:
-        """Set the start values and enter initialisation mode."""
+        """Tell the stop time (s) and the tolerance of the description, set the start values, and
+        enter initialisation mode."""
 
     @abstractmethod
     def exit_initialization(self) -> None:

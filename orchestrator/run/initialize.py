@@ -7,6 +7,7 @@ the start values of the inputs on the loop: FMUs are evaluated nowhere else but 
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -24,19 +25,24 @@ from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.solvers import Aitken, Newton, Solution, Solver, Vector, error
 from hapticlink.orchestrator.scene.start_pose import describe_start_outside
-from hapticlink.orchestrator.system.system import Connection
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
+from hapticlink.orchestrator.system.timeline import SLOWEST
 
 MOST = 50
 """Points of Newton's method, and rounds of whole numbers and texts on a loop."""
 TOLERANCE = 1e-12
 MAX_COLUMNS = 500
 """Signals on a loop up to which Newton's Jacobian is evaluated; Aitken's method needs none."""
+LONGEST = 1.5 / SLOWEST
+"""Step (s) of a clock that is slowed down as far as it may be, and jitters."""
 CONTINUOUS = ("Real", "Float64", "Float32")
 
 
-def initialize(fmus: LoadedFmus) -> bool:
+def initialize(fmus: LoadedFmus, rates_change: bool = False) -> bool:
     """Initialise every instance; the outputs of t = 0 are in the signal vector afterwards, as they
     are when initialisation mode has ended. Returns whether there was an algebraic loop.
+
+    rates_change: whether those of slower clocks may, during the run.
 
     Values cross connections, those to parameters among them, before initialisation mode ends. An
     output that its FMU changes in ending it is passed on with the first step: FMI allows no output
@@ -46,11 +52,9 @@ def initialize(fmus: LoadedFmus) -> bool:
     points of Newton's method, or outputs aren't finite.
     """
     system, instances, values = fmus.system, fmus.instances, fmus.signals.values
-    timeline = system.timeline
     for fmu in system.fmus:
         interrupt.raise_if_interrupted()
-        longest = timeline.clock(fmu.clock).longest
-        instances[fmu.name].enter_initialization(timeline.seconds(timeline.end + longest))
+        instances[fmu.name].enter_initialization(find_stop(system, fmu, rates_change))
     start = StartValues(fmus)
     loops = False
     for group in order_start(system):
@@ -74,6 +78,19 @@ def initialize(fmus: LoadedFmus) -> bool:
         instance.exit_initialization()
     require_finite(instances)
     return loops
+
+
+def find_stop(system: System, fmu: Fmu, rates_change: bool) -> float:
+    """The stop time (s) that an FMU is told: the end of the run for a plant, which takes no step
+    beyond it; for a sampled block the end of the step that it begins then at the latest, with the
+    longest period that its clock may be given where the rates of slower clocks can change."""
+    time = system.timeline
+    if not fmu.sampled:
+        return time.seconds(time.end)
+    if rates_change and fmu.clock != time.clocks[0].name:
+        return time.seconds(time.end) + LONGEST
+    starts = time.clock(fmu.clock).starts
+    return time.seconds(starts[bisect_right(starts, time.end)])
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ class Simulation(LoadedFmus):
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
         create the recorders."""
-        self.loops_at_start = initialize(self)
+        self.loops_at_start = initialize(self, rates_change=self.pace is not None)
         values = self.signals.values
         for hold in self.holds.values():
             hold.push(0, values[hold.places], 0)

@@ -1,13 +1,15 @@
 """Start values: in the order of what depends on what, loops by Newton's method, read again behind
-the end of initialisation mode."""
+the end of initialisation mode. The stop time and the tolerance that FMUs are told."""
 
 import math
+import re
 import uuid
 from pathlib import Path
 
 import pytest
 
 from tests.little_fmus import edited, python_fmu_of
+from tests.orchestrator.c_fmus import told_fmu3
 from tests.orchestrator.foreign_scenes import ISOLATED, fault, fmu_table, ran, wire_table
 
 FUNCTION = """
@@ -135,3 +137,72 @@ def test_whole_numbers_without_a_solution_are_told(tmp_path):
     told = fault(tmp_path, loop(tmp_path, "2 * u + 1", "4 - 3 * u", "n", most=1000.0))
     assert "b: output n does not converge in initialisation: " in told
     assert "around its algebraic loop (" in told
+
+
+# --- the experiment -----------------------------------------------------------------------
+
+TOLD = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+class Told(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.stop = self.tolerance = self.ramp = -1.0
+        for name in ("stop", "tolerance", "ramp"):
+            self.register_variable(Real(name, causality=Fmi2Causality.output))
+
+    def setup_experiment(self, start_time, stop_time, tolerance):
+        self.stop = -1.0 if stop_time is None else stop_time
+        self.tolerance = -1.0 if tolerance is None else tolerance
+
+    def do_step(self, time, size):
+        self.ramp = (time + size) / self.stop
+        return True
+"""
+
+
+def told(folder: Path, fmi: str) -> Path:
+    """Told.fmu puts out the stop time and the tolerance that it is told, -1 for none, and the share
+    of the stop time that its steps have reached."""
+    return told_fmu3(folder) if fmi == "3" else python_fmu_of(folder, TOLD, uuid.uuid4().hex)
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_the_stop_time_is_that_of_the_run(tmp_path, fmi, isolate):
+    """Rates of 64 and 24 Hz, 0.5 s; a sampled block begins its last step at the end of the run."""
+    told(tmp_path, fmi)
+    of = {"plant": "", "sampled": 'timing = "sampled"\n', "slow": "rate = 24\n"}
+    of["slow_sampled"] = of["sampled"] + of["slow"]
+    scene = "".join(fmu_table(name, "Told", isolate + lines) for name, lines in of.items())
+    found = ran(tmp_path, scene)
+    haptics, slow = found.haptics, found.tables["24hz"]
+    assert haptics["plant.stop"][0] == slow["slow.stop"][0] == 0.5
+    assert haptics["sampled.stop"][0] == 0.5 + 1 / 64
+    assert slow["slow_sampled.stop"][0] == pytest.approx(0.5 + 1 / 24)
+    ramps = haptics["plant.ramp"], slow["slow.ramp"], haptics["sampled.ramp"]
+    assert [ramp[-1] for ramp in ramps] == pytest.approx([1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+@pytest.mark.parametrize(
+    ("declared", "line", "tolerance"),
+    [
+        ("", "", -1.0),
+        ("1e-3", "", 1e-3),
+        ("1e-3", "tolerance = 1e-5\n", 1e-5),
+        ("", "tolerance = 1e-5\n", 1e-5),
+        ("0", "", -1.0),
+    ],
+)
+def test_the_tolerance_is_that_of_the_default_experiment_or_the_scene(
+    tmp_path, fmi, declared, line, tolerance
+):
+    def declare(text: str) -> str:
+        head, rest = re.sub("<DefaultExperiment.*?/>", "", text).split("<ModelVariables>")
+        experiment = f'<DefaultExperiment tolerance="{declared}"/>' * bool(declared)
+        return f"{head}{experiment}<ModelVariables>{rest}"
+
+    edited(told(tmp_path, fmi), declare)
+    found = ran(tmp_path, fmu_table("one", "Told", line)).haptics
+    assert found["one.tolerance"][0] == tolerance
