@@ -19,7 +19,7 @@ from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.base.signal_names import DEVICE
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.transfer import as_signal
-from hapticlink.orchestrator.fmi.variables import WRITTEN
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, WRITTEN
 from hapticlink.orchestrator.plan.dependency_order import StartOutputs, order_start, whole_fmus
 from hapticlink.orchestrator.run import jacobians
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
@@ -35,7 +35,6 @@ MAX_COLUMNS = 500
 """Signals on a loop up to which Newton's Jacobian is evaluated; Aitken's method needs none."""
 LONGEST = 1.5 / SLOWEST
 """Step (s) of a clock that is slowed down as far as it may be, and jitters."""
-CONTINUOUS = ("Real", "Float64", "Float32")
 
 
 def initialize(fmus: LoadedFmus, rates_change: bool = False) -> bool:
