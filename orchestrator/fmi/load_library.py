@@ -34,6 +34,7 @@ from fmpy import sharedLibraryExtension
 
 from hapticlink.fmus import cache as fmu_cache
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.fmus.plain_folder import require_plain
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.description import PLATFORMS
 from hapticlink.orchestrator.fmi.status import require_success
@@ -98,7 +99,7 @@ def is_python(loaded: ctypes.CDLL) -> bool:
 def prepare(loaded: ctypes.CDLL, folder: str) -> str:
     """The Python module of an FMU whose library, loaded from its `folder`, holds an interpreter,
     which is then released when this process ends; "" for other FMUs. Raises ValueError where such a
-    library would find no module."""
+    library would find no module, FmuError where it would not from this folder."""
     if not is_python(loaded):
         return ""
     if os.name == "posix":
@@ -110,6 +111,7 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> str:
     with suppress(OSError, ValueError):
         name = (resources / "slavemodule.txt").read_text(encoding="utf-8").strip()
         if (resources / f"{name}.py").is_file():
+            require_plain(folder)
             return name
     raise ValueError("resources/slavemodule.txt names no module beside it; build the FMU again")
 

@@ -103,7 +103,7 @@ class Evaluation:
     read: Callable[[], object]
 
 
-def _nothing(signals: Vector) -> None:
+def _set_nothing(signals: Vector) -> None:
     """Sets no input."""
 
 
@@ -122,7 +122,9 @@ class StartValues:
         return Evaluation(
             outputs.needs,
             [first + i for i in outputs.outputs],
-            self._fmus.setter(outputs.needs, self._signals.places) if outputs.needs else _nothing,
+            self._fmus.setter(outputs.needs, self._signals.places)
+            if outputs.needs
+            else _set_nothing,
             instance.read if whole else lambda: instance.read_some(outputs.outputs),
         )
 
