@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import tempfile
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -24,6 +25,9 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
+from hapticlink.fmus.errors import FmuError
+from hapticlink.fmus.plain_folder import find_unpacking_folder, require_plain
+
 STEPS = 4
 Trace = list[bytes]
 
@@ -36,13 +40,13 @@ class Slave3(FMU3Slave):
         super().__init__(**about)
         self._sizes = sizes
         self._first = {first + i: first for first, size in sizes.items() for i in range(size)}
-        self._start = 0.0
+        self._times: dict[str, float | None] = {}
 
-    def setupExperiment(self, startTime: float = 0.0) -> None:
-        self._start = startTime
+    def setupExperiment(self, startTime: float = 0.0, stopTime: float | None = None) -> None:
+        self._times = {"startTime": startTime, "stopTime": stopTime}
 
     def enterInitializationMode(self) -> None:
-        super().enterInitializationMode(startTime=self._start)
+        super().enterInitializationMode(**self._times)
 
     def getReal(self, references: Sequence[int]) -> list[float]:
         arrays = {self._first.get(r, r): list[float]() for r in references}
@@ -76,6 +80,18 @@ def _entries(variable: Any) -> Iterator[Any]:
         yield scalar
 
 
+def _unpack(path: Path | str, folder: Path | None = None) -> str:
+    """The folder in which an FMU is unpacked. Raises FmuError where it would crash from there."""
+    unpacked = str(folder or tempfile.mkdtemp(dir=find_unpacking_folder()))
+    fmpy.extract(str(path), unpacked)
+    try:
+        require_plain(unpacked)
+    except FmuError:
+        shutil.rmtree(unpacked)
+        raise
+    return unpacked
+
+
 class FmuSession:
     """An FMU that is extracted to `folder`, by default a new temporary one, and its instances, all
     of which `close` frees. `description` has scalars, also of FMI 3.0."""
@@ -93,7 +109,7 @@ class FmuSession:
         self.inputs = [v for v in variables if v.causality == "input" and v.type == "Real"]
         experiment = self.description.defaultExperiment
         self.step_size = float(experiment.stepSize or 1e-3) if experiment else 1e-3
-        self.folder = fmpy.extract(str(path), folder)
+        self.folder = _unpack(path, folder)
         self.messages: list[str] = []
         self._instances: list[FMU2Slave] = []
 
@@ -186,11 +202,13 @@ def check_fmu(path: Path | str) -> list[str]:
 
 def _alone(path: Path | str, step_size: float) -> list[str]:
     """Simulated by FMPy with its start values, the FMU has to run and stay finite."""
-    stop = STEPS * step_size
+    stop, folder = STEPS * step_size, _unpack(path)
     try:
-        result = fmpy.simulate_fmu(str(path), stop_time=stop, output_interval=step_size)
+        result = fmpy.simulate_fmu(folder, stop_time=stop, output_interval=step_size)
     except Exception as error:
         return [f"alone: {error}"]
+    finally:
+        shutil.rmtree(folder)
     bad = [name for name in result.dtype.names if not np.isfinite(result[name]).all()]
     return [f"alone: not finite from its own start values: {', '.join(bad)}"] if bad else []
 

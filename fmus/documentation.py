@@ -36,7 +36,16 @@ TIMING = {
 }
 
 
-def documentation(component: Component, run: ReferenceRun | None = None) -> bytes:
+PYTHON_PATHS = (
+    "This FMU runs on Python. A tool has to unpack it in a folder whose path has letters of ASCII, "
+    "digits, spaces and - . _ ~ alone: with others, the library of pythonfmu ends the tool's "
+    "process. FMPy takes the temporary folder, TMPDIR."
+)
+
+
+def documentation(
+    component: Component, run: ReferenceRun | None = None, on_python: bool = False
+) -> bytes:
     """One HTML page without external references, with the block's ports as a drawing, and what it
     does in `run`."""
     steps = component.substeps
@@ -45,6 +54,7 @@ def documentation(component: Component, run: ReferenceRun | None = None) -> byte
         f"<h1>{escape(component.name)}</h1>",
         f"<p>{escape(component.description)}</p>",
         f"<p>{TIMING[component.timing]} Each communication step is taken {times}.</p>",
+        *([f"<p>{PYTHON_PATHS}</p>"] if on_python else []),
         f"<figure>{diagram(component)}</figure>",
         *_paragraphs(component.documentation),
         *(_run(run) if run and len(run.times) else []),

@@ -32,7 +32,8 @@ def try_lock(path: Path) -> Iterator[bool]:
         if sys.platform != "win32":
             with suppress(OSError):  # forked processes may have it open, too
                 fcntl.flock(number, fcntl.LOCK_UN)
-        os.close(number)
+        with suppress(OSError):  # an FMU may have closed it
+            os.close(number)
 
 
 @contextmanager

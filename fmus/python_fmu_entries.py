@@ -86,7 +86,7 @@ def pack_entries(
     described_as = describe_component(component, **experiment)
     own_equations = not engine
     run = reference_run(component, described_as.step_size) if own_equations else None
-    files = {PAGE: documentation(component, run), **functions}
+    files = {PAGE: documentation(component, run, on_python=True), **functions}
     for path in sorted(PYTHONFMU.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
     for path in sorted((PYTHONFMU / "resources" / "binaries").rglob("*.*")):

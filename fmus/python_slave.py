@@ -19,7 +19,8 @@ no state: where p, x or t are not those that they were evaluated for, they are e
 Until the end of initialisation mode a get of either kind returns y = output(x0, u, p, t) with
 x0 = initialize(u, p), from the values set so far.
 
-A call out of order (FMI 2.0.5 section 4.2.4) and a time that is not finite are refused.
+A call out of order (FMI 2.0.5 section 4.2.4), a time that is not finite, and a step that does not
+begin where the last one ended, goes back or nowhere, or beyond the stop time, are refused.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ from pythonfmu import Fmi2Slave, enums
 
 MODES = ("instantiated", "in initialisation mode", "initialised", "terminated")
 INSTANTIATED, INITIALIZATION, STEP, TERMINATED = MODES
+NEAR = 1e-3
+"""Share of a step by which its begin and end may be off."""
 
 
 def _surviving(method: typing.Callable) -> typing.Callable:
@@ -96,6 +99,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         self._whole = 0 if self._sampled else self._substeps - 1  # the substep with the outputs
         # due: to be computed before the next read
         self._mode, self._start_due, self._output_due = INSTANTIATED, True, True
+        self._stop = math.inf
         self._shared_time = math.nan  # for which z was evaluated; nan: it is out of date
         t, h = _doubles([0.0]), _doubles([0.0])
         x, trial, after = (_doubles([0.0] * n_x) for _ in range(3))
@@ -203,6 +207,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         if not math.isfinite(start_time):
             raise ValueError(f"the start time is {start_time}")
         self._time[0] = start_time
+        self._stop = math.inf if stop_time is None else stop_time
 
     @_surviving
     def enter_initialization_mode(self) -> None:
@@ -290,16 +295,17 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
     def do_step(self, current_time: float, step_size: float) -> bool:
         """True is fmi2OK, False fmi2Discard; raises nothing. State and outputs change only on
         success."""
+        now = self._time[0]
         try:
             return self._advance(current_time, step_size)
         except Exception as error:
+            self._time[0] = now
             self.log(f"step at t = {current_time!r}: {error!r}", enums.Fmi2Status.error)
             return False
 
     def _advance(self, start: float, step_size: float) -> bool:
         self._require("fmi2DoStep", STEP)
-        if not math.isfinite(start + step_size):
-            raise ValueError(f"a step from t = {start!r} by {step_size!r} s has no end")
+        self._require_step(start, step_size)
         time, x, trial, after = self._time, self._state, self._trial, self._after
         if self._start_due:
             self._refresh()
@@ -331,6 +337,17 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         time[0] = self._shared_time = start + step_size
         self._output_due = False
         return True
+
+    def _require_step(self, start: float, step_size: float) -> None:
+        """Raises ValueError for a step that does not begin where the FMU stands and end later, at
+        the stop time at most. Steps whose times are added up are off by less than NEAR of one."""
+        end, near, now = start + step_size, NEAR * step_size, self._time[0]
+        if not step_size > 0.0 or not math.isfinite(end):
+            raise ValueError(f"a step from t = {start!r} by {step_size!r} s has no end after it")
+        if not abs(start - now) <= near:
+            raise ValueError(f"a step from t = {start!r} s: the FMU stands at {now!r} s")
+        if end > self._stop + near:
+            raise ValueError(f"a step to t = {end!r} s, beyond the stop time {self._stop!r} s")
 
     def _not_finite(self, values: memoryview, time: float, outputs: bool = False) -> str:
         """The message which state, or with `outputs` which output, is not finite, with the likely

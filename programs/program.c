@@ -75,17 +75,18 @@ typedef struct {
 #define FIELD(id, function, field) fmi2##function##TYPE *field;
 typedef struct {
     const char *id, *name, *guid;
+    double tolerance; /* 0 where there is none */
     FUNCTIONS(FIELD, )
 } Member;
 
 #include "scene.h"
 
 #define DECLARE_ONE(id, function, field) extern fmi2##function##TYPE id##_fmi2##function;
-#define DECLARE(id, name, guid) FUNCTIONS(DECLARE_ONE, id)
+#define DECLARE(id, name, guid, tolerance) FUNCTIONS(DECLARE_ONE, id)
 MEMBERS(DECLARE)
 
 #define NAME(id, function, field) id##_fmi2##function,
-#define ROW(id, name, guid) {#id, name, guid, FUNCTIONS(NAME, id)},
+#define ROW(id, name, guid, tolerance) {#id, name, guid, tolerance, FUNCTIONS(NAME, id)},
 static const Member members[] = {MEMBERS(ROW)};
 
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP_MODE = 4, ENDED = 8, FAILURE = 16, TERMINATED = 32 };
@@ -115,6 +116,7 @@ typedef struct {
     fmi2Component members[N_MEMBERS];
     fmi2FMUstate slots[N_SLOTS + 1]; /* states that the loop saves */
     double before[N_VALUES];
+    double stop; /* INFINITY where none is defined */
     char name[];
 } Model;
 
@@ -190,6 +192,7 @@ static fmi2Status restart(Model *m) {
     memcpy(m->now.guid, GUID, sizeof GUID);
     memcpy(&m->now.scene, &initial, sizeof initial);
     m->now.mode = INSTANTIATED;
+    m->stop = INFINITY;
     relocate(m);
     for (int i = 0; i < N_SETTABLE; i++) {
         const Variable *v = variables + i;
@@ -246,6 +249,14 @@ static fmi2Status settle(Model *m) {
                     last < N_SIGNALS ? signals[last] : "a held value", l->values[last], m->before[last]);
     m->now.settled = 1;
     return fmi2OK;
+}
+
+static int are_finite(const Model *m) {
+    const double *values = m->now.scene.loop.values;
+    for (int i = 0; i < N_SIGNALS; i++)
+        if (!isfinite(values[i]))
+            return !fail(m, fmi2Error, "output %s is %.17g after initialisation", signals[i], values[i]);
+    return 1;
 }
 
 /* Bounds of the outputs, and the samples of t = 0 for holds and meters. */
@@ -458,6 +469,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
     Model *m = c;
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
     if (start != 0.0) return fail(m, fmi2Error, "a scene starts at 0 s, not at %.17g s", start);
+    m->stop = has_stop ? stop : INFINITY;
     return fmi2OK;
 }
 
@@ -465,7 +477,8 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     Model *m = c;
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
     for (int i = 0; i < N_MEMBERS; i++)
-        if (members[i].setup(m->members[i], fmi2False, 0.0, 0.0, fmi2False, 0.0) > fmi2Warning ||
+        if (members[i].setup(m->members[i], members[i].tolerance > 0.0, members[i].tolerance, 0.0,
+                             fmi2False, 0.0) > fmi2Warning ||
             members[i].enter(m->members[i]) > fmi2Warning)
             return fail(m, fmi2Error, "%s does not enter initialisation mode", members[i].name);
     m->now.mode = INITIALIZATION;
@@ -475,15 +488,15 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Model *m = c;
     if (out_of_order(m, __func__, INITIALIZATION)) return fmi2Error;
-    if (settle(m) != fmi2OK) return fmi2Error;
-    for (int i = 0; i < N_SIGNALS; i++)
-        if (!isfinite(m->now.scene.loop.values[i]))
-            return fail(m, fmi2Error, "output %s is %.17g after initialisation", signals[i],
-                        m->now.scene.loop.values[i]);
+    if (settle(m) != fmi2OK || !are_finite(m)) return fmi2Error;
     m->now.mode = FAILURE;
     for (int i = 0; i < N_MEMBERS; i++)
         if (members[i].exit(m->members[i]) > fmi2Warning)
             return fail(m, fmi2Error, "%s does not leave initialisation mode", members[i].name);
+    At at = {0};
+    for (int i = 0; i < N_FMUS; i++) /* a block may compute outputs in leaving it */
+        if (fmu_get(m->now.scene.loop.fmus + i, 0, &at)) return unsettled(m, i);
+    if (!are_finite(m)) return fmi2Error;
     if (begin(m)) return fail(m, fmi2Error, "holds and meters cannot take the samples of t = 0");
     m->now.mode = STEP_MODE;
     return fmi2OK;
@@ -586,6 +599,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     if (!(end > m->now.time))
         return fail(m, fmi2Error, "a step from t = %.17g s to %.17g s goes back: the program stands at "
                     "%.17g s", start, end, m->now.time);
+    if (end > m->stop + NEAR * tick)
+        return fail(m, fmi2Error, "a step to t = %.17g s, beyond the stop time %.17g s", end, m->stop);
     const int64_t until = (int64_t)floor(end * l->denominator / l->numerator + NEAR);
     if (until > m->now.tick && !advance(m, until)) {
         if (m->now.mode == ENDED) {

@@ -17,6 +17,7 @@ from hapticlink.orchestrator.base.ticks import Frames, Timeline, exact
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
+from hapticlink.orchestrator.plan.dependency_order import whole_fmus
 from hapticlink.orchestrator.plan.event_kinds import key_of, keyed_events
 from hapticlink.orchestrator.plan.operations import Event, Instruction, Push
 from hapticlink.orchestrator.plan.plan import Plan
@@ -27,7 +28,9 @@ from hapticlink.orchestrator.run.compiled.fmus import Memory
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
+from hapticlink.orchestrator.run.initialize import MOST, TOLERANCE, StartValues
 from hapticlink.orchestrator.run.instructions import Move, Sample, instructions
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import build_system
@@ -137,11 +140,30 @@ def resolve_scene(
         simulation = Simulation(system, RunResults(), stack)
         refusals.of_simulation(simulation, scene.title)
         simulation.start()
-        if not simulation.swept:
+        if simulation.loops_at_start and not _settles(system):
             why = "an algebraic loop at t = 0 is solved by Newton's method, in Python"
             refusals.refuse(scene.title, [why])
         recorded = _find_recorded(fetched)
         yield _resolve(scene, plan, simulation, outside, foreign, rooms, recorded, changing)
+
+
+def _settles(system: System) -> bool:
+    """Whether start values agree after they are passed on from block to block as often as `settle`
+    of program.c does."""
+    with ExitStack() as stack:
+        fmus = LoadedFmus(system, stack)
+        start, values = StartValues(fmus), fmus.signals.values
+        every = start.evaluations(whole_fmus(system))
+        for instance in fmus.instances.values():
+            instance.enter_initialization(system.timeline.seconds(system.timeline.end))
+            instance.read()
+        for _ in range(MOST):
+            before = values.copy()
+            for each in every:
+                start.evaluate([each])
+            if np.isclose(values, before, TOLERANCE, TOLERANCE, equal_nan=True).all():
+                return True
+    return False
 
 
 def _find_recorded(system: System) -> frozenset[str]:

@@ -137,7 +137,8 @@ def _scene(
             f"#define WITHOUT_BYTES {_lacking(resolved, SERIALISED)}",
             f"#define ALTERNATIVES(s) {'(s)->alternatives' if changes.choices else '((Hold **)0)'}",
             "#define MEMBERS(X) " + " ".join(
-                f"X({ids[fmu]}, {json.dumps(fmu)}, {json.dumps(guids[fmu])})" for fmu in members
+                f"X({ids[fmu]}, {json.dumps(fmu)}, {json.dumps(guids[fmu])}, "
+                f"{resolved.system.fmu[fmu].description.tolerance or 0.0})" for fmu in members
             ),
             data.structure,
             f"static const Scene initial = {data.values};",

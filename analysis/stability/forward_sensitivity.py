@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -150,6 +151,11 @@ class ForwardSensitivity:
             return found
         owners = tuple(o for o in reach.state.owners if o != SIGNALS)
         before = reach.state.sizes()
+        if isinstance(operation, Step):  # steps that were left out have not moved the FMU
+            begin = tick + Fraction(operation.part * operation.dticks, operation.parts)
+            reach.state.set_time(
+                operation.fmu, float(begin * self._simulation.system.timeline.base)
+            )
         slopes, after = self._slopes(tick, operation, call, reach)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
         reach.applied[since] = made = Applied(

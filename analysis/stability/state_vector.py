@@ -103,6 +103,18 @@ class StateVector:
             block.restore(saved, numbers[first : first + len(saved.numbers)])
             first += len(saved.numbers)
 
+    def set_time(self, name: str, time: float) -> None:
+        """Has an FMU of this project stand at a time (s), the number before all others of its
+        serialised state; what others have there is not known."""
+        instance = self._simulation.instances[name]
+        about = instance.description
+        if about.block is not None and about.states is not None:
+            state = instance.serialized()
+            values = doubles(state).copy()
+            scalars = [s for s in about.scalars if s.causality != "independent"]
+            values[-len(scalars) - len(about.states) - 1] = time
+            instance.deserialize(state[: len(state) - values.nbytes] + values.tobytes())
+
     def now(self) -> Vector:
         """The numbers of the simulation as it is."""
         instances = self._simulation.instances

@@ -19,7 +19,8 @@
    values set so far. The Python FMU (python_slave.py) does the same operations in the same order.
    Nothing is shared between instances: the tables are constant, the rest stands in a Model.
 
-   A call out of order (section 4.2.4), a null pointer and a time that is not finite are errors that
+   A call out of order (section 4.2.4), a null pointer, a time that is not finite, and a step that does
+   not begin where the last one ended, goes back or nowhere, or beyond the stop time, are errors that
    change nothing. */
 #include <math.h>
 #include <stdarg.h>
@@ -37,6 +38,8 @@
 
 typedef const fmi2ValueReference *References;
 
+static const double NEAR = 1e-3; /* share of a step by which its begin and end may be off */
+
 enum { SETTABLE = N_U + N_P, REALS = N_U + N_P + N_Y };
 enum { WITH_OUTPUTS = SAMPLED ? 0 : SUBSTEPS - 1 }; /* the substep that evaluates them */
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8 }; /* modes */
@@ -52,6 +55,7 @@ typedef struct {
     fmi2CallbackFunctions callbacks;
     double trial[N_X], after[N_X], sample[N_Y];
     double shared[N_Z + 1], next[N_Z + 1]; /* z, and the one after a step */
+    double stop;                           /* INFINITY where none is defined */
     double shared_time;                    /* for which z was evaluated; NAN: it is out of date */
     char name[];
 } Model;
@@ -141,6 +145,7 @@ static void restart(Model *m) {
     m->now.mode = INSTANTIATED;
     m->now.start_due = m->now.output_due = 1;
     m->shared_time = NAN;
+    m->stop = INFINITY;
 }
 
 /* --- life of an instance -------------------------------------------------------------------- */
@@ -161,6 +166,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
     if (!isfinite(start)) return fail(m, fmi2Error, "the start time is %s", number(start).text);
     m->now.time = start;
+    m->stop = has_stop ? stop : INFINITY;
     return fmi2OK;
 }
 
@@ -233,13 +239,29 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
 
 /* --- stepping ------------------------------------------------------------------------------- */
 
+/* Whether a step does not begin where the FMU stands and end later, at the stop time at most. Steps
+ * whose times are added up are off by less than NEAR of one. */
+static int refuses_step(const Model *m, double start, double size) {
+    const double end = start + size, near = NEAR * size;
+    if (!(size > 0.0) || !isfinite(end))
+        fail(m, fmi2Error, "a step from t = %s by %s s has no end after it", number(start).text,
+             number(size).text);
+    else if (!(fabs(start - m->now.time) <= near))
+        fail(m, fmi2Error, "a step from t = %s s: the FMU stands at %s s", number(start).text,
+             number(m->now.time).text);
+    else if (end > m->stop + near)
+        fail(m, fmi2Error, "a step to t = %s s, beyond the stop time %s s", number(end).text,
+             number(m->stop).text);
+    else
+        return 0;
+    return 1;
+}
+
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolean no_way_back) {
     Model *m = c;
     if (out_of_order(m, __func__, STEP)) return fmi2Error;
-    if (!isfinite(start + size))
-        return fail(m, fmi2Error, "a step from t = %s by %s s has no end", number(start).text,
-                    number(size).text);
     double time, h = size / SUBSTEPS, end = start + size;
+    if (refuses_step(m, start, size)) return fmi2Error;
     double *const y = SAMPLED ? m->sample : m->now.reals + SETTABLE;
     const double *arguments[N_ARG] = {m->trial, m->now.reals, m->now.reals + N_U, &time, &h, &end,
                                       m->shared};

@@ -109,22 +109,24 @@ def _watch(end: Action) -> Iterator[None]:
 
     def watch() -> None:
         count = 0
-        while number := os.read(reading, 1):
-            count += number[0] in SIGNALS
-            if count > 1:
-                time.sleep(GRACE)
-                last = threading.Timer(ENOUGH, os._exit, (1,))
-                last.daemon = True
-                last.start()
-                _end(end)
-        os.close(reading)
+        with suppress(OSError):  # an FMU may have closed either end
+            while number := os.read(reading, 1):
+                count += number[0] in SIGNALS
+                if count > 1:
+                    time.sleep(GRACE)
+                    last = threading.Timer(ENOUGH, os._exit, (1,))
+                    last.daemon = True
+                    last.start()
+                    _end(end)
+            os.close(reading)
 
     threading.Thread(target=watch, daemon=True).start()
     try:
         yield
     finally:
         signal.set_wakeup_fd(before)
-        os.close(writing)
+        with suppress(OSError):
+            os.close(writing)
 
 
 def end_process() -> None:

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from hapticlink.fmus.plain_folder import find_unpacking_folder
+
 
 def _prefix() -> str:
     """`hapticlink-<machine>-`; on Linux each container counts as a machine, since it has its own
@@ -25,8 +27,8 @@ def _prefix() -> str:
 
 def make_folder() -> str:
     """Creates a temporary folder `hapticlink-<machine>-<process>-<random>`, which the caller has to
-    remove."""
-    return tempfile.mkdtemp(prefix=f"{_prefix()}{os.getpid()}-")
+    remove, where FMUs can be unpacked."""
+    return tempfile.mkdtemp(prefix=f"{_prefix()}{os.getpid()}-", dir=find_unpacking_folder())
 
 
 @contextmanager
@@ -57,14 +59,15 @@ def clear(ended: int | None = None) -> None:
     if os.name != "posix":
         return
     ours = re.compile(rf"{_prefix()}(\d+)-\w+")
-    with suppress(OSError), os.scandir(tempfile.gettempdir()) as entries:
-        for entry in entries:
-            match = ours.fullmatch(entry.name)
-            if not match or not entry.is_dir(follow_symlinks=False):
-                continue
-            owner, own = int(match[1]), entry.stat(follow_symlinks=False).st_uid == os.getuid()
-            if own and (owner == ended or not lives(owner)):
-                shutil.rmtree(entry.path, ignore_errors=True)
+    for folder in {tempfile.gettempdir(), find_unpacking_folder()}:
+        with suppress(OSError), os.scandir(folder) as entries:
+            for entry in entries:
+                match = ours.fullmatch(entry.name)
+                if not match or not entry.is_dir(follow_symlinks=False):
+                    continue
+                owner, own = int(match[1]), entry.stat(follow_symlinks=False).st_uid == os.getuid()
+                if own and (owner == ended or not lives(owner)):
+                    shutil.rmtree(entry.path, ignore_errors=True)
 
 
 UNFINISHED = re.compile(r"\..+\.(?:rows\.(\d+)|(\d+)\.[0-9a-f]{32}(?:\.\w+)?)")

@@ -186,13 +186,20 @@ class InProcess(Instance):
         self._carry_out(transfers, "sets")
 
     def enter_initialization(self, stop_time: float) -> None:
-        self._call("fmi2SetupExperiment", False, 0.0, 0.0, True, stop_time)
+        self._call("fmi2SetupExperiment", *self._tolerance, 0.0, True, stop_time)
         self._set_starts()
         self._call("fmi2EnterInitializationMode")
+
+    @property
+    def _tolerance(self) -> tuple[bool, float]:
+        """Whether there is a tolerance for its solver, and which."""
+        tolerance = self.description.tolerance
+        return tolerance is not None, tolerance or 0.0
 
     def exit_initialization(self) -> None:
         self._call(f"fmi{self.description.fmi}ExitInitializationMode")
         self._initialized = True
+        self.read()
         self._start_loop()
 
     def _call(self, name: str, *arguments: Any) -> None:
@@ -217,6 +224,12 @@ class InProcess(Instance):
 
     def read(self) -> None:
         self._carry_out(self.asked, "gets")
+
+    def read_some(self, places: Sequence[int]) -> None:
+        values = np.zeros(len(places))
+        scalars = [self.description.outputs[i] for i in places]
+        self._carry_out(self._transfers("Get", scalars, values), "gets")
+        self.outputs[list(places)] = values
 
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
         return derivatives(self.slave, self.description, outputs, inputs)

@@ -3,9 +3,11 @@ and its timing."""
 
 from __future__ import annotations
 
+import math
 import re
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
@@ -64,9 +66,13 @@ class Description:
     """The capabilities of its CoSimulation element that are true."""
     step_size: str | None = None
     """Of its default experiment (s), as it is written."""
+    tolerance: float | None = None
+    """The relative tolerance that its solver is told: of its default experiment, or the scene."""
     dependencies: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """By output: the variables that it depends on directly. An output that is not here may depend
     on every input."""
+    initial_dependencies: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """The same in initialisation mode, where parameters count too (InitialUnknowns)."""
     strings: tuple[Scalar, ...] = ()
     """Variables that are text or binary; of a system, those that are not connected."""
     derivatives: Mapping[str, str] = field(default_factory=dict)
@@ -120,6 +126,16 @@ class Description:
             inputs = (s for s in self.scalars if s.causality == "input")
         declared = self.dependencies.get(output.name, self.dependencies.get(output.port))
         return declared is None or any(s.name in declared or s.port in declared for s in inputs)
+
+    def follows_at_start(self, output: Scalar, inputs: Sequence[Scalar]) -> bool:
+        """Whether an output depends on one of `inputs`, all inputs or all parameters, in
+        initialisation mode. Of an output that is none of the InitialUnknowns only `dependencies`
+        are known, which leave parameters out."""
+        declared = self.initial_dependencies
+        names = declared.get(output.name, declared.get(output.port))
+        if names is None:
+            return inputs[0].causality != "input" or self.follows(output, inputs)
+        return any(s.name in names or s.port in names for s in inputs)
 
     def derivative(self, outputs: Iterable[Scalar]) -> tuple[Scalar, ...] | None:
         """The outputs that are the derivatives of `outputs`, all or none."""
@@ -182,6 +198,7 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
         fmi=version,
         flags=frozenset(capable),
         step_size=model.defaultExperiment and model.defaultExperiment.stepSize,
+        tolerance=_read_tolerance(model.defaultExperiment),
         clocks=ticking,
         block=None if annotation.block(tree) is None else model.modelName,
         **variables,
@@ -235,18 +252,31 @@ def _variables(
     scalars = annotation.with_units(tree, numbered)
     strings = tuple(text(v) for v in model.modelVariables if v.type in WRITTEN and not v.shape)
     require_unique(s.name for s in (*scalars, *strings))
-    dependencies = {
-        output.variable.name: frozenset(v.name for v in output.dependencies)
-        for output in model.outputs
-        if output.dependencies is not None
-    }
     return {
         "scalars": scalars,
         "strings": strings,
         "units": {u.name: u for u in map(Unit.read, tree.iterfind("UnitDefinitions/Unit"))},
         "derivatives": derivatives(model),
-        "dependencies": dependencies,
+        "dependencies": _read_dependencies(model.outputs),
+        "initial_dependencies": _read_dependencies(model.initialUnknowns),
     }
+
+
+def _read_dependencies(unknowns: Iterable[Any]) -> dict[str, frozenset[str]]:
+    """By variable those that it depends on, where that is declared."""
+    return {
+        unknown.variable.name: frozenset(v.name for v in unknown.dependencies)
+        for unknown in unknowns
+        if unknown.dependencies is not None
+    }
+
+
+def _read_tolerance(experiment: Any) -> float | None:
+    """The tolerance of a default experiment, None where it is no positive number."""
+    with suppress(TypeError, ValueError):
+        if experiment and 0.0 < (tolerance := float(experiment.tolerance)) < math.inf:
+            return tolerance
+    return None
 
 
 def _only_xml(text: bytes) -> BytesIO:

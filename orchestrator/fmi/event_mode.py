@@ -306,6 +306,12 @@ class InProcessWithEvents(InProcess3):
         self._read_those(None)
         self.outputs[:] = self.pending.values
 
+    def read_some(self, places: Sequence[int]) -> None:
+        if self._clocks:
+            self.read()
+        else:
+            super().read_some(places)
+
     # --- states ---------------------------------------------------------------------------
 
     def save(self, slot: int = 0) -> None:

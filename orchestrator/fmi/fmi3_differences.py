@@ -81,4 +81,4 @@ class InProcess3(InProcess):
             self._set_starts(structural=True)
             self._call("fmi3ExitConfigurationMode")
         self._set_starts()
-        self._call("fmi3EnterInitializationMode", False, 0.0, 0.0, True, stop_time)
+        self._call("fmi3EnterInitializationMode", *self._tolerance, 0.0, True, stop_time)

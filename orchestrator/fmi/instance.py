@@ -15,13 +15,16 @@ from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import Diverged, Fault, FmuFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 
 if TYPE_CHECKING:  # a worker process need not load what reads scenes
     from hapticlink.orchestrator.fmi.start_values import Starts
 
 GROWTH = 1e12
 """Times the larger of its start and its nominal, for an output that states no bound."""
+UNKNOWN_GROWTH = 1e100
+"""The same for one without a unit, which may stand for infinity by a larger number: it diverges
+where it grows beyond."""
 _CALLS = ("get", "rollback", "save", "set", "step")
 
 
@@ -63,17 +66,21 @@ class OutputBounds:
     def __init__(self, description: Description, outputs: Vector) -> None:
         self._scalars, self._outputs = description.outputs, outputs
         self.inverse, self._shares = np.zeros(len(outputs)), np.zeros(len(outputs))
+        self._before = np.zeros(len(outputs))
 
     def start(self) -> None:
-        """Sets the bounds from the start values. Integers have the bounds of their types; a Real
-        without a unit is no known physical quantity and has none."""
+        """Sets the bounds from the start values. Integers have the bounds of their types."""
         nominal = np.array([s.nominal for s in self._scalars])
-        bounds = GROWTH * np.maximum(np.abs(self._outputs), nominal)
+        scales = np.maximum(np.abs(self._outputs), nominal)
+        bounds = GROWTH * scales
         for i, scalar in enumerate(self._scalars):
             if scalar.bound:
                 bounds[i] = scalar.bound
-            elif scalar.unit is None or scalar.type not in ("Real", "Float64", "Float32"):
+            elif scalar.type not in CONTINUOUS:
                 bounds[i] = np.inf
+            elif scalar.unit is None:
+                bounds[i] = UNKNOWN_GROWTH * scales[i]
+                self._before[i] = np.inf
         self.inverse[:] = 1.0 / bounds
 
     def hold(self) -> bool:
@@ -81,6 +88,15 @@ class OutputBounds:
         vector, since this is asked at every read."""
         np.multiply(self._outputs, self.inverse, out=self._shares)
         return bool(self._shares.dot(self._shares) <= 1.0)  # not where one is NaN or infinite
+
+    def find_diverged(self) -> int | None:
+        """The first output that is beyond its bound, without a unit further than when it was last
+        found there; None where there is none."""
+        shares = np.abs(self._outputs) * self.inverse
+        diverged = (shares > 1.0) & (shares > self._before)
+        unknown = self._before > 0.0
+        self._before[unknown] = np.where(shares > 1.0, shares, np.inf)[unknown]
+        return int(np.argmax(diverged)) if diverged.any() else None
 
 
 class Instance(ABC):
@@ -186,15 +202,22 @@ class Instance(ABC):
 
     @abstractmethod
     def enter_initialization(self, stop_time: float) -> None:
-        """Set the start values and enter initialisation mode."""
+        """Tell the stop time (s) and the tolerance of the description, set the start values, and
+        enter initialisation mode."""
 
     @abstractmethod
     def exit_initialization(self) -> None:
-        """Leave initialisation mode and enter step mode."""
+        """Leave initialisation mode, enter step mode, and read all outputs again: an FMU may
+        compute them in this call."""
 
     @abstractmethod
     def read(self) -> None:
         """Read all outputs without checking that they are finite."""
+
+    @abstractmethod
+    def read_some(self, places: Sequence[int]) -> None:
+        """Read the outputs at these indices, whole arrays of FMI 3.0, and others only where they
+        come with them."""
 
     @abstractmethod
     def step(self, time: float, end: float, size: float) -> None:
@@ -256,9 +279,7 @@ class Instance(ABC):
             lost = ~np.isfinite(self.outputs)
             self.outputs[lost] = self.good[lost]
             self.held += int(lost.sum())
-        shares = np.abs(self.outputs) * self.bounds.inverse
-        if (shares > 1.0).any():
-            first = int(np.argmax(shares > 1.0))
+        if (first := self.bounds.find_diverged()) is not None:
             name, bound = self.description.outputs[first].name, 1.0 / self.bounds.inverse[first]
             beyond = f"output {name} is {self.outputs[first]:.3g}, beyond {bound:.3g}"
             remedy = "take a higher rate, a finer integrator, or weaker gains"

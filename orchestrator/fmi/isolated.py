@@ -147,6 +147,7 @@ class Isolated(Instance):
 
     def exit_initialization(self) -> None:
         self._ask("exit_initialization")
+        self.read()
         self._start_loop()
 
     def read(self) -> None:
@@ -155,6 +156,9 @@ class Isolated(Instance):
         if isinstance(self._fresh, FmuFault):
             raise self._fresh
         self.outputs[:] = np.frombuffer(self._fresh)
+
+    def read_some(self, places: Sequence[int]) -> None:
+        self.outputs[list(places)] = np.frombuffer(self._ask("read_some", places))
 
     def step(self, time: float, end: float, size: float) -> None:
         if self.ended:

@@ -20,10 +20,11 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache, wraps
 from inspect import getattr_static, isfunction
+from numbers import Integral
 from pathlib import Path
 from traceback import extract_tb
 from types import SimpleNamespace
@@ -33,6 +34,7 @@ from fmpy import sharedLibraryExtension
 
 from hapticlink.fmus import cache as fmu_cache
 from hapticlink.fmus.atomic_file import atomic_file
+from hapticlink.fmus.plain_folder import require_plain
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.fmi.description import PLATFORMS
 from hapticlink.orchestrator.fmi.status import require_success
@@ -85,6 +87,8 @@ CALLED = re.compile(
     r"|([gs]et)_(real|integer|boolean|string|float\d+|u?int\d+)"
 )
 """The methods of a slave that a library calls."""
+INTEGERS = re.compile(r"get_(u?)int(eger|\d+)")
+"""Those whose numbers it cuts to so many bits, 32 of an Integer, without a word."""
 
 
 def is_python(loaded: ctypes.CDLL) -> bool:
@@ -95,7 +99,7 @@ def is_python(loaded: ctypes.CDLL) -> bool:
 def prepare(loaded: ctypes.CDLL, folder: str) -> str:
     """The Python module of an FMU whose library, loaded from its `folder`, holds an interpreter,
     which is then released when this process ends; "" for other FMUs. Raises ValueError where such a
-    library would find no module."""
+    library would find no module, FmuError where it would not from this folder."""
     if not is_python(loaded):
         return ""
     if os.name == "posix":
@@ -107,6 +111,7 @@ def prepare(loaded: ctypes.CDLL, folder: str) -> str:
     with suppress(OSError, ValueError):
         name = (resources / "slavemodule.txt").read_text(encoding="utf-8").strip()
         if (resources / f"{name}.py").is_file():
+            require_plain(folder)
             return name
     raise ValueError("resources/slavemodule.txt names no module beside it; build the FMU again")
 
@@ -133,20 +138,55 @@ def tell_exceptions(module: str, instance: str, tell: Callable[[bytes], object])
 
 
 def _telling(method: Callable[..., Any], module: str, own_files: Path) -> Callable[..., Any]:
+    limits = _find_limits(method.__name__)
+
     @wraps(method)
     def telling(slave: Any, *arguments: Any, **named: Any) -> Any:
+        tell = _told.get((module, getattr(slave, "instance_name", "")), _tell_nobody)
         try:
-            return method(slave, *arguments, **named)
+            result = method(slave, *arguments, **named)
         except Exception as error:
             frames = extract_tb(error.__traceback__)
             last = ([f for f in frames if Path(f.filename).parent == own_files] or frames)[-1]
             where = f"{Path(last.filename).name}, line {last.lineno}, in {last.name}: {last.line}"
-            if tell := _told.get((module, getattr(slave, "instance_name", ""))):
-                tell(f"{where}: {type(error).__name__}: {error}".encode())
+            tell(f"{where}: {type(error).__name__}: {error}".encode())
             raise
+        if limits and (cut := _find_cut(slave, result, limits, *arguments)):
+            tell(cut.encode())
+            raise OverflowError(cut)
+        return result
 
     vars(telling)[TELLS] = True
     return telling
+
+
+def _tell_nobody(text: bytes) -> None:
+    """For an instance of which nobody wants to know."""
+
+
+def _find_limits(method: str) -> range | None:
+    """The integers that a library passes on of what a method returns; None of one without."""
+    if not (found := INTEGERS.fullmatch(method)):
+        return None
+    size = 2 ** (32 if found[2] == "eger" else int(found[2]))
+    return range(size) if found[1] else range(-size // 2, size // 2)
+
+
+def _find_cut(slave: Any, result: Any, limits: range, references: Sequence[int]) -> str:
+    """Which integer a library would cut, as a message; "" if none. pythonfmu3 itself has cut those
+    of 64 bits without a sign, which are therefore asked for."""
+    if not isinstance(result, list):
+        return ""  # which the library refuses
+    if any(isinstance(value, ctypes.c_uint64) for value in result):
+        every = (slave.vars[r].getter() for r in references)
+        result = [v for each in every for v in (each if isinstance(each, list) else [each])]
+    beyond = (i for i, v in enumerate(result) if isinstance(v, Integral) and int(v) not in limits)
+    if (wrong := next(beyond, None)) is None:
+        return ""
+    scalars = len(result) == len(references) and hasattr(slave, "vars")
+    name = slave.vars[references[wrong]].name if scalars else "an entry of an array"
+    holds = f"its type holds {limits[0]} to {limits[-1]}"
+    return f"{name} is {result[wrong]}: {holds}, and the FMU's library would cut it"
 
 
 def find_shared_library(folder: Path, library: Path) -> Path | None:

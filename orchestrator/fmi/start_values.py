@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 
 Given = bool | int | float | str
 """A start value as a scene gives it."""
@@ -40,7 +40,7 @@ def fit_start_value(scalar: Scalar, given: Given) -> Given:
 
 def _takes(scalar: Scalar) -> type | tuple[type, type]:
     """The Python types of the start values of a variable."""
-    if scalar.type in ("Real", "Float64", "Float32"):
+    if scalar.type in CONTINUOUS:
         return (int, float)
     return {"Boolean": bool, "String": str, "Binary": str}.get(scalar.type, int)
 

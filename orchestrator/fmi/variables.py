@@ -21,6 +21,8 @@ TYPES = (
 )  # fmt: skip
 """The FMI types, by the name in their get and set functions: FMI 2.0's two, FMI 3.0's ten, Boolean
 of both, Clock, whose number is how often it has been active, and those that are no numbers."""
+CONTINUOUS = ("Real", "Float64", "Float32")
+"""Those of floating point."""
 WRITTEN = ("String", "Binary")
 """The FMI types that are no numbers: signals have the number of the text (`texts`)."""
 _CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}

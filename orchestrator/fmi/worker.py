@@ -69,6 +69,10 @@ class HostedFmu:
         self.instance.read()
         return self.instance.outputs.tobytes()
 
+    def read_some(self, places: Sequence[int]) -> bytes:
+        self.instance.read_some(places)
+        return self.instance.outputs[list(places)].tobytes()
+
     def step(self, time: float, end: float, size: float) -> Any:
         """Returns (outputs, or the fault in reading them; whether the FMU has requested the end;
         time spent in doStep (s))."""

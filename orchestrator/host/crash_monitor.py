@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import subprocess
 import sys
@@ -10,6 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hapticlink.orchestrator.base import interrupt
+
+CLOSED = (
+    "an FMU has closed files of this process that it had not opened; with isolate = true each FMU "
+    "has a process of its own"
+)
 
 
 @contextmanager
@@ -26,15 +32,21 @@ def watch_for_crash(
     command = [sys.executable, "-P", "-m", recording, str(folder.resolve()), str(os.getpid())]
     # A session of its own keeps the terminal's Ctrl-C from it. Its standard input is closed by the
     # operating system when this process ends.
-    with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
-        interrupt.add(process.kill)
-        exit_at_once = os._exit
-        os._exit = lambda status: exit_at_once(status or 1)
-        guard_exit(1)
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
+    interrupt.add(process.kill)
+    exit_at_once = os._exit
+    os._exit = lambda status: exit_at_once(status or 1)
+    guard_exit(1)
+    try:
+        yield
+    finally:
+        guard_exit(0)
+        os._exit = exit_at_once
+        interrupt.remove(process.kill)
+        process.kill()
+        assert process.stdin is not None
         try:
-            yield
-        finally:
-            guard_exit(0)
-            os._exit = exit_at_once
-            interrupt.remove(process.kill)
-            process.kill()
+            process.stdin.close()
+        except OSError:
+            logging.getLogger(__name__).warning(CLOSED)
+        process.wait()

@@ -3,13 +3,18 @@ records a fault of kind `Crash` in run.json and removes the temporary folders.""
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
+
+POLL = 0.05
+"""Time (s) between two looks whether the run's process has ended."""
 
 
 def record_crash(folder: Path, process: int) -> None:
@@ -38,6 +43,9 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     sys.stdin.buffer.read()
+    # An FMU may have closed the other end of it in a process that goes on.
+    while os.name == "posix" and os.getppid() == int(sys.argv[2]):
+        time.sleep(POLL)
     # A full disk, a folder that was removed, or one that another run writes to already.
     with suppress(OSError, InputFault):
         record_crash(Path(sys.argv[1]), int(sys.argv[2]))

@@ -11,7 +11,9 @@ import ctypes
 import errno
 import mmap
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
@@ -95,63 +97,84 @@ class RowsBeingWritten:
     """A file of up to `most` rows, into which a run writes: `rows` are all that it can have, of
     which the first `filled` are written and the first `reserved` have their place on the disk.
 
+    `path` is where it is. No descriptor of it stays open: FMUs share those of a process, and one
+    that closes what is not its own would have rows written into whatever is opened next.
+
     Raises OSError, as on a full disk, and where there is a file already.
     """
 
     def __init__(self, path: Path, columns: tuple[str, ...], most: int) -> None:
         line = header(columns)
         self._begin, self._row = _data(line), 8 * len(columns)
-        self._file = path.open("xb+", buffering=0)  # never through a link
-        self.reserved = 0
-        try:
-            self._file.write(line.ljust(self._begin - COUNT, b"\n") + bytes(COUNT))
-            self._memory = self._map(max(most, 1))
-            self.reserve()
-        except OSError:
-            self._file.close()
-            path.unlink()
-            raise
+        self.path, self.reserved = path, 0
+        with path.open("xb+", buffering=0) as file:  # never through a link
+            self._identity = _identify(file)
+            try:
+                file.write(line.ljust(self._begin - COUNT, b"\n") + bytes(COUNT))
+                self._memory = self._map(file, max(most, 1))
+                self._reserve(file)
+            except OSError:
+                path.unlink()
+                raise
         self.filled = ctypes.c_int64.from_buffer(self._memory, self._begin - COUNT)
         flat = np.frombuffer(self._memory, np.float64, offset=self._begin)
         self.rows: Rows = flat.reshape(-1, len(columns))
 
-    def _map(self, most: int) -> mmap.mmap:
+    def _map(self, file: FileIO, most: int) -> mmap.mmap:
         """The file in memory, with room for `most` rows or, where files are not that long (4 GB on
         FAT, 16 TB on ext4), for half of them, a quarter and so on."""
         size = self._begin + most * self._row
         try:
-            self._file.truncate(size)
-            return mmap.mmap(self._file.fileno(), size)
+            file.truncate(size)
+            return mmap.mmap(file.fileno(), size)
         except (OSError, OverflowError):
             if most == 1:
                 raise
-            return self._map(most // 2)
+            return self._map(file, most // 2)
 
     def reserve(self) -> None:
-        """Have a place on the disk for further rows. Raises OSError where not one more fits."""
+        """Have a place on the disk for further rows. Raises OSError where not one more fits, and
+        where another file has taken the place of this one."""
+        with self._reopen() as file:
+            self._reserve(file)
+
+    @contextmanager
+    def _reopen(self) -> Iterator[FileIO]:
+        with self.path.open("rb+", buffering=0) as file:
+            if _identify(file) != self._identity:
+                what = "another file has taken the place of the rows of a run"
+                raise OSError(errno.EEXIST, what, str(self.path))
+            yield file
+
+    def _reserve(self, file: FileIO) -> None:
         begin = self._begin + self.reserved * self._row
         if begin == len(self._memory):
             raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
-        self._file.seek(begin)
+        file.seek(begin)
         left = memoryview(bytes(min(max(RESERVED, self._row), len(self._memory) - begin)))
         with suppress(OSError):
             while left:
-                left = left[self._file.write(left) :]
-        if (more := (self._file.tell() - begin) // self._row) == 0:
-            self._file.write(left)  # which says why
+                left = left[file.write(left) :]
+        if (more := (file.tell() - begin) // self._row) == 0:
+            file.write(left)  # which says why
         self.reserved += more
         with suppress(AttributeError, OSError):  # not on Windows, nor where memory is locked
             self._memory.madvise(mmap.MADV_DONTNEED)  # rows that are written need no memory
 
     def close(self) -> None:
-        """Close the file, which then ends with its last row. Nothing may write rows any more."""
+        """The file ends with its last row. Nothing may write rows any more."""
         size = self._begin + self.filled.value * self._row
         del self.rows, self.filled
         with suppress(BufferError):  # somebody else still has them
             self._memory.close()
-        with suppress(OSError):  # Windows shortens no file that is mapped
-            self._file.truncate(size)
-        self._file.close()
+        with suppress(OSError), self._reopen() as file:  # Windows shortens none that is mapped
+            file.truncate(size)
+
+
+def _identify(file: FileIO) -> tuple[int, int]:
+    """What tells an open file from all others."""
+    status = os.fstat(file.fileno())
+    return status.st_dev, status.st_ino
 
 
 def text(rows: Rows) -> bytes:

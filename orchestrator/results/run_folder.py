@@ -66,6 +66,9 @@ class RunFolder(RunResults):
     def finish(self) -> None:
         if self._csv:
             super().finish()
+        else:
+            for recorder in self._recorders.values():
+                recorder.require_whole()
 
     def _publish(self) -> None:
         """Called by each recorder after its first row; once all have one, replaces the results of

@@ -57,6 +57,13 @@ class Recorder:
         """The time (s) of the newest row, None before the first."""
         return self.reached.value if self.count.value else None
 
+    @property
+    def recorded(self) -> int:
+        """The rows that were to be written so far, of those that were counted."""
+        count = self.count.value
+        ended = count > self.end > 0 and self.end % self.every != 0
+        return 0 if self.rows is None else -(-count // self.every) + ended
+
     def row(self, time: float) -> None:
         """Write a row at `time` (s). Raises OSError, as on a full disk."""
         if self.due.value and self.rows is not None:
@@ -82,7 +89,11 @@ class Recorder:
         """Replace the table of an earlier run by this one."""
 
     def finish(self) -> None:
-        """Make the CSV of the rows, which stay. Raises OSError, as on a full disk."""
+        """Make the CSV of the rows, which stay, and `require_whole`. Raises OSError, as on a full
+        disk."""
+
+    def require_whole(self) -> None:
+        """Raises Fault where the file does not have the rows that were recorded."""
 
     def __enter__(self) -> Recorder:
         return self

@@ -13,6 +13,7 @@ from typing import Any
 
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_results import Recorder
 
@@ -72,11 +73,25 @@ class FileRecorder(Recorder):
         if self._file:
             if self._unfinished != self.target:
                 os.replace(self._unfinished, self.target)
+                self._file.path = self.target
             self._published = True
 
     def finish(self) -> None:
-        if self._published:
-            make_csv(self.path, rows_file.RowsFile(self.target))
+        if self._file and self.last is not None:
+            table = rows_file.RowsFile(self.target)
+            make_csv(self.path, table)
+            self._require_rows(table)
+
+    def require_whole(self) -> None:
+        if self._file and self.last is not None:
+            self._require_rows(rows_file.RowsFile(self.target))
+
+    def _require_rows(self, table: rows_file.RowsFile) -> None:
+        if (written := len(table)) != self.recorded:
+            raise Fault(
+                f"{self.path}: {written} rows, where {self.recorded} were recorded: somebody else "
+                "wrote there; take another folder, and isolate = true if an FMU may have done it"
+            )
 
     def discard(self) -> None:
         """Remove the rows, where they are not published."""

@@ -120,14 +120,10 @@ class FixedPoint:
             responses.append(values.copy())
         values[:] = before
         tangent = np.stack(responses[1:], axis=1) - responses[0][:, None]
-        slopes = np.zeros((len(values), len(places)))
-        for partial in self._partial:
-            through = partial.of(tangent)
-            if through is None:
-                self._partial = None
-                return None
-            slopes[list(partial.rows)] = through
-        return slopes[places] - np.eye(len(places))
+        jacobian = jacobians.jacobian_of_residual(self._partial, tangent, places)
+        if jacobian is None:
+            self._partial = None
+        return jacobian
 
     def _unconverged(self, solution: Solution, tick: int) -> None:
         self.counts.unconverged += 1

@@ -69,3 +69,18 @@ def find_derivatives(
             return None
         found.append(partial)
     return found
+
+
+def jacobian_of_residual(
+    every: Sequence[PartialDerivatives], tangent: Matrix, places: Sequence[int]
+) -> Matrix | None:
+    """The Jacobian of g(w) - w for the outputs g at `places`, where `tangent` (signals, places) are
+    the derivatives of all signals by w; None where an FMU gives none of its own."""
+    slopes = np.zeros((len(tangent), len(places)))
+    for partial in every:
+        through = partial.of(tangent)
+        if through is None:
+            return None
+        slopes[list(partial.rows)] = through
+    jacobian: Matrix = slopes[list(places)] - np.eye(len(places))
+    return jacobian

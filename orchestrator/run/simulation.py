@@ -44,8 +44,8 @@ class Simulation(LoadedFmus):
     springs: the energy tanks. pace: the schedule of a run in real time. beside: the FMUs whose
     steps are then taken beside the loop, each with its clock; `sides` and `arrivals`, tables of
     their samples, are by clock, `frames`, tables of what went to other computers, by FMU. late:
-    ticks by which the current event comes after its own. swept: whether sweeps alone have
-    initialised the FMUs.
+    ticks by which the current event comes after its own. loops_at_start: whether start values
+    depend on each other.
     """
 
     def __init__(self, system: System, results: RunResults, stack: ExitStack) -> None:
@@ -58,7 +58,7 @@ class Simulation(LoadedFmus):
         self.arrivals: dict[str, Recorder] = {}
         self.frames: dict[str, Recorder] = {}
         self.late = 0
-        self.swept = False
+        self.loops_at_start = False
         self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
         repeated = system.coupling.scheme == "iterated"
@@ -83,7 +83,7 @@ class Simulation(LoadedFmus):
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
         create the recorders."""
-        self.swept = initialize(self)
+        self.loops_at_start = initialize(self, rates_change=self.pace is not None)
         values = self.signals.values
         for hold in self.holds.values():
             hold.push(0, values[hold.places], 0)

@@ -63,8 +63,12 @@ class Aitken:
 
 
 class Newton:
-    """w <- w - J^-1 r, with J by finite differences (one evaluation of r per column), updated by
-    Broyden's rank-one formula and evaluated anew where a step does not halve the error.
+    """w <- w - share J^-1 r, with J by finite differences (one evaluation of r per column), updated
+    by Broyden's rank-one formula and evaluated anew where a step does not halve the error.
+
+    share is 1 unless the whole step with a new J does not reduce the error, in units of 1 + |w|
+    before the step; it is then halved until the step does, as it also does where r is not finite
+    (damped Newton: Deuflhard 2011, section 3.1).
 
     `supplied` may return J at the last point, or None; a supplied J that does not halve the error
     is replaced by differences. `jacobians` counts evaluations of J by differences,
@@ -73,6 +77,8 @@ class Newton:
 
     STEP = 1e-6
     """Increment of a finite difference, relative to 1 + |w|."""
+    SMALLEST = 2.0**-20
+    """Smallest share of a step before the iteration is given up."""
 
     def __init__(self) -> None:
         self._jacobian: Matrix | None = None
@@ -93,13 +99,27 @@ class Newton:
                     self._jacobian = self._differences(residual, w, r)
                 else:
                     self.supplied_jacobians += 1
+            if not np.isfinite(self._jacobian).all():
+                self._jacobian = None
+                if fresh:
+                    residual(w)
+                    break
+                continue
             step = -np.linalg.lstsq(self._jacobian, r, rcond=None)[0]
             before, w = r, w + step
             r = residual(w)
-            if not error(r, w) <= solution.error / 2:
+            if not (reached := error(r, solution.point)) <= solution.error / 2:
                 self._jacobian = None
-                if not fresh and not error(r, w) <= solution.error:
+                share = 1.0
+                while fresh and not reached < solution.error and share > self.SMALLEST:
+                    share /= 2
+                    w = solution.point + share * step
+                    r = residual(w)
+                    reached = error(r, solution.point)
+                if not reached < solution.error:
                     w, r = solution.point, residual(solution.point)
+                    if fresh:
+                        break
                 fresh = False
                 continue
             doubted = False

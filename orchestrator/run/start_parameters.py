@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from hapticlink.orchestrator.fmi.start_values import Given, Starts
 from hapticlink.orchestrator.fmi.units import SAME
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 from hapticlink.orchestrator.run.initialize import initialize
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.system.system import System
@@ -56,6 +56,6 @@ def _carry_starts(system: System) -> dict[str, Starts]:
 def _start(scalar: Scalar, value: float) -> Given:
     """What a connection sets, as `fmi.transfer` does."""
     value = scalar.conversion.factor * value + scalar.conversion.offset
-    if scalar.type in ("Real", "Float64", "Float32"):
+    if scalar.type in CONTINUOUS:
         return value
     return value >= 0.5 if scalar.type == "Boolean" else round(value)

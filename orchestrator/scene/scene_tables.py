@@ -61,6 +61,8 @@ class ForeignFmu:
     """sampled: doStep(t, h) computes y(t) from the inputs at t; continuous: y(t + h); frame: y(t),
     which is known at t + h. By default
     what the FMU declares, else that of the block that it replaces, else "continuous"."""
+    tolerance: Annotated[float | None, Quantity("1", gt=0, lt=1)] = None
+    """Relative tolerance for the solver in it; by default that of its DefaultExperiment."""
     start: Mapping[str, Value] = field(default_factory=dict)
     """Start values of inputs and parameters by name; a list for a whole vector, lists of rows for a
     matrix."""

@@ -25,7 +25,7 @@ from hapticlink.orchestrator.ssp.names import (
     SSD,
 )
 
-OF_AN_FMU = ("rate", "timing", "isolate", "derivatives")
+OF_AN_FMU = ("rate", "timing", "tolerance", "isolate", "derivatives")
 
 
 def read_run_annotation(path: FilePath, root: Element) -> dict[str, Any]:

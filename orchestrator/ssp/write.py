@@ -203,8 +203,10 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
         )
     as_json = partial(pydantic.TypeAdapter(AnyRate).dump_python, mode="json")
     derivatives = {f.name: dict(f.derivatives) for f in scene.fmu if f.derivatives}
+    tolerances = {f.name: f.tolerance for f in scene.fmu if f.tolerance is not None}
     tables["fmu"] = {
         u.name: {"rate": as_json(rates[u.name]), "timing": u.description.timing}
+        | ({"tolerance": tolerances[u.name]} if u.name in tolerances else {})
         | ({"isolate": True} if u.isolate else {})
         | ({"derivatives": derivatives[u.name]} if u.name in derivatives else {})
         for u in system.fmus

@@ -56,6 +56,8 @@ def fmus(
             description = replace(description, timing=fmu.timing)
         elif block and not description.declares_timing:
             description = replace(description, timing=block.timing)
+        if fmu.tolerance is not None:
+            description = replace(description, tolerance=fmu.tolerance)
         for name, derivative in fmu.derivatives.items():
             with collect_problem(problems, ("fmu", i, "derivatives", name)):
                 description = _with_derivative(description, name, derivative)

@@ -62,13 +62,18 @@ def rename_ports(description: Description, names: Mapped, block: Component) -> D
         for port, given in names.items()
         for own, name in zip(given, every[port].names, strict=True)
     }
+
+    def renamed(dependencies: Mapping[str, frozenset[str]]) -> dict[str, frozenset[str]]:
+        return {
+            new.get(output, output): frozenset(new.get(name, name) for name in on)
+            for output, on in dependencies.items()
+        }
+
     return replace(
         description,
         scalars=tuple(replace(s, name=new.get(s.name, s.name)) for s in description.scalars),
-        dependencies={
-            new.get(output, output): frozenset(new.get(name, name) for name in on)
-            for output, on in description.dependencies.items()
-        },
+        dependencies=renamed(description.dependencies),
+        initial_dependencies=renamed(description.initial_dependencies),
         derivatives={new.get(a, a): new.get(b, b) for a, b in description.derivatives.items()},
     )
 

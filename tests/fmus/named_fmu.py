@@ -21,8 +21,8 @@ class Named:
     def get(self, *names: str) -> list[float]:
         return self.slave.getReal([self.references[n] for n in names])
 
-    def start(self, time: float = 0.0) -> Named:
-        self.slave.setupExperiment(startTime=time)
+    def start(self, time: float = 0.0, stop: float | None = None) -> Named:
+        self.slave.setupExperiment(startTime=time, stopTime=stop)
         self.slave.enterInitializationMode()
         self.slave.exitInitializationMode()
         return self

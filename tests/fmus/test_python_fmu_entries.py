@@ -164,7 +164,8 @@ def test_a_damaged_fmu_is_found_out(fmus, tmp_path):
         folder = Path(at.folder) / "resources"
         module = (folder / "slavemodule.txt").read_text().strip()
         text = (folder / f"{module}_slave.py").read_text()
-        broken = text.replace("part[:] = array.array", "array.array")
+        kept = "part[:] = part if part is self._state else array.array"
+        broken = text.replace("part[:] = array.array", kept)
         assert broken != text
         (folder / f"{module}_broken_slave.py").write_text(broken)
         entry = (folder / f"{module}.py").read_text().replace(module, f"{module}_broken")

@@ -287,6 +287,40 @@ def test_times_that_are_not_finite_are_refused(opened, value):
     assert fmu.get("x[1]", "x[2]", "time") == before
 
 
+@pytest.mark.parametrize("name", ["spring", "gain"])
+@pytest.mark.parametrize(
+    ("time", "size", "why"),
+    [
+        (0.5, 0.0, "has no end after it"),
+        (0.5, -0.25, "has no end after it"),
+        (0.25, 0.25, "a step from t = 0.25 s: the FMU stands at 0.5 s"),
+        (0.75, 0.25, "a step from t = 0.75 s: the FMU stands at 0.5 s"),
+        (0.5, 0.75, "a step to t = 1.25 s, beyond the stop time 1.0 s"),
+    ],
+)
+def test_steps_that_cannot_be_are_refused_and_change_nothing(
+    opened, name, packaging, time, size, why
+):
+    fmu = Named(opened(name)).start(stop=1.0)
+    fmu.step(0.0, 0.5)
+    before = fmu.slave.getReal(fmu.at.reals)
+    with pytest.raises(FMICallException) as raised:
+        fmu.step(time, size)
+    assert raised.value.status == OUT_OF_STEP.get(packaging, ERROR)
+    assert why in " ".join(fmu.at.messages).replace("1 s", "1.0 s")
+    assert fmu.slave.getReal(fmu.at.reals) == before
+    fmu.step(0.5, 0.5)
+
+
+def test_steps_whose_times_are_added_up_reach_the_stop_time(opened):
+    fmu, time = Named(opened("spring")).start(stop=1.0), 0.0
+    for _ in range(10):
+        fmu.step(time, 0.1)
+        time += 0.1
+    assert time != 1.0
+    assert fmu.get("time")[0] == pytest.approx(1.0)
+
+
 def test_a_sampled_output_that_is_not_finite_fails_the_step(tmp_path, packaging):
     b = Block(inputs=[Variable("M", start=2.0)], states=[Variable("n")], outputs=[Variable("F")])
     made = b.component(

@@ -99,6 +99,18 @@ def event_fmu3(folder: Path, varies: bool = True, token: str = "") -> Path:
     return packed(folder / "events.fmu", "event_fmu3.c", description)
 
 
+TOLD = ("stop", "tolerance", "ramp")
+
+
+def told_fmu3(folder: Path) -> Path:
+    """The FMU of told_fmu3.c, which puts out what it is told of the experiment."""
+    variables = "".join(
+        f'<Float64 name="{name}" valueReference="{k}" causality="output"/>'
+        for k, name in enumerate(TOLD)
+    )
+    return packed(folder / "Told.fmu", "told_fmu3.c", description3("Told", variables, range(3)))
+
+
 CLOCKED = """
 <Clock name="sample" valueReference="0" causality="input" intervalVariability="constant"
  intervalDecimal="0.1" shiftDecimal="{shift}"/>

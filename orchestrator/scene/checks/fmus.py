@@ -49,7 +49,7 @@ def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
             remedy = file if fmu.replaces else "say which by `replaces`"
             can_be = f"{fmu.engine} can be {' and '.join(SHARED)} alone"
             yield (*path, "engine"), f"{can_be}: {remedy}"
-        for key in ("path", "block", "settings"):
+        for key in ("path", "block", "settings", "tolerance"):
             if getattr(fmu, key):
                 yield (
                     (*path, key),
@@ -60,6 +60,8 @@ def _source(path: Path, fmu: ForeignFmu) -> Iterator[Problem]:
         yield (*path, "block"), "is missing, and so is path: give a block to build or an FMU's file"
     if fmu.path is not None and not text_files.exists(fmu.path):
         yield (*path, "path"), f"there is no file {fmu.path}"
+    if fmu.block is not None and fmu.tolerance is not None:
+        yield (*path, "tolerance"), "is for a solver in a file: take it out, or give path for block"
     for key in ("block", "settings"):
         if fmu.path is not None and getattr(fmu, key):
             yield (*path, key), "is not for an FMU that is a file: take it out, or take path out"

@@ -363,3 +363,47 @@ def test_a_spring_that_stiffens_in_steps(gives_and_takes, packaging):
         found.append(state[0])
         state = expm(np.array([[0.0, 1.0], [-k / 2.0, 0.0]]) / 512) @ state
     np.testing.assert_allclose(table["virtual_mechanism.q[1]"], found, atol=1e-8)
+
+
+# --- whole numbers that the library of a Python FMU would cut -----------------------------------
+
+COUNTER = """
+from pythonfmu3 import *
+
+class Counts(Fmi3Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.n, self.time = 0, 0.0
+        discrete, output = Fmi3Variability.discrete, Fmi3Causality.output
+        self.register_variable(KIND("n", causality=output, variability=discrete))
+        independent, continuous = Fmi3Causality.independent, Fmi3Variability.continuous
+        self.register_variable(Float64("time", causality=independent, variability=continuous))
+
+    def do_step(self, time, size):
+        self.n = BODY
+        return Fmi3StepResult(status=Fmi3Status.ok)
+"""
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+@pytest.mark.parametrize(
+    ("kind", "value", "limits"),
+    [
+        ("Integer", 3 * 10**9, "-2147483648 to 2147483647"),
+        ("Int32", -(2**31) - 1, "-2147483648 to 2147483647"),
+        ("UInt64", -2048, f"0 to {2**64 - 1}"),
+    ],
+)
+def test_a_whole_number_that_its_library_would_cut_ends_the_run(
+    tmp_path, kind, value, limits, isolate
+):
+    body = f"{value} if time > 0.2 else 7"
+    if kind == "Integer":
+        slave(tmp_path, "Counts", ("output", {"n": 7}), body=f"self.n = {body}")
+    else:
+        pytest.importorskip("pythonfmu3")
+        text = COUNTER.replace("KIND", kind).replace("BODY", body)
+        python_fmu_of(tmp_path, text, f"counts{kind}{bool(isolate)}", "3")
+    experiment, found = run(tmp_path, fmu_table("one", "Counts", isolate))
+    assert f"n is {value}: its type holds {limits}, and the" in str(experiment.outcome.fault)
+    assert found.haptics["one.n"][-1] == 7

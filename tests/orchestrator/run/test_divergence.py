@@ -5,7 +5,7 @@ import pytest
 from hapticlink.orchestrator.base.errors import Diverged
 from hapticlink.orchestrator.experiment import simulate
 from tests.little_fmus import python_fmu, slave, with_units
-from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, ran, run
+from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, ran, run, scene
 from tests.shared_fixtures import status
 
 
@@ -20,6 +20,23 @@ def test_an_output_beyond_1e12_of_its_start(tmp_path, start, bound, rows, isolat
     assert experiment.outcome.reason == found.run["end"]["reason"] == "diverged"
     assert f", beyond {bound}: the run has diverged" in str(experiment.outcome.fault)
     assert len(found.haptics["time"]) == rows
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_an_output_without_a_unit_that_grows_beyond_1e100(tmp_path, isolate):
+    """Tenfold at each step: it is there with step 101, and larger with the next."""
+    python_fmu(tmp_path, "Grows", "self.y = 10.0**self.steps")
+    path = scene(tmp_path, fmu_table("one", "Grows", isolate), duration=4.0)
+    experiment = simulate(str(path), tmp_path / "out")
+    assert isinstance(experiment.outcome.fault, Diverged)
+    assert "output y is 1e+102, beyond 1e+100" in str(experiment.outcome.fault)
+    assert experiment.results.haptics["one.y"].max() == 1e101
+
+
+@pytest.mark.parametrize("infinity", [1e300, -1.7976931348623157e308])
+def test_a_number_that_stands_for_infinity_ends_no_run(tmp_path, infinity):
+    python_fmu(tmp_path, "Waits", f"self.y = {infinity} if 2 < self.steps < 9 else time")
+    assert ran(tmp_path, fmu_table("one", "Waits")).haptics["one.y"][8] == infinity
 
 
 def test_a_held_output_is_bounded_too(tmp_path):
@@ -58,8 +75,8 @@ def test_energy_that_nobody_put_in(tmp_path, capsys):
 
 
 def test_what_wrenches_and_drives_put_in_is_no_divergence(tmp_path):
-    for scene in ("single-body", "four-bar", "two-hands", "obstacles"):
-        assert simulate(scene, tmp_path / scene, ["duration=0.3"]).outcome.fault is None
+    for name in ("single-body", "four-bar", "two-hands", "obstacles"):
+        assert simulate(name, tmp_path / name, ["duration=0.3"]).outcome.fault is None
 
 
 def test_an_unstable_loop_that_leaves_the_workspace_is_told_as_such(tmp_path):

@@ -361,3 +361,31 @@ def test_a_connection_to_one_entry_of_a_fed_vector_is_refused(tmp_path):
     (tmp_path / "scene.toml").write_text(text + wire_table("one.y", "controller.x_D[1]"))
     with pytest.raises(InputFault, match=r"line 7: .*x_D lose their source, haptic_device.x"):
         simulate(str(tmp_path / "scene.toml"), tmp_path / "out")
+
+
+CLOSES = "import os, time as clock; clock.sleep(0.3); os.closerange(3, 64)"
+
+
+@pytest.mark.parametrize("lines", ["", 'record.format = "rows"\n'])
+def test_an_fmu_that_closes_the_files_of_a_run_loses_no_row(tmp_path, lines):
+    """Among them the pipe by which a process beside the run knows that the run has ended."""
+    python_fmu(tmp_path, "Closes", f"{CLOSES}; self.y = time + size")
+    path = scene(tmp_path, lines + fmu_table("one", "Closes"), rate=8, duration=1.0)
+    ended = process(path, tmp_path / "out")
+    assert (ended.returncode, "Traceback" in ended.stderr) == (0, False), ended.stderr
+    assert "closed files of this process that it had not opened" in ended.stderr
+    found = read_results.load(tmp_path / "out")
+    assert found.haptics["one.y"].tolist() == (np.arange(9) / 8).tolist()
+
+
+def test_rows_that_are_lost_are_told(tmp_path):
+    """An FMU puts a table without rows in the place of the one that is being written."""
+    body = f"""
+        from pathlib import Path
+        from hapticlink.orchestrator.results.rows_file import write_empty
+        rows = Path({str(tmp_path / "out" / "haptics.rows")!r})
+        rows.unlink()
+        write_empty(rows, ("time", "one.y", "one.steps"), False)"""
+    python_fmu(tmp_path, "Replaces", body.strip())
+    said = fault(tmp_path, fmu_table("one", "Replaces"))
+    assert "haptics.csv: 0 rows, where 33 were recorded: somebody else wrote there" in said

@@ -46,6 +46,9 @@ REFUSED = {
         ("graphics.rate=[0.5, 0.2]", "must rise"),
         ("controller.topology=3", "controller.topology: 3 should be a table or true or false"),
         ("controller.topology.stif=3", "controller.topology.stif: unknown"),
+        ("fmu.+={ name = 'w', block = 'virtual_wall', settings = { stiffness = 9.0 }, "
+         "tolerance = 1e-3 }",
+         "is for a solver in a file"),
         ("duration.x=1", "--set duration.x=1: duration: {'x': 1} should be"),
         ("novalue", "--set novalue"),
         ("=3", "--set =3"),
