@@ -13,8 +13,10 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.contact import contact_forces
+from hapticlink.components.blocks import FRAME
+from hapticlink.components.component import FRAME_SIZE, Block, Component, Variable
+from hapticlink.components.contact import contact_forces, kept_sides
+from hapticlink.components.contact.kept_sides import KeptSides
 from hapticlink.components.dynamics import follow_mechanism, further_points
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
@@ -61,10 +63,11 @@ def virtual_environment(
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     counts = further_points.counts(users) if directions else []
+    sides = kept_sides.states(linkage, contacts) if contacts else []
     block = Block(
         inputs=follow_mechanism.inputs(linkage, copy),
         parameters=_parameters(linkage, copy, directions, contacts),
-        states=[*states(linkage), *(Variable(name) for name in counts)],
+        states=[*states(linkage), *(Variable(name) for name in counts), *sides],
         outputs=_outputs(linkage, directions, contacts, users, mobility, local_model),
     )
     model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
@@ -83,7 +86,13 @@ def virtual_environment(
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:
-        output["contacts"] = contact_forces.detect_contacts(model, contacts)
+        kept = block.x.get(kept_sides.NAME)
+        if kept is not None:
+            initial[kept_sides.NAME] = ca.SX(*kept.shape)
+            moved = KeptSides(model, contacts, kept).between(q1, block.p)
+            step[kept_sides.NAME] = moved
+        frame_s = block.p[FRAME_SIZE]
+        output["contacts"] = contact_forces.detect_contacts(model, contacts, kept, frame_s)
     if local_model:
         output |= held_matrices.values(model)
     component = block.component(
@@ -110,7 +119,11 @@ def _parameters(
     if directions:
         variables.append(length_parameter(linkage, directions.length_scale))
         variables += direction_parameters(directions)
-    return variables + (contact_forces.detection_parameters(linkage, contacts) if contacts else [])
+    if contacts:
+        text = "step size of the graphics copy"
+        variables.append(Variable(FRAME_SIZE, (), "s", FRAME, text, "fixed"))
+        variables += contact_forces.detection_parameters(linkage, contacts)
+    return variables
 
 
 def _outputs(
