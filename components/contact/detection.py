@@ -22,7 +22,8 @@ jump, if that side changes or the corner passes an end of the link. Runs warn of
 A place that would pass through its shape in one step is kept on the side where it entered, as long
 as it is behind its line there (swept.py); the normals of such places are a state. Whoever detects
 contacts that are held for a while looks `ahead`: a place is active if its path over this time, at
-the velocity that it has, comes within a margin, with the geometry of where it does.
+the velocity that it has, comes within a margin, with the geometry of where it first touches, or
+else is nearest: a path that passes beside a shape is along the plane there.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from hapticlink.components.contact.closest_points import (
     select,
     sunk_past,
 )
-from hapticlink.components.contact.swept import entry, is_kept, support
+from hapticlink.components.contact.swept import closest_approach, entry, is_kept, support
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.bodies import counterclockwise
 from hapticlink.components.specs.contacts import Contacts, Pair
@@ -259,12 +260,7 @@ class Place:
         """kept: its normal (1 x 2), or None."""
         active, best = ca.SX(1), self._nearest
         if ahead:
-            r, d = self._reach + ahead.margin, self.model.rate(self.x) * ahead.time
-            share = entry(self.core.corners, self.x, d, r)
-            within = self._gap < r
-            active = ca.logic_or(within, share <= 1)
-            later = _nearest(self.core, self.x + ca.fmin(share, 1) * d)
-            best = select(within, best, later)
+            active, best = self._ahead(ahead)
         if kept is not None:
             n = kept.T
             off = ca.dot(n, self.x) - support(self.core.corners, n)
@@ -272,6 +268,19 @@ class Place:
             best = select(keeps, [self.x - off * n, n], best)
             active = ca.logic_or(active, keeps)
         return self._placed(active, *best)
+
+    def _ahead(self, ahead: Ahead) -> tuple[ca.SX, list[ca.SX]]:
+        """Whether the place comes within the margin, and the core's nearest point and normal at the
+        place's first touch in this time, or where it is nearest to the core."""
+        corners, d = self.core.corners, self.model.rate(self.x) * ahead.time
+        share = entry(corners, self.x, d, self._reach)
+        end, normal = _nearest(self.core, self.x + d)
+        gaps = self._gap, ca.dot(normal, self.x + d - end)
+        least, nearest = closest_approach(corners, self.x, d, *gaps)
+        meets = ca.logic_or(self.is_inside, share <= 1)
+        at = ca.if_else(self.is_inside, 0, ca.if_else(meets, share, nearest))
+        there = select(at > 0, _nearest(self.core, self.x + at * d), self._nearest)
+        return ca.logic_or(meets, least < self._reach + ahead.margin), there
 
     def _placed(self, active: ca.SX, point: ca.SX, normal: ca.SX) -> Touch:
         """The contact at a point of the core, with its outward normal, both in its frame."""

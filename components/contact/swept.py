@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.contact.closest_points import TINY, edges
+from hapticlink.components.contact.closest_points import TINY, edges, select
 
 NEVER = 1e9
 """The share of a path that meets nothing."""
@@ -46,6 +46,20 @@ def entry(corners: ca.SX, x: ca.SX, d: ca.SX, r: ca.SX) -> ca.SX:
         beside = ca.logic_and(along >= 0, along <= ca.sumsqr(span))
         first = meet(share, ca.logic_and(fall > 0, beside))
     return first
+
+
+def closest_approach(
+    corners: ca.SX, x: ca.SX, d: ca.SX, begin: ca.SX, end: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """The smallest distance from a core on the path from x along d, which does not meet it, and its
+    share of the path: at one of the ends, whose distances are given, or at a corner."""
+    least, share = select(end < begin, [end, ca.SX(1)], [begin, ca.SX(0)])
+    for k in range(corners.shape[0]):
+        ahead = corners[k, :].T - x
+        s = ca.fmin(ca.fmax(ca.dot(ahead, d) / (ca.sumsqr(d) + TINY), 0), 1)
+        distance = ca.norm_2(ahead - s * d)
+        least, share = select(distance < least, [distance, s], [least, share])
+    return least, share
 
 
 def support(corners: ca.SX, n: ca.SX) -> ca.SX:
