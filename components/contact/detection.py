@@ -21,9 +21,11 @@ jump, if that side changes or the corner passes an end of the link. Runs warn of
 
 A place that would pass through its shape in one step is kept on the side where it entered, as long
 as it is behind its line there (swept.py); the normals of such places are a state. Whoever detects
-contacts that are held for a while looks `ahead`: a place is active if its path over this time, at
-the velocity that it has, comes within a margin, with the geometry of where it first touches, or
-else is nearest: a path that passes beside a shape is along the plane there.
+contacts that are held for a while looks `ahead`, at the straight path of each place over this time:
+one that moves by more than a margin is active if its path comes within the margin, with the
+geometry of where it first touches, or else is nearest: a path that passes beside a shape is along
+the plane there. Any other is active within the margin, with the geometry of where it is: it can
+come no further than to the shape.
 """
 
 from __future__ import annotations
@@ -277,10 +279,14 @@ class Place:
         end, normal = _nearest(self.core, self.x + d)
         gaps = self._gap, ca.dot(normal, self.x + d - end)
         least, nearest = closest_approach(corners, self.x, d, *gaps)
-        meets = ca.logic_or(self.is_inside, share <= 1)
-        at = ca.if_else(self.is_inside, 0, ca.if_else(meets, share, nearest))
-        there = select(at > 0, _nearest(self.core, self.x + at * d), self._nearest)
-        return ca.logic_or(meets, least < self._reach + ahead.margin), there
+        meets = share <= 1
+        at = ca.if_else(meets, share, nearest)
+        later = [ca.logic_or(meets, least < self._reach + ahead.margin)]
+        later += _nearest(self.core, self.x + at * d)
+        now = [self._gap < self._reach + ahead.margin, *self._nearest]
+        leaves = ca.logic_and(ca.sumsqr(d) > ahead.margin**2, ca.logic_not(self.is_inside))
+        active, *there = select(leaves, later, now)
+        return active, there
 
     def _placed(self, active: ca.SX, point: ca.SX, normal: ca.SX) -> Touch:
         """The contact at a point of the core, with its outward normal, both in its frame."""
