@@ -242,7 +242,7 @@ class _Equations:
 
     @cached_property
     def _sides_in_step(self) -> ca.SX | None:
-        return self._sides and self._sides.in_step(self._block.h)
+        return self._sides.in_step(self._block.h) if self._sides else None
 
     @cached_property
     def _directions(self) -> dict[str, ConstrainedDirections]:
@@ -282,9 +282,7 @@ class _Equations:
         counted = (x[name] for name in method.counters)
         kept = ca.SX(0, 1)
         if self._sides and self._sides_in_step is not None:
-            kept = ca.vec(
-                self._sides.after_step(self._sides_in_step, moved[:n], self._block.p).T
-            )
+            kept = ca.vec(self._sides.after_step(self._sides_in_step, moved[:n], self._block.p).T)
         return ca.vertcat(
             refuse_jumps(self.model, moved[:n], moved[n : 2 * n], self._block.h),
             moved[n:],

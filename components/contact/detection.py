@@ -21,11 +21,11 @@ jump, if that side changes or the corner passes an end of the link. Runs warn of
 
 A place that would pass through its shape in one step is kept on the side where it entered, as long
 as it is behind its line there (swept.py); the normals of such places are a state. Whoever detects
-contacts that are held for a while looks `ahead`, at the straight path of each place over this time:
-one that moves by more than a margin is active if its path comes within the margin, with the
-geometry of where it first touches, or else is nearest: a path that passes beside a shape is along
-the plane there. Any other is active within the margin, with the geometry of where it is: it can
-come no further than to the shape.
+contacts that are held for a time t looks `ahead`, at the straight path of each place over t, and
+what the acceleration a of a hand adds: it is active if its gap on the path comes below
+margin + a t^2/2. If it moves by more than the margin, the geometry is that of where it first
+touches, or else is nearest: a path that passes beside a shape is along the plane there. Otherwise
+it is that of where the place is.
 """
 
 from __future__ import annotations
@@ -54,6 +54,10 @@ from hapticlink.components.specs.contacts import Contacts, Pair
 COLUMNS = ("1", "m", "m", "m", "m", "1", "1")
 """Units of a row of the `contacts` port: active, point in the body (x, y), point of the plane
 (x, y), normal of the plane (x, y), both in the other body or the world."""
+
+
+ACCELERATION = 10.0
+"""m/s^2, of a hand that reaches 1 m/s in 0.1 s."""
 
 
 @dataclass(frozen=True)
@@ -111,10 +115,15 @@ def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) ->
 
 @dataclass(frozen=True)
 class Ahead:
-    """For how long (s) contacts are held, and the gap (m) up to which they are active then."""
+    """For how long (s) contacts are held, and the margin (m) of their gaps."""
 
     time: ca.SX
     margin: float
+
+    @property
+    def gap(self) -> ca.SX:
+        """The gap (m) on the path up to which a place is active: what a hand may change of it."""
+        return self.margin + ACCELERATION * self.time**2 / 2
 
 
 def touches(
@@ -203,7 +212,7 @@ def _least_gap(model: LinkageModel, gap: ca.SX, ahead: Ahead | None) -> ca.SX:
 
 
 def _is_met(gap: ca.SX, radius: ca.SX, ahead: Ahead | None) -> ca.SX:
-    return gap - radius < ahead.margin if ahead else ca.SX(1)
+    return gap - radius < ahead.gap if ahead else ca.SX(1)
 
 
 @dataclass(frozen=True)
@@ -281,9 +290,9 @@ class Place:
         least, nearest = closest_approach(corners, self.x, d, *gaps)
         meets = share <= 1
         at = ca.if_else(meets, share, nearest)
-        later = [ca.logic_or(meets, least < self._reach + ahead.margin)]
+        later = [ca.logic_or(meets, least < self._reach + ahead.gap)]
         later += _nearest(self.core, self.x + at * d)
-        now = [self._gap < self._reach + ahead.margin, *self._nearest]
+        now = [self._gap < self._reach + ahead.gap, *self._nearest]
         leaves = ca.logic_and(ca.sumsqr(d) > ahead.margin**2, ca.logic_not(self.is_inside))
         active, *there = select(leaves, later, now)
         return active, there
