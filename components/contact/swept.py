@@ -37,7 +37,7 @@ def entry(corners: ca.SX, x: ca.SX, d: ca.SX, r: ca.SX) -> ca.SX:
         away = x - corners[k, :].T
         closing, length = -ca.dot(away, d), ca.sumsqr(d)
         under = closing**2 - length * (ca.sumsqr(away) - r**2)
-        meets = ca.logic_and(under >= 0, closing > 0)
+        meets = ca.logic_and(under >= 0, ca.logic_and(closing > 0, length > TINY))
         first = meet((closing - ca.sqrt(ca.fmax(under, 0))) / (length + TINY), meets)
     for a, b, outward in edges(corners) if corners.shape[0] > 1 else ():
         fall, span = -ca.dot(outward, d), b - a
