@@ -13,7 +13,6 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from hapticlink.components.blocks import FRAME
 from hapticlink.components.component import FRAME_SIZE, Block, Component, Variable
 from hapticlink.components.contact import contact_forces, kept_sides
 from hapticlink.components.contact.kept_sides import KeptSides
@@ -51,12 +50,13 @@ def virtual_environment(
     *,
     mobility: bool = True,
     local_model: bool = False,
+    frame_s: float = 1 / 30,
     users: further_points.Users = (),
 ) -> Component:
     """The FMU `virtual_environment` with the outputs that are requested: `mobility` Lambda_inv,
     `directions` P_c and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h
     (B.15). Mobility and directions are those of the operational point and of the further points of
-    `users`.
+    `users`. frame_s (s) is where the parameter `frame_size` starts, for contacts.
 
     Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
@@ -66,7 +66,7 @@ def virtual_environment(
     sides = kept_sides.states(linkage, contacts) if contacts else []
     block = Block(
         inputs=follow_mechanism.inputs(linkage, copy),
-        parameters=_parameters(linkage, copy, directions, contacts),
+        parameters=_parameters(linkage, copy, directions, contacts, frame_s),
         states=[*states(linkage), *(Variable(name) for name in counts), *sides],
         outputs=_outputs(linkage, directions, contacts, users, mobility, local_model),
     )
@@ -112,7 +112,11 @@ def virtual_environment(
 
 
 def _parameters(
-    linkage: Linkage, copy: GraphicsCopy, directions: Directions | None, contacts: Contacts | None
+    linkage: Linkage,
+    copy: GraphicsCopy,
+    directions: Directions | None,
+    contacts: Contacts | None,
+    frame_s: float,
 ) -> list[Variable]:
     variables = [*parameters(linkage), *start_parameters(linkage)]
     variables += follow_mechanism.gains(linkage, copy)
@@ -121,7 +125,7 @@ def _parameters(
         variables += direction_parameters(directions)
     if contacts:
         text = "step size of the graphics copy"
-        variables.append(Variable(FRAME_SIZE, (), "s", FRAME, text, "fixed"))
+        variables.append(Variable(FRAME_SIZE, (), "s", frame_s, text, "fixed"))
         variables += contact_forces.detection_parameters(linkage, contacts)
     return variables
 

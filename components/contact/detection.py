@@ -148,7 +148,7 @@ def touches(
     return touching
 
 
-def swept_places(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Place]:
+def swept_places(model: LinkageModel, contacts: Contacts, p: Signals) -> list[MovingPoint]:
     """The places of all pairs of shapes: all but those at the enclosure, which nothing passes."""
     return [
         place
@@ -216,7 +216,7 @@ def _is_met(gap: ca.SX, radius: ca.SX, ahead: Ahead | None) -> ca.SX:
 
 
 @dataclass(frozen=True)
-class Place:
+class MovingPoint:
     """A point that moves by a core, both of shapes that can touch each other: x (m) in the frame of
     the core's body. core_first: the core belongs to the pair's first body, whose `Touch` has a
     point of the core, or else one of its plane; back: as in closest_points.py."""
@@ -308,11 +308,11 @@ class Place:
         return Touch(ours.body, theirs.body, active, point, plane, -outward)
 
 
-def _between(model: LinkageModel, a: Shape, b: Shape) -> Iterator[Place]:
+def _between(model: LinkageModel, a: Shape, b: Shape) -> Iterator[MovingPoint]:
     """The places of two shapes: each corner of either core at the other core; of a point alone."""
     if b.corners.shape[0] > 1:
         for corner in _rows(a):
-            yield Place(model, b, a, corner, core_first=False)
+            yield MovingPoint(model, b, a, corner, core_first=False)
     if a.corners.shape[0] > 1 or b.corners.shape[0] == 1:
         frame, other = model.frames[a.body], model.frames[b.body]
         seen = [frame.local(other.point(corner)) for corner in _rows(b)]
@@ -320,7 +320,7 @@ def _between(model: LinkageModel, a: Shape, b: Shape) -> Iterator[Place]:
         if a.corners.shape[0] == 2 and len(seen) > 2:
             backs = sunk_past(a.corners, ca.horzcat(*seen).T)
         for corner, back in zip(_rows(b), backs, strict=True):
-            yield Place(model, a, b, corner, core_first=True, back=back)
+            yield MovingPoint(model, a, b, corner, core_first=True, back=back)
 
 
 def _nearest(shape: Shape, position: ca.SX, back: ca.SX | int = 0) -> list[ca.SX]:

@@ -7,7 +7,7 @@ import casadi as ca
 
 from hapticlink.components.component import Signals, Variable
 from hapticlink.components.contact.broad_phase import near
-from hapticlink.components.contact.detection import Place, swept_places
+from hapticlink.components.contact.detection import MovingPoint, swept_places
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
@@ -28,7 +28,7 @@ class KeptSides:
 
     def __init__(self, model: LinkageModel, contacts: Contacts, kept: ca.SX) -> None:
         self._model, self._kept = model, kept
-        self._places: list[Place] = swept_places(model, contacts, model.p)
+        self._places: list[MovingPoint] = swept_places(model, contacts, model.p)
 
     def in_step(self, h: ca.SX) -> ca.SX:
         """The sides for a step of h (s) at the velocities of its begin."""
