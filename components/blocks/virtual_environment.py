@@ -89,10 +89,9 @@ def virtual_environment(
         kept = block.x.get(kept_sides.NAME)
         if kept is not None:
             initial[kept_sides.NAME] = ca.SX(*kept.shape)
-            moved = KeptSides(model, contacts, kept).between(q1, block.p)
-            step[kept_sides.NAME] = moved
-        frame_s = block.p[FRAME_SIZE]
-        output["contacts"] = contact_forces.detect_contacts(model, contacts, kept, frame_s)
+            step[kept_sides.NAME] = KeptSides(model, contacts, kept).between(q1, block.p)
+        held_s = block.p[FRAME_SIZE]
+        output["contacts"] = contact_forces.detect_contacts(model, contacts, kept, held_s)
     if local_model:
         output |= held_matrices.values(model)
     component = block.component(
