@@ -1,5 +1,5 @@
-"""Warnings of contacts that are deeper than their geometry means, too stiff for the steps, or not
-rendered."""
+"""Warnings of contacts that are deeper than their geometry means, not seen while others are held,
+too stiff for the steps, or not rendered."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ from hapticlink.orchestrator.results.recorded_scene import scene_part
 
 ROWS = 500
 """Largest number of rows whose depths are computed."""
+UNSEEN = 1e-3
+"""The depth (m) from which on a contact that no held one sees is told."""
 PRESSED = 1e-4
 """The depth (m) from which on a contact at the start is no rest on an obstacle."""
 
@@ -45,6 +47,8 @@ def warn_of_contacts(results: Results) -> Iterator[str]:
     if JOINT_COORDINATES in table:  # both are recorded
         yield from warn_of_pressed_start(linkage, contacts, table[JOINT_COORDINATES][0])
         yield from _deep(table, linkage, contacts)
+        if contacts.detection == "graphics":
+            yield from _unseen(table, linkage, contacts)
     method = METHODS.get(mechanism.integrator, Integrator)  # a plugin's may not be loaded
     if method.bounded_by and len(table["time"]) > 1:
         rate = record.fmus[CONTACT_GAP.partition(".")[0]].rate
@@ -92,7 +96,11 @@ def _deep(table: Table, linkage: Linkage, contacts: Contacts) -> Iterator[str]:
     ]
     if len(rows):
         q, times = table[JOINT_COORDINATES][rows], table["time"][rows]
-        found += [(*item, times) for item in depths(linkage, contacts, q)]
+        each = [*depths(linkage, contacts, q)]
+        deepest = np.max([depth for _, depth in each], axis=0)
+        for pair, depth in each:  # one that went through is pushed back from the other side
+            through = (deepest < 0) & (depth == deepest)
+            found.append((pair, np.where(through, -table[CONTACT_GAP][rows], depth), times))
     if not found:
         return
     pair, depth, times = max(found, key=lambda item: _beyond(item, most))
@@ -100,8 +108,28 @@ def _deep(table: Table, linkage: Linkage, contacts: Contacts) -> Iterator[str]:
         yield (
             f"warning: at {times[depth.argmax()]:.4g} s {pair.body} is {short(worst * 1e3)} mm "
             f"deep in {pair.obstacle}, past the middle of the thinner one "
-            f"({short(most[pair] * 1e3)} mm), where it goes through or its side changes, and "
-            "energy with it: take a larger contacts.stiffness, or a start at which they are apart"
+            f"({short(most[pair] * 1e3)} mm), where their geometry no longer says to which side it "
+            "is pushed out: take a larger contacts.stiffness, or a start at which they are apart"
+        )
+
+
+def _unseen(table: Table, linkage: Linkage, contacts: Contacts) -> Iterator[str]:
+    """A line for the deepest contact in rows where none of those that are held touches."""
+    worst, told = UNSEEN, None
+    for block in table.blocks():
+        apart = block[CONTACT_GAP] >= 0
+        if not apart.any():
+            continue
+        for pair, depth in depths(linkage, contacts, block[JOINT_COORDINATES][apart]):
+            if (most := float(depth.max())) > worst:
+                worst, told = most, (pair, block["time"][apart][depth.argmax()])
+    if told:
+        pair, time = told
+        yield (
+            f"warning: at {time:.4g} s {pair.body} is {short(1e3 * worst)} mm deep in "
+            f"{pair.obstacle}, and no contact that is held from an earlier frame touches it there: "
+            "take contacts.detection = 'haptics', a higher graphics.rate, or a larger "
+            "contacts.margin"
         )
 
 

@@ -24,7 +24,7 @@ from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.base.signal_names import CLOSURE_ERROR
 from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import all_devices
-from hapticlink.orchestrator.results.run_record import Energy, PortEnergy
+from hapticlink.orchestrator.results.run_record import Energy, HeldContacts, PortEnergy
 
 
 class TrackingError(NamedTuple):
@@ -133,6 +133,15 @@ class Measures:
         """The energy generated at the user's port in the whole run."""
         port = user_port(self._results)
         return port.measured if port and len(port.time_s) else None
+
+    @cached_property
+    def held_contacts(self) -> HeldContacts | None:
+        """What new frames of contacts did to the mechanism in the whole run."""
+        if not self._results.record.scene["contacts"]:
+            return None
+        from hapticlink.analysis.findings import held_contacts  # casadi
+
+        return held_contacts.held_contacts(self._results)
 
     @cached_property
     def held(self) -> dict[str, Energy]:

@@ -56,7 +56,10 @@ def find(results: Results) -> Findings:
     """What the tables of a run show."""
     measures = Measures(results)
     port, warned = measures.port, list(lines(results, measures))
+    held = measures.held_contacts
     record = {"user_port": port and content(port), "warnings": warned}
+    if held:
+        record["held_contacts"] = content(held)
     return Findings(record, tuple(numbers(results, measures)))
 
 
@@ -127,6 +130,10 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
             yield f"held {name} {describe_generated(energy.peak, energy.generated)}"
+    if held := measures.held_contacts:
+        from hapticlink.analysis.findings.held_contacts import describe_held
+
+        yield from describe_held(held)
     if measures.closure_m is not None:
         yield f"loops close within {measures.closure_m:.2g} m"
 
@@ -209,7 +216,7 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from friction_speed.coarse(results)
     yield from _passivity(results, measures)
     yield from _describe_stops(results)
-    yield from _contacts(results)
+    yield from _contacts(results, measures)
     for name, link in record.links.items():
         if link.lost or link.overtaken:
             yield (
@@ -271,11 +278,13 @@ def _describe_stops(results: Results) -> Iterator[str]:
         )
 
 
-def _contacts(results: Results) -> Iterator[str]:
+def _contacts(results: Results, measures: Measures) -> Iterator[str]:
     if results.record.scene["contacts"]:
-        from hapticlink.analysis.findings import contact_warnings
+        from hapticlink.analysis.findings import contact_warnings, held_contacts
 
         yield from contact_warnings.warn_of_contacts(results)
+        if held := measures.held_contacts:
+            yield from held_contacts.warn_of_held(held)
 
 
 def _real_time(report: Mapping[str, Any]) -> Iterator[str]:

@@ -64,7 +64,12 @@ def _virtual_environment(
 ) -> Component:
     from hapticlink.components.blocks.virtual_environment import virtual_environment
 
-    options: dict[str, Any] = {"mobility": mobility, "local_model": local_model, "users": users}
+    options: dict[str, Any] = {
+        "mobility": mobility,
+        "local_model": local_model,
+        "frame_s": FRAME,
+        "users": users,
+    }
     return virtual_environment(linkage, graphics, directions, contacts, **options)
 
 

@@ -10,6 +10,7 @@ import casadi as ca
 from hapticlink.components import forces, integrators, time_signals
 from hapticlink.components.component import Block
 from hapticlink.components.contact import located_events
+from hapticlink.components.contact.kept_sides import NAME
 from hapticlink.components.contact.located_events import LocatedEvents
 from hapticlink.components.contact.one_sided_spring import OneSidedForces
 from hapticlink.components.dynamics import further_points, joint_ports
@@ -45,7 +46,8 @@ class MechanismSteps(MechanicalSystem):
 
     applied: generalised forces (n x 1) of hands, couplings and motors outside; touching: the
     contacts and joint limits, if there are any; energy: kinetic and potential (J); signals: those
-    of drives over time, which are known within a step.
+    of drives over time, which are known within a step; kept_sides: of contacts, for the whole
+    step, in the place of the state.
     """
 
     def __init__(
@@ -57,6 +59,8 @@ class MechanismSteps(MechanicalSystem):
         touching: OneSidedForces | None,
         energy: ca.SX,
         signals: list[TimeSignal],
+        *,
+        kept_sides: ca.SX | None = None,
     ) -> None:
         self._block, self._mechanism, self._space = block, mechanism, space
         self._applied, self._touching, self._energy = applied, touching, energy
@@ -65,16 +69,20 @@ class MechanismSteps(MechanicalSystem):
         self.x = ca.vertcat(self._model.q, self._model.qd, *further)
         self.p, self.t, self.h, self.n = block.p.vector, block.t, block.h, self._model.q.numel()
         self._symbols = self.u = block.u.vector
+        self._now = None
         if signals:
             over = ca.SX.sym("over", time_signals.size_over(signals))
             self._now = time_signals.within(signals, over, block.t)
             self._symbols = ca.vertcat(self.u, over)
             self.u = ca.vertcat(self.u, time_signals.over(signals, block.t, block.h))
+        if kept_sides is not None:
+            self._symbols = ca.vertcat(self._symbols, ca.vec(block.x[NAME].T))
+            self.u = ca.vertcat(self.u, ca.vec(kept_sides.T))
 
     def _known(self, expression: ca.SX) -> ca.SX:
         """An expression of the signals' values at an instant in terms of what is known of them
         within the step, a part of the inputs."""
-        if self._symbols is self._block.u.vector:
+        if self._now is None:
             return expression
         return ca.substitute(expression, self._model.tabled, self._now)
 

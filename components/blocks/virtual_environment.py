@@ -13,8 +13,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.contact import contact_forces
+from hapticlink.components.component import FRAME_SIZE, Block, Component, Variable
+from hapticlink.components.contact import contact_forces, kept_sides
+from hapticlink.components.contact.kept_sides import KeptSides
 from hapticlink.components.dynamics import follow_mechanism, further_points
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
@@ -49,22 +50,24 @@ def virtual_environment(
     *,
     mobility: bool = True,
     local_model: bool = False,
+    frame_s: float = 1 / 30,
     users: further_points.Users = (),
 ) -> Component:
     """The FMU `virtual_environment` with the outputs that are requested: `mobility` Lambda_inv,
     `directions` P_c and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h
     (B.15). Mobility and directions are those of the operational point and of the further points of
-    `users`.
+    `users`. frame_s (s) is where the parameter `frame_size` starts, for contacts.
 
     Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     counts = further_points.counts(users) if directions else []
+    sides = kept_sides.states(linkage, contacts) if contacts else []
     block = Block(
         inputs=follow_mechanism.inputs(linkage, copy),
-        parameters=_parameters(linkage, copy, directions, contacts),
-        states=[*states(linkage), *(Variable(name) for name in counts)],
+        parameters=_parameters(linkage, copy, directions, contacts, frame_s),
+        states=[*states(linkage), *(Variable(name) for name in counts), *sides],
         outputs=_outputs(linkage, directions, contacts, users, mobility, local_model),
     )
     model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
@@ -83,7 +86,12 @@ def virtual_environment(
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:
-        output["contacts"] = contact_forces.detect_contacts(model, contacts)
+        kept = block.x.get(kept_sides.NAME)
+        if kept is not None:
+            initial[kept_sides.NAME] = ca.SX(*kept.shape)
+            step[kept_sides.NAME] = KeptSides(model, contacts, kept).between(q1, block.p)
+        held_s = block.p[FRAME_SIZE]
+        output["contacts"] = contact_forces.detect_contacts(model, contacts, kept, held_s)
     if local_model:
         output |= held_matrices.values(model)
     component = block.component(
@@ -103,14 +111,22 @@ def virtual_environment(
 
 
 def _parameters(
-    linkage: Linkage, copy: GraphicsCopy, directions: Directions | None, contacts: Contacts | None
+    linkage: Linkage,
+    copy: GraphicsCopy,
+    directions: Directions | None,
+    contacts: Contacts | None,
+    frame_s: float,
 ) -> list[Variable]:
     variables = [*parameters(linkage), *start_parameters(linkage)]
     variables += follow_mechanism.gains(linkage, copy)
     if directions:
         variables.append(length_parameter(linkage, directions.length_scale))
         variables += direction_parameters(directions)
-    return variables + (contact_forces.detection_parameters(linkage, contacts) if contacts else [])
+    if contacts:
+        text = "step size of the graphics copy"
+        variables.append(Variable(FRAME_SIZE, (), "s", frame_s, text, "fixed"))
+        variables += contact_forces.detection_parameters(linkage, contacts)
+    return variables
 
 
 def _outputs(

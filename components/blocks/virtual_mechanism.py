@@ -19,10 +19,11 @@ from hapticlink.components import forces, integrators, time_signals
 from hapticlink.components.blocks.mechanism_steps import DEFLECTIONS, MechanismSteps
 from hapticlink.components.blocks.step_defaults import StepDefaults
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.contact import contact_forces, joint_limits
+from hapticlink.components.contact import contact_forces, joint_limits, kept_sides
 from hapticlink.components.contact.contact_forces import ContactForces
 from hapticlink.components.contact.detection import touches
 from hapticlink.components.contact.joint_limits import JointLimits
+from hapticlink.components.contact.kept_sides import KeptSides
 from hapticlink.components.contact.one_sided_spring import AllOneSidedForces, OneSidedForces
 from hapticlink.components.dynamics import (
     closure_diagnostics,
@@ -159,6 +160,8 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
         memory += contact_forces.states(linkage, contacts)
         if contacts.detection == "graphics":
             inputs.append(contact_forces.contact_port(linkage, contacts))
+        else:
+            memory += kept_sides.states(linkage, contacts)
     for name, text in parts.method.counters.items():
         memory.append(Variable(name))
         outputs.append(Variable(name, (), "1", description=text))
@@ -199,7 +202,7 @@ class _Equations:
         if not contacts:
             return None
         places = (
-            touches(model, contacts, block.p)
+            touches(model, contacts, block.p, block.x.get(kept_sides.NAME))
             if contacts.detection == "haptics"
             else contact_forces.held_contacts(model, contacts, block.u["contacts"])
         )
@@ -223,11 +226,23 @@ class _Equations:
         """q, qd and deflections after a step, and by how much the method's counters grow."""
         parts, model, n = self._parts, self.model, self.model.q.numel()
         acting = self._applied, self.touching, self._energy, self.signals
-        steps = MechanismSteps(self._block, parts.mechanism, self._space, *acting)
+        steps = MechanismSteps(
+            self._block, parts.mechanism, self._space, *acting, kept_sides=self._sides_in_step
+        )
         after = integrators.mechanism_step(parts.method, steps)
         if k := model.deflection.numel():
             after[2 * n : 2 * n + k] = friction.clip_deflection(model, after[2 * n : 2 * n + k])
         return after
+
+    @cached_property
+    def _sides(self) -> KeptSides | None:
+        """The sides on which contacts are kept that the mechanism detects itself."""
+        kept, contacts = self._block.x.get(kept_sides.NAME), self._parts.contacts
+        return KeptSides(self.model, contacts, kept) if contacts and kept is not None else None
+
+    @cached_property
+    def _sides_in_step(self) -> ca.SX | None:
+        return self._sides.in_step(self._block.h) if self._sides else None
 
     @cached_property
     def _directions(self) -> dict[str, ConstrainedDirections]:
@@ -240,6 +255,8 @@ class _Equations:
     def initial(self) -> dict[str, ca.SX]:
         """All states at t = 0."""
         initial = dict(zip(("q", "qd"), self._start, strict=True)) | self._initial_deflections()
+        if (kept := self._block.x.get(kept_sides.NAME)) is not None:
+            initial[kept_sides.NAME] = ca.SX(*kept.shape)
         initial |= dict.fromkeys(self._parts.method.counters, ca.SX(0))
         return initial | {name: directed.first for name, directed in self._directions.items()}
 
@@ -263,9 +280,13 @@ class _Equations:
             self._after, [0, self._after.numel() - len(method.counters), self._after.numel()]
         )
         counted = (x[name] for name in method.counters)
+        kept = ca.SX(0, 1)
+        if self._sides and self._sides_in_step is not None:
+            kept = ca.vec(self._sides.after_step(self._sides_in_step, moved[:n], self._block.p).T)
         return ca.vertcat(
             refuse_jumps(self.model, moved[:n], moved[n : 2 * n], self._block.h),
             moved[n:],
+            kept,
             ca.vertcat(ca.SX(0, 1), *counted) + growth,
             *(directed.after for directed in self._directions.values()),
         )

@@ -21,6 +21,7 @@ from hapticlink.components.component import Signals, Variable
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.contact.detection import (
     COLUMNS,
+    Ahead,
     Touch,
     obstacle_parameters,
     shape_parameters,
@@ -93,14 +94,17 @@ def gap(model: LinkageModel, touch: Touch) -> ca.SX:
     return ca.dot(touch.normal, point - touch.plane) - model.p[f"{touch.body}.radius"]
 
 
-def detect_contacts(model: LinkageModel, contacts: Contacts) -> ca.SX:
-    """The rows of the `contacts` port at the model's pose; a place is active within the margin."""
+def detect_contacts(
+    model: LinkageModel, contacts: Contacts, kept: ca.SX | None, frame_s: ca.SX
+) -> ca.SX:
+    """The rows of the `contacts` port at the model's pose, for the two frames of frame_s (s) until
+    they are replaced: one in which they are computed, and one in which they are held. kept: as of
+    `touches`."""
     rows = []
-    for touch in touches(model, contacts, model.p):
-        active = ca.logic_and(touch.active, gap(model, touch) < contacts.margin)
+    for touch in touches(model, contacts, model.p, kept, Ahead(2 * frame_s, contacts.margin)):
         other = model.frames[touch.other]
         plane = ca.vertcat(other.local(touch.plane), other.rotation.T @ touch.normal)
-        rows.append(ca.vertcat(active, touch.point, plane).T)
+        rows.append(ca.vertcat(touch.active, touch.point, plane).T)
     return ca.vertcat(*rows)
 
 

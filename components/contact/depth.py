@@ -1,11 +1,11 @@
 """How deep bodies are in what they touch, and how deep is meaningful.
 
 Beyond the middle of the thinner one of two shapes the nearest side is another one than that on
-which they met: the force changes its direction, and a corner that has sunk past the axis of a
-capsule can lose or gain its spring (detection.py), and with it energy. Two polygons that go right
-through each other, and shapes that cross with no corner in the other, have no deep corner that
-shows it: `overlaps` finds them by separating axes. The walls of the enclosure are half planes, in
-which any depth is meaningful.
+which they met, which is known only where they were seen to meet (swept.py), and a corner that has
+sunk past the axis of a capsule can lose or gain its spring (detection.py), and with it energy. Two
+polygons that go right through each other, and shapes that cross with no corner in the other, have
+no deep corner that shows it: `overlaps` finds them by separating axes. The walls of the enclosure
+are half planes, in which any depth is meaningful.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def depths(
     model = LinkageModel.symbolic(linkage, p)
     gaps = ca.vertcat(*(gap(model, touch) for touch in touches(model, contacts, p)))
     function, rows = ca.Function("gaps", [model.q, p.vector], [gaps]), np.atleast_2d(q)
-    gap_rows = np.array([np.array(function(row, p.starts)).ravel() for row in rows])
+    gap_rows = np.array(function(rows.T, np.tile(p.starts, (len(rows), 1)).T)).T
     first = 0
     for pair in near(linkage, contacts):
         last = first + pair.places

@@ -18,12 +18,21 @@ inside: a corner that has sunk past the axis of a link goes on to be pushed back
 it entered, up to the shortest way out of the polygon (closest_points.py); there alone a gap can
 jump, if that side changes or the corner passes an end of the link. Runs warn of contacts that deep
 (depth.py).
+
+A place that would pass through its shape in one step is kept on the side where it entered, as long
+as it is behind its line there (swept.py); the normals of such places are a state. Whoever detects
+contacts that are held for a time t looks `ahead`, at the straight path of each place over t, and
+what the acceleration a of a hand adds: it is active if its gap on the path comes below
+margin + a t^2/2. If it moves by more than the margin, the geometry is that of where it first
+touches, or else is nearest: a path that passes beside a shape is along the plane there. Otherwise
+it is that of where the place is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
@@ -37,6 +46,7 @@ from hapticlink.components.contact.closest_points import (
     select,
     sunk_past,
 )
+from hapticlink.components.contact.swept import closest_approach, entry, is_kept, support
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.bodies import counterclockwise
 from hapticlink.components.specs.contacts import Contacts, Pair
@@ -44,6 +54,10 @@ from hapticlink.components.specs.contacts import Contacts, Pair
 COLUMNS = ("1", "m", "m", "m", "m", "1", "1")
 """Units of a row of the `contacts` port: active, point in the body (x, y), point of the plane
 (x, y), normal of the plane (x, y), both in the other body or the world."""
+
+
+ACCELERATION = 10.0
+"""m/s^2, of a hand that reaches 1 m/s in 0.1 s."""
 
 
 @dataclass(frozen=True)
@@ -99,17 +113,49 @@ def shape_parameters(pairs: tuple[Pair, ...], model_bodies: dict[str, float]) ->
     ]
 
 
-def touches(model: LinkageModel, contacts: Contacts, p: Signals) -> list[Touch]:
-    """Every place of every pair within reach, in the order of `broad_phase.near`."""
+@dataclass(frozen=True)
+class Ahead:
+    """For how long (s) contacts are held, and the margin (m) of their gaps."""
+
+    time: ca.SX
+    margin: float
+
+    @property
+    def gap(self) -> ca.SX:
+        """The gap (m) on the path up to which a place is active: what a hand may change of it."""
+        return self.margin + ACCELERATION * self.time**2 / 2
+
+
+def touches(
+    model: LinkageModel,
+    contacts: Contacts,
+    p: Signals,
+    kept: ca.SX | None = None,
+    ahead: Ahead | None = None,
+) -> list[Touch]:
+    """Every place of every pair within reach, in the order of `broad_phase.near`. kept: a row of
+    normals, or zeros, for each of `swept_places` (k x 2); None: none is kept."""
     touching: list[Touch] = []
+    sides = iter([] if kept is None else ca.vertsplit(kept))
     for pair in near(model.linkage, contacts):
         body = _body(model, pair.body)
         if pair.kind == "enclosure":
             at_end = _in_corner if contacts.friction is None else _at_walls
-            touching += [t for end in _rows(body) for t in at_end(model, pair.body, end, p)]
+            touching += [t for end in _rows(body) for t in at_end(model, pair.body, end, p, ahead)]
         else:
-            touching += _between(model, body, _obstacle(model, pair, p))
+            places = _between(model, body, _obstacle(model, pair, p))
+            touching += [place.touch(next(sides, None), ahead) for place in places]
     return touching
+
+
+def swept_places(model: LinkageModel, contacts: Contacts, p: Signals) -> list[MovingPoint]:
+    """The places of all pairs of shapes: all but those at the enclosure, which nothing passes."""
+    return [
+        place
+        for pair in near(model.linkage, contacts)
+        if pair.kind != "enclosure"
+        for place in _between(model, _body(model, pair.body), _obstacle(model, pair, p))
+    ]
 
 
 def _body(model: LinkageModel, name: str) -> Shape:
@@ -129,15 +175,23 @@ def _rows(shape: Shape) -> list[ca.SX]:
     return [shape.corners[k, :].T for k in range(shape.corners.shape[0])]
 
 
-def _at_walls(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
-    walls = edges(p["enclosure.corners"])
-    return [Touch(body, "ground", ca.SX(1), end, a, -outward) for a, _, outward in walls]
+def _at_walls(
+    model: LinkageModel, body: str, end: ca.SX, p: Signals, ahead: Ahead | None
+) -> list[Touch]:
+    radius, point = model.p[f"{body}.radius"], model.frames[body].point(end)
+    touching = []
+    for a, _, outward in edges(p["enclosure.corners"]):
+        least = _least_gap(model, ca.dot(point - a, -outward), ahead)
+        touching.append(Touch(body, "ground", _is_met(least, radius, ahead), end, a, -outward))
+    return touching
 
 
-def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[Touch]:
-    point = model.frames[body].point(end)
+def _in_corner(
+    model: LinkageModel, body: str, end: ca.SX, p: Signals, ahead: Ahead | None
+) -> list[Touch]:
+    radius, point = model.p[f"{body}.radius"], model.frames[body].point(end)
     walls = [
-        [ca.dot(point - a, -outward), a, -outward]
+        [_least_gap(model, ca.dot(point - a, -outward), ahead), a, -outward]
         for a, _, outward in edges(p["enclosure.corners"])
     ]
     first, second = select(walls[0][0] < walls[1][0], walls[0] + walls[1], walls[1] + walls[0]), []
@@ -146,28 +200,127 @@ def _in_corner(model: LinkageModel, body: str, end: ca.SX, p: Signals) -> list[T
         nearer, next_one = wall[0] < first[0], wall[0] < second[0]
         second = select(nearer, first, select(next_one, wall, second))
         first = select(nearer, wall, first)
-    return [Touch(body, "ground", ca.SX(1), end, plane, n) for _, plane, n in (first, second)]
+    return [
+        Touch(body, "ground", _is_met(least, radius, ahead), end, plane, n)
+        for least, plane, n in (first, second)
+    ]
 
 
-def _between(model: LinkageModel, a: Shape, b: Shape) -> Iterator[Touch]:
+def _least_gap(model: LinkageModel, gap: ca.SX, ahead: Ahead | None) -> ca.SX:
+    """The smallest gap of a corner at a wall over the time `ahead`."""
+    return gap + ca.fmin(0, model.rate(gap)) * ahead.time if ahead else gap
+
+
+def _is_met(gap: ca.SX, radius: ca.SX, ahead: Ahead | None) -> ca.SX:
+    return gap - radius < ahead.gap if ahead else ca.SX(1)
+
+
+@dataclass(frozen=True)
+class MovingPoint:
+    """A point that moves by a core, both of shapes that can touch each other: x (m) in the frame of
+    the core's body. core_first: the core belongs to the pair's first body, whose `Touch` has a
+    point of the core, or else one of its plane; back: as in closest_points.py."""
+
+    model: LinkageModel
+    core: Shape
+    corner: Shape
+    local: ca.SX
+    core_first: bool
+    back: ca.SX | int = 0
+
+    @cached_property
+    def x(self) -> ca.SX:
+        frames = self.model.frames
+        return frames[self.core.body].local(frames[self.corner.body].point(self.local))
+
+    @cached_property
+    def _nearest(self) -> list[ca.SX]:
+        """The core's nearest point and its normal there."""
+        return _nearest(self.core, self.x, self.back)
+
+    @property
+    def _gap(self) -> ca.SX:
+        """Distance from the core, negative inside."""
+        point, normal = self._nearest
+        return ca.dot(normal, self.x - point)
+
+    @property
+    def _reach(self) -> ca.SX:
+        return ca.SX(self.core.radius + self.corner.radius)
+
+    def entered(self, kept: ca.SX, d: ca.SX) -> ca.SX:
+        """The normal on whose side the place is to be kept while it moves by d: the one on which it
+        is kept already, where it touches, or where its path enters; 0 if it does not."""
+        share = entry(self.core.corners, self.x, d, self._reach)
+        _, later = _nearest(self.core, self.x + ca.fmin(share, 1) * d)
+        _, normal = self._nearest
+        entered = ca.if_else(self.is_inside, normal, ca.if_else(share <= 1, later, 0))
+        return ca.if_else(self.keeps(kept), kept, entered)
+
+    def keeps(self, kept: ca.SX) -> ca.SX:
+        """Whether the place is kept on the side `kept`."""
+        _, normal = self._nearest
+        return is_kept(self.core.corners, self.x, kept, self._reach, normal)
+
+    @property
+    def is_inside(self) -> ca.SX:
+        """Whether the shapes overlap here."""
+        return self._gap < self._reach
+
+    def touch(self, kept: ca.SX | None, ahead: Ahead | None) -> Touch:
+        """kept: its normal (1 x 2), or None."""
+        active, best = ca.SX(1), self._nearest
+        if ahead:
+            active, best = self._ahead(ahead)
+        if kept is not None:
+            n = kept.T
+            off = ca.dot(n, self.x) - support(self.core.corners, n)
+            keeps = self.keeps(n)
+            best = select(keeps, [self.x - off * n, n], best)
+            active = ca.logic_or(active, keeps)
+        return self._placed(active, *best)
+
+    def _ahead(self, ahead: Ahead) -> tuple[ca.SX, list[ca.SX]]:
+        """Whether the place comes within the margin, and the core's nearest point and normal at the
+        place's first touch in this time, or where it is nearest to the core."""
+        corners, d = self.core.corners, self.model.rate(self.x) * ahead.time
+        share = entry(corners, self.x, d, self._reach)
+        end, normal = _nearest(self.core, self.x + d)
+        gaps = self._gap, ca.dot(normal, self.x + d - end)
+        least, nearest = closest_approach(corners, self.x, d, *gaps)
+        meets = share <= 1
+        at = ca.if_else(meets, share, nearest)
+        later = [ca.logic_or(meets, least < self._reach + ahead.gap)]
+        later += _nearest(self.core, self.x + at * d)
+        now = [self._gap < self._reach + ahead.gap, *self._nearest]
+        leaves = ca.logic_and(ca.sumsqr(d) > ahead.margin**2, ca.logic_not(self.is_inside))
+        active, *there = select(leaves, later, now)
+        return active, there
+
+    def _placed(self, active: ca.SX, point: ca.SX, normal: ca.SX) -> Touch:
+        """The contact at a point of the core, with its outward normal, both in its frame."""
+        frame, ours, theirs = self.model.frames[self.core.body], self.core, self.corner
+        outward = frame.rotation @ normal
+        if not self.core_first:
+            plane = frame.point(point) + ours.radius * outward
+            return Touch(theirs.body, ours.body, active, self.local, plane, outward)
+        plane = self.model.frames[theirs.body].point(self.local) - theirs.radius * outward
+        return Touch(ours.body, theirs.body, active, point, plane, -outward)
+
+
+def _between(model: LinkageModel, a: Shape, b: Shape) -> Iterator[MovingPoint]:
     """The places of two shapes: each corner of either core at the other core; of a point alone."""
-    frame, other = model.frames[a.body], model.frames[b.body]
     if b.corners.shape[0] > 1:
         for corner in _rows(a):
-            plane, normal = _nearest(b, other.local(frame.point(corner)))
-            outward = other.rotation @ normal
-            position = other.point(plane) + b.radius * outward
-            yield Touch(a.body, b.body, ca.SX(1), corner, position, outward)
+            yield MovingPoint(model, b, a, corner, core_first=False)
     if a.corners.shape[0] > 1 or b.corners.shape[0] == 1:
-        world = [other.point(corner) for corner in _rows(b)]
-        seen = [frame.local(position) for position in world]
+        frame, other = model.frames[a.body], model.frames[b.body]
+        seen = [frame.local(other.point(corner)) for corner in _rows(b)]
         backs: list[ca.SX] = [ca.SX(0)] * len(seen)
         if a.corners.shape[0] == 2 and len(seen) > 2:
             backs = sunk_past(a.corners, ca.horzcat(*seen).T)
-        for position, local, back in zip(world, seen, backs, strict=True):
-            point, normal = _nearest(a, local, back)
-            inward = -(frame.rotation @ normal)
-            yield Touch(a.body, b.body, ca.SX(1), point, position + b.radius * inward, inward)
+        for corner, back in zip(_rows(b), backs, strict=True):
+            yield MovingPoint(model, a, b, corner, core_first=True, back=back)
 
 
 def _nearest(shape: Shape, position: ca.SX, back: ca.SX | int = 0) -> list[ca.SX]:

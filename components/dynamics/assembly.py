@@ -11,7 +11,7 @@ regularised system.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 
 import casadi as ca
 import numpy as np
@@ -29,6 +29,9 @@ STEPS = 12
 RATE_STEPS = 3  # each step reduces the error by a factor of about MU
 MU = 1e-9  # as in closed_loop_solver.py
 TOLERANCE = 1e-9  # for the gap at the start pose (m), and for given rates relative to the largest
+LOST = 1e-7  # singular values of W below this share of the largest are none
+OFF = 1e-6  # the share of w that no acceleration can take up from which on rates are off a branch
+TRIALS, NAMED = 40, 3  # to find the rates along branches, and how many are named
 
 
 class AssemblyError(ValueError):
@@ -83,8 +86,9 @@ def given_rates(linkage: Linkage) -> NDArray[np.bool_]:
 
 
 def require_assembled(component: Component, model: LinkageModel) -> None:
-    """Raises AssemblyError for a loop that does not close from the default start pose, and for
-    given start rates that are not consistent, with the nearest rates that are."""
+    """Raises AssemblyError for a loop that does not close from the default start pose, for given
+    start rates that are not consistent, with the nearest rates that are, and for rates along no
+    branch of the motion where W loses rank, with some that are."""
     n = model.q.numel()
     start = component.initialize(component.start_inputs, component.start_parameters)
     q, qd = start[:n], np.array(start[n : 2 * n]).ravel()
@@ -107,13 +111,86 @@ def require_assembled(component: Component, model: LinkageModel) -> None:
             f"give what is nearest, {', '.join(_rates(model.linkage, qd))}"
         )
 
+    if qd.any():
+        _require_branch(component, model, np.array(q).ravel(), qd)
 
-def _rates(linkage: Linkage, qd: NDArray[np.float64]) -> Iterator[str]:
-    """`crank = 2` for each joint that `start_velocity` names."""
+
+def _require_branch(
+    component: Component, model: LinkageModel, q: NDArray[np.float64], qd: NDArray[np.float64]
+) -> None:
+    """Raises AssemblyError for start rates at which the loops do not stay closed in second order.
+
+    W qdd = -w(qd) has no solution where N' w(qd) != 0 for the left null vectors N of W. These are
+    there where W is redundant, and then N' w = 0 for all rates with W qd = 0, or where branches of
+    the motion meet, along which alone it is 0 (Mueller, J. Mech. Robotics 10, 2018).
+    """
+    if not model.closures:
+        return
+    p = component.start_parameters
+    arguments = [model.q, model.qd, model.p.vector]
+    w_function = ca.Function("w", arguments, [model.rate(model.W @ model.qd)])
+    W_function = ca.Function("W", [model.q, model.p.vector], [model.W])
+    left, sizes, right = np.linalg.svd(np.array(W_function(q, p)))
+    rank = int(np.sum(sizes > LOST * sizes[0]))
+    N, Z = left[:, rank:], right[rank:].T
+
+    def w(rates: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array(w_function(q, rates, p)).ravel()
+
+    scale = float(np.linalg.norm(w(qd)) + sizes[0] * (qd @ qd))
+    if not np.linalg.norm(N.T @ w(qd)) > OFF * scale:
+        return
+    found = _branches(lambda rates: N.T @ w(rates), Z, model.linkage)
+    names = [j.name for j in model.linkage.joint]
+    said = [f"{{ {', '.join(_rates(model.linkage, rates, names))} }}" for rates in found]
+    remedy = f"give the rates of one, linkage.start_velocity = {' or '.join(said)}; or " * bool(
+        said
+    )
+    raise AssemblyError(
+        "at the start pose branches of the motion meet, where W loses rank (as where all links are "
+        f"in line), and {', '.join(_rates(model.linkage, qd, names))}, which "
+        "`linkage.start_velocity` leads to, is along none of them: the loops would open; "
+        f"{remedy}start beside this pose"
+    )
+
+
+def _branches(
+    bent: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    Z: NDArray[np.float64],
+    linkage: Linkage,
+) -> list[NDArray[np.float64]]:
+    """Some rates Z c, with those that the scene gives, at which bent(Z c) = 0, quadratic in c, by
+    Newton's method from several c; the smallest ones first."""
+    given = given_rates(linkage)
+    wanted = np.array(coordinates(linkage, linkage.start_velocity))[given]
+
+    def residual(c: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate([bent(Z @ c), (Z @ c)[given] - wanted])
+
+    k, size = Z.shape[1], np.abs(wanted).max(initial=0.0) or 1.0
+    found: list[NDArray[np.float64]] = []
+    for c in size * np.random.default_rng(0).normal(size=(TRIALS, k)):
+        for _ in range(TRIALS):
+            columns = [(residual(c + d) - residual(c - d)) / 2 for d in size * np.eye(k)]
+            J = np.array(columns).T / size  # exact: the residual is quadratic
+            c = c - np.linalg.lstsq(J, residual(c))[0]
+        rates = Z @ c
+        if np.abs(residual(c)).max() > TOLERANCE * size or not np.isfinite(rates).all():
+            continue
+        rates[np.abs(rates) < TOLERANCE * np.abs(rates).max()] = 0.0
+        if rates.any() and not any(np.allclose(rates, known, atol=1e-6 * size) for known in found):
+            found.append(rates)
+    return sorted(found, key=lambda rates: float(rates @ rates))[:NAMED]
+
+
+def _rates(
+    linkage: Linkage, qd: NDArray[np.float64], names: Collection[str] | None = None
+) -> Iterator[str]:
+    """`crank = 2` for each joint of `names`, by default those that `start_velocity` names."""
     place = 0
     for j in linkage.joint:
         rates = qd[place : place + j.kind.size].tolist()
         place += len(rates)
-        if j.name in linkage.start_velocity:
+        if j.name in (linkage.start_velocity if names is None else names):
             value = f"{rates[0]:.10g}" if len(rates) == 1 else str(rates)
             yield f"{j.name} = {value}"

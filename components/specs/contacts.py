@@ -62,7 +62,7 @@ class Contacts:
     """graphics: the virtual environment detects contacts, and their geometry is held between frames
     (the report's local model); haptics: the mechanism detects them at every evaluation."""
     margin: Annotated[float, Quantity("m", ge=0)] = 0.01
-    """Gap up to which the virtual environment reports a contact."""
+    """Gap up to which the virtual environment reports a contact, on the path that it foresees."""
     broad_phase = True
     """Whether pairs that can never touch are left out."""
 

@@ -255,15 +255,31 @@ class PortEnergy(BlockEnergy):
 
 
 @dataclass(frozen=True)
+class HeldContacts:
+    """What new frames of held contacts did to the mechanism (`analysis/findings/held_contacts.py`):
+    energy (J) that they gave and took in all, the largest gain at one frame and when (s), and the
+    largest jump (N) of F_env and when; with the energy (J) of the deepest contact."""
+
+    given: float
+    taken: float
+    largest_gain: float
+    time_of_gain: float
+    stored: float
+    largest_jump: float
+    time_of_jump: float
+
+
+@dataclass(frozen=True)
 class RunRecord(RunEnding, RunSetup):
     """The content of run.json, which a run that was recovered has together with `recovered`."""
 
     user_port: PortEnergy | None = None
+    held_contacts: HeldContacts | None = None
     warnings: list[str] | None = None
     """None of a run that goes on or was killed."""
 
 
-def content(section: RunSetup | RunEnding | PortEnergy) -> dict[str, Any]:
+def content(section: RunSetup | RunEnding | PortEnergy | HeldContacts) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""
     values: dict[str, Any] = plain(section)
     if "end" in values:

@@ -120,3 +120,75 @@ def test_a_device_that_starts_elsewhere_is_said(tmp_path):
     run = hl.run("closed-loop-ideal", {"duration": 0.05, "stop_when": "", "fmu": [own]})
     (line,) = [w for w in run.run["warnings"] if "from the operational point: errors" in w]
     assert line.startswith("warning: the handle starts 16 mm and")
+
+
+def pushed_against_a_wall(folder: Path, force: float, rate: float, **contacts: str) -> hl.Run:
+    """A ball of 0.5 kg at rest, 46 mm before a wall of 30 mm, from t = 0 on under a force (N)."""
+    scene = folder / "pushed.toml"
+    scene.write_text(f"""
+title = "Pushed against a wall"
+duration = 0.3
+haptics.rate = 512
+graphics.rate = {rate}
+
+[hand]
+wrench = [{force}, 0.0, 0.0]
+
+[linkage.operational_point]
+body = "ball"
+
+[[linkage.body]]
+name = "ball"
+mass = 0.5
+inertia = 1e-4
+radius = 0.004
+
+[[linkage.joint]]
+name = "slide"
+type = "prismatic"
+axis = 0.0
+child = "ball"
+
+[contacts]
+damping = 0.0
+
+[[contacts.polygon]]
+name = "wall"
+corners = [[0.05, -0.1], [0.08, -0.1], [0.08, 0.1], [0.05, 0.1]]
+""")
+    options = {f"contacts.{key}": value for key, value in contacts.items()}
+    return hl.run(scene, options)
+
+
+def test_a_contact_that_was_met_late_is_told_with_the_energy_that_its_frame_gave(
+    tmp_path: Path,
+) -> None:
+    """40 m/s^2, more than held contacts foresee. Energy: E - E(0) = F dx + what frames gave."""
+    made = pushed_against_a_wall(tmp_path, 20.0, 30)
+    held, warned = made.run["held_contacts"], "\n".join(made.run["warnings"])
+    rows = made.tables["haptics"]
+    x, energy = rows["virtual_mechanism.x"][:, 0], rows["virtual_mechanism.energy"]
+    gained = energy[-1] - energy[0] - 20.0 * (x[-1] - x[0])
+    assert held["given"] > 1.0
+    assert gained == pytest.approx(held["given"] - held["taken"], rel=1e-3)
+    assert held["largest_jump"] > 100.0
+    assert "no contact that is held from an earlier frame touches it there" in warned
+    assert f"frame of contacts at {held['time_of_gain']:.4g} s gave the mechanism" in warned
+    jumps = [line for line in made.numbers or () if "a new frame F_env jumps by at most" in line]
+    assert len(jumps) == 1
+
+
+@pytest.mark.parametrize(
+    ("force", "contacts"), [(5.0, {}), (20.0, {"detection": "haptics"})], ids=["graphics", "own"]
+)
+def test_a_contact_that_was_foreseen_gives_no_energy(
+    tmp_path: Path, force: float, contacts: dict[str, str]
+) -> None:
+    """10 m/s^2, at 10 Hz."""
+    made = pushed_against_a_wall(tmp_path, force, 10, **contacts)
+    assert not any("frame" in line for line in made.run["warnings"])
+    held = made.run.get("held_contacts")
+    assert held["given"] == 0.0 if force == 5.0 else held is None
+    rows = made.tables["haptics"]
+    x, energy = rows["virtual_mechanism.x"][:, 0], rows["virtual_mechanism.energy"]
+    assert energy[-1] - energy[0] == pytest.approx(force * (x[-1] - x[0]), abs=2e-3)

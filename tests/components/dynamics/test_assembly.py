@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from hapticlink.components.dynamics.assembly import AssemblyError
-from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
+from hapticlink.components.specs.linkage import (
+    Body,
+    GraphicsCopy,
+    Joint,
+    Linkage,
+    Loop,
+    OperationalPoint,
+)
 from hapticlink.orchestrator import open_scene
-from tests.blocks import Running, running, virtual_environment
+from tests.blocks import Running, advance, running, virtual_environment
 
 
 def moving(name: str, **given: Any) -> tuple[Linkage, Running]:
@@ -90,3 +97,64 @@ def test_a_piston_at_its_dead_centre_has_no_rate() -> None:
         moving("slider-crank", start=dead, cylinder=0.1)
     _, block = moving("slider-crank", start=dead, crank=4.0)
     np.testing.assert_allclose(block.y["qd"], [4.0, -4.0 * (1 + 0.05 / 0.15), 0.0], atol=1e-12)
+
+
+def in_line(**given: float) -> Linkage:
+    """A parallelogram of cranks of 1 m and a coupler of 2 m with all links in line: there it may
+    go on as a parallelogram or as its crossed form."""
+    crank = {"mass": 1.0, "inertia": 1 / 12, "center": (0.5, 0.0)}
+    body = (
+        Body(name="crank", **crank),
+        Body(name="coupler", mass=1.0, inertia=1 / 3, center=(1.0, 0.0)),
+        Body(name="rocker", **crank),
+    )
+    joint = (
+        Joint(name="A", child="crank"),
+        Joint(name="B", parent="crank", child="coupler", at_parent=(1.0, 0.0)),
+        Joint(name="D", child="rocker", at_parent=(2.0, 0.0)),
+    )
+    loop = (Loop(bodies=("coupler", "rocker"), at=((2.0, 0.0), (1.0, 0.0))),)
+    point = OperationalPoint(body="coupler")
+    return Linkage(body=body, joint=joint, loop=loop, operational_point=point, start_velocity=given)
+
+
+@pytest.mark.parametrize("given", [{"A": 1.0}, {"A": 1.0, "B": 0.0}, {"A": 1.0, "D": -1.0}])
+def test_rates_along_no_branch_are_refused_where_branches_meet(given: dict[str, float]) -> None:
+    """To second order, with rates a, b, d and c = a + b: a + 2 c = d and a^2 + 2 c^2 = d^2, so that
+    c = 0 (parallel) or c = -2 a (crossed)."""
+    with pytest.raises(AssemblyError, match="branches of the motion meet") as refused:
+        running(in_line(**given))
+    if given == {"A": 1.0}:
+        assert "{ A = 1, B = -1, D = 1 } or { A = 1, B = -3, D = -3 }" in str(refused.value)
+
+
+@pytest.mark.parametrize("given", [{"A": 1.0, "D": 1.0}, {"A": 1.0, "B": -3.0, "D": -3.0}])
+def test_rates_along_a_branch_are_kept_with_their_energy_at_any_rate(
+    given: dict[str, float],
+) -> None:
+    ends = []
+    for rate in (200, 1000):
+        block = running(in_line(**given))
+        assert [block.y["qd"][i] for i in (0, 2)] == pytest.approx([given["A"], given["D"]])
+        energy = block.y["energy"]
+        advance(block, 0.5, rate)
+        assert block.y["energy"] == pytest.approx(energy, rel=1e-4)
+        ends.append(block.y["q"])
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-4)
+
+
+def test_a_redundant_loop_is_no_place_where_branches_meet() -> None:
+    """W has lost rank at every pose of a parallelogram with a second, parallel coupler."""
+    linkage = in_line(A=1.0)
+    also = Body(name="second", mass=1.0, inertia=1 / 3, center=(1.0, 0.0))
+    joint = Joint(name="E", parent="crank", child="second", at_parent=(0.5, 0.0))
+    loop = Loop(bodies=("second", "rocker"), at=((2.0, 0.0), (0.5, 0.0)))
+    doubled = replace(
+        linkage,
+        body=(*linkage.body, also),
+        joint=(*linkage.joint, joint),
+        loop=(*linkage.loop, loop),
+        start={"A": 1.0, "B": -1.0, "D": 1.0, "E": -1.0},
+    )
+    block = running(doubled)
+    np.testing.assert_allclose(block.y["qd"], [1.0, -1.0, 1.0, -1.0], atol=1e-9)
