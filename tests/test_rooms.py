@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 4758,
-    "fmus": 2618,
-    "orchestrator": 11606,
-    "programs": 1098,
-    "analysis": 6491,
+    "components": 5049,
+    "fmus": 2736,
+    "orchestrator": 12125,
+    "programs": 1114,
+    "analysis": 6614,
     "visualization": 3127,
-    "api": 400,
-    "commands": 1329,
+    "api": 402,
+    "commands": 1345,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
