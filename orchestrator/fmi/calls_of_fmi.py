@@ -75,7 +75,7 @@ class InProcess(Instance):
             raise self._fault(f"could not be loaded: {reason}", 0.0) from error
         outputs = self.description.outputs
         self.gets = self.gets_between_rows = self._transfers("Get", outputs, self.outputs)
-        if self.recorded_only:
+        if self.recorded_only and self.converted is None:
             often = [s for s in outputs if s.name not in self.recorded_only]
             places = [*map(outputs.index, often)]
             self.gets_between_rows = self._transfers("Get", often, self.outputs, {}, places)
@@ -224,15 +224,19 @@ class InProcess(Instance):
 
     def read(self) -> None:
         self._carry_out(self.asked, "gets")
+        self._convert()
 
     def read_some(self, places: Sequence[int]) -> None:
         values = np.zeros(len(places))
         scalars = [self.description.outputs[i] for i in places]
         self._carry_out(self._transfers("Get", scalars, values), "gets")
         self.outputs[list(places)] = values
+        self._convert(list(places))
 
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
-        return derivatives(self.slave, self.description, outputs, inputs)
+        found = derivatives(self.slave, self.description, outputs, inputs)
+        factors = np.array([s.conversion.factor for s in outputs])
+        return found if found is None else factors[:, None] * found
 
     def step(self, time: float, end: float, size: float) -> None:
         place = self.place

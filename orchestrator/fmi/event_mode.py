@@ -305,6 +305,7 @@ class InProcessWithEvents(InProcess3):
             self._read_those(frozenset(c.reference for c in self._clocks))
         self._read_those(None)
         self.outputs[:] = self.pending.values
+        self._convert()
 
     def read_some(self, places: Sequence[int]) -> None:
         if self._clocks:

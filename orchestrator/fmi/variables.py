@@ -46,7 +46,8 @@ class Scalar:
     entry: int = 0
     """Its index among the entries of its array, row by row."""
     conversion: Linear = SAME
-    """Applied to values of a connection to it."""
+    """Applied to values of a connection to an input; to an output's value where it is read, of an
+    FMU in the place of a block with other units."""
     nominal: float = 1.0
     """Nominal value (FMI 2.0.5 section 2.2.7)."""
     bound: float | None = None

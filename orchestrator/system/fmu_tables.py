@@ -20,6 +20,7 @@ from hapticlink.orchestrator.scene.scene_tables import ForeignFmu, Value
 from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem
 from hapticlink.orchestrator.system.port_map import (
     Mapped,
+    in_units_of,
     map_ports,
     rename_ports,
     with_declarations,
@@ -51,7 +52,8 @@ def fmus(
             except ValueError as fault:
                 problems.append((("fmu", i, "map"), str(fault)))
                 continue
-            description = with_declarations(rename_ports(description, names, block), block)
+            description = in_units_of(rename_ports(description, names, block), block)
+            description = with_declarations(description, block)
         if fmu.timing:
             description = replace(description, timing=fmu.timing)
         elif block and not description.declares_timing:

@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
+from hapticlink.components.ports import BASES
+from hapticlink.fmus.units import base_unit
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.units import why_unsuitable
+from hapticlink.orchestrator.fmi.units import SAME, Unit, conversion, why_unsuitable
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 if TYPE_CHECKING:
@@ -52,6 +55,29 @@ def map_ports(
             own = [s for s in free if s.port not in ports]
             renamings |= {port: names} if (names := _alike(variable, own)) else {}
     return renamings
+
+
+def in_units_of(description: Description, block: Component) -> Description:
+    """The description with outputs in the units of the block's that have their names, where the FMU
+    has others: as they are read, so that whoever reads them finds what the block would have given.
+    What cannot be converted stays as it is."""
+    declared = {
+        name: Unit(unit, tuple(base_unit(unit).get(base, 0) for base in BASES))
+        for v in block.outputs
+        for name, unit in zip(v.names, v.units, strict=True)
+    }
+    scalars, units = [], dict(description.units)
+    for s in description.scalars:
+        if s.causality == "output" and s.unit and (unit := declared.get(s.name)):
+            with suppress(ValueError):
+                into = conversion(description.unit(s), unit, s.relative)
+                if into != SAME:
+                    bound = s.bound and abs(into.factor) * s.bound
+                    nominal = abs(into.factor) * s.nominal
+                    s = replace(s, unit=unit.name, conversion=into, bound=bound, nominal=nominal)
+                    units[unit.name] = unit
+        scalars.append(s)
+    return replace(description, scalars=tuple(scalars), units=units)
 
 
 def rename_ports(description: Description, names: Mapped, block: Component) -> Description:

@@ -94,6 +94,9 @@ int fmu_get(const Fmu *f, int64_t judged, At *at) {
         if (gets[i].kind.type != DOUBLE && !from_buffer(gets + i)) return CALL;
     }
     keep_arithmetic(f->place);
+    if (f->factors)
+        for (int64_t i = 0; i < f->n_outputs; i++)
+            f->outputs[i] = f->factors[i] * f->outputs[i] + f->offsets[i];
     if (!judged) return 0;
     int within = 1;
     for (int64_t i = 0; i < f->n_outputs; i++)

@@ -74,6 +74,8 @@ def of_instance(
         c.fill(instance, "reached", event=event, terminate=terminate, early=early)
     c.gets, c.n_gets = of_transfers(instance.gets, instance, memory), len(instance.gets)
     c.inverse = memory.copy(instance.bounds.inverse)
+    if instance.converted is not None:
+        c.factors, c.offsets = map(memory.copy, instance.converted)
     c.gets_between_rows, c.n_gets_between_rows = c.gets, c.n_gets
     if instance.gets_between_rows is not instance.gets:
         c.gets_between_rows, c.n_gets_between_rows = (

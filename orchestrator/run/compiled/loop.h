@@ -68,6 +68,7 @@ typedef struct {
     int64_t n_gets;
     double *outputs /* [n_outputs] */;
     const double *inverse /* [n_outputs] */; /* 1/bound */
+    const double *factors /* [n_outputs] */, *offsets /* [n_outputs] */; /* to the units of the block that it replaces, or NULL */
     double *good /* [n_outputs] */;       /* the last finite outputs, or NULL */
     int64_t n_outputs, n_steps, untimed;  /* untimed: steps too short to be timed */
     Check *check;                         /* NULL if there is none */

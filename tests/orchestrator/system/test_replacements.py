@@ -14,7 +14,7 @@ from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.system.build_system import build_system
-from tests.little_fmus import entries, slave
+from tests.little_fmus import entries, slave, with_units
 from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import status
 
@@ -216,3 +216,21 @@ def test_info_does_not_run_another_s_mechanism(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "virtual_mechanism has no ports for" in said
     assert "needed by the scene's own virtual_mechanism" in said
+
+
+@pytest.mark.parametrize("isolate", [False, True])
+def test_outputs_are_read_in_the_units_of_the_block(tmp_path, isolate):
+    """A hand that gives .5 N, in kN: signals and summary have what the block's own would have."""
+    starts = {"F[1]": 3.526708e-4, "F[2]": -3.545062e-4, "F[3]": 0.0}
+    slave(tmp_path, "Pushes", ("output", starts))
+    with_units(tmp_path / "Pushes.fmu", **{"F[1]": "kN", "F[2]": "kN"})
+    own = {"path": str(tmp_path / "Pushes.fmu"), "replaces": "hand", "isolate": isolate}
+    given = {"type": "constant", "wrench": [0.3526708, -0.3545062, 0.0]}
+    options = {"duration": 0.2}
+    found = hl.run("closed-loop-ideal", options | {"fmu": [own]})
+    expected = hl.run("closed-loop-ideal", options | {"hand": given})
+    assert found.run["units"]["hand.F[1]"] == "N"
+    for name in ("hand.F", "haptic_device.x_true", "controller.F_drift"):
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9, atol=1e-12)
+    for told, own in zip(found.numbers, expected.numbers, strict=True):
+        assert told == own
