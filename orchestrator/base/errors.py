@@ -26,7 +26,7 @@ def describe_memory_error(error: MemoryError) -> str:
     """What was to be allocated, where that is told, and a remedy."""
     what = f" ({error})" if str(error) else ""
     return (
-        f"there is not enough memory{what}: end others that use it, or take a shorter duration, a "
+        f"there is not enough memory{what}: end other applications, or take a shorter duration, a "
         "smaller scene, or fewer outputs ([record])"
     )
 
