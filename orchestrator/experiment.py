@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -191,6 +191,7 @@ def simulate(
                 host_state.restore_interpreter(),
             ):
                 outcome = run(plan, results, progress, real_time)
+            outcome.details = replace(outcome.details, logged=results.count_logged())
             try:
                 results.end(outcome.ending(build_time), tables)
             except OSError as error:

@@ -232,6 +232,10 @@ def _steps(record: RunRecord) -> Iterator[str]:
     run in real time was late with."""
     for fmu, count in record.held_outputs.items():
         yield f'{fmu}: {count} outputs were not finite and held (faults.nan = "hold")'
+    for fmu, logged in record.logged.items():
+        told = [f"{n} of {status}" for status, n in logged.items() if status != "ok"]
+        if told:
+            yield f"{fmu} has logged messages, {' and '.join(told)}: they are in fmus.log"
     if record.real_time:
         yield from _real_time(record.real_time)
     for fmu, exchange in record.network.items():

@@ -70,8 +70,8 @@ def clear(ended: int | None = None) -> None:
                     shutil.rmtree(entry.path, ignore_errors=True)
 
 
-UNFINISHED = re.compile(r"\..+\.(?:rows\.(\d+)|(\d+)\.[0-9a-f]{32}(?:\.\w+)?)")
-"""The names of files that a process of that number is writing: of `atomic_file`, and its rows."""
+UNFINISHED = re.compile(r"\..+\.(?:(?:rows|log)\.(\d+)|(\d+)\.[0-9a-f]{32}(?:\.\w+)?)")
+"""The names of files that a process of that number writes: of `atomic_file`, rows, and a log."""
 
 
 def clear_unfinished(folder: Path, ended: int | None = None) -> None:

@@ -63,6 +63,8 @@ class InProcess(Instance):
         self._key = messages.open_log()
 
     def _load(self) -> None:
+        if self.log_path:
+            messages.write_to(self._key, self.log_path, self.name, lambda: self.time)
         try:
             self._folder = process_cache.unpack(self.description, self._folder)
             with host_state.restore_directory(self.name):

@@ -28,7 +28,7 @@ class InProcess3(InProcess):
 
     def _logging(self) -> dict[str, Any]:
         def log(environment: int | None, status: int, category: bytes, message: bytes) -> None:
-            keep_message(self._key, status, message)
+            keep_message(self._key, status, message, category)
 
         return {"logMessage": log}
 

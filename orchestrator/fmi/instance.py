@@ -128,6 +128,8 @@ class Instance(ABC):
         self.place = StepState()
         self._waiting: list[tuple[float, Callable[[float], object]]] = []
         self.recorded_only: frozenset[str] = frozenset()
+        self.log_path = ""
+        """The file to which it writes what the FMU logs, "" for none."""
         self.row_due = ctypes.c_int64(1)
         self._counted = False
         self.bounds = OutputBounds(description, outputs)

@@ -64,7 +64,9 @@ class Isolated(Instance):
         self._process.interruptible = True
         what = (self.name, self.description, self.starts, self.policy)
         # The answer waits for `enter_initialization`: all FMUs of a run load at the same time.
-        self._send("load", *what, self._folder, allowed=max(self.policy.timeout, LOADING))
+        self._send(
+            "load", *what, self._folder, self.log_path, allowed=max(self.policy.timeout, LOADING)
+        )
 
     # --- messages -------------------------------------------------------------------------
 

@@ -1,17 +1,58 @@
-"""The most recent log messages of each FMU, by the key of its instance."""
+"""What FMUs log: the newest messages of each, by the key of its instance, which a fault shows; and
+all of them in a file, one in a line, up to a bound:
+
+    0.5    drill    warning    logStatusWarning    the valve is shut
+
+that is where the instance stood (s), its name, the status and the category of the message, and its
+text, with tabs between.
+"""
 
 from __future__ import annotations
 
-from collections import deque
+import os
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import count
+from pathlib import Path
 
 from fmpy import fmi2
 
+from hapticlink.orchestrator.fmi.status import STATUS
+
 MAX_MESSAGES, MAX_LENGTH = 5, 2000
-"""Messages of an instance, and characters of one."""
+"""Messages of an instance that are kept for a fault, and characters of one."""
+MAX_WRITTEN = 1000
+"""Messages of an instance that are written to the file."""
+LEFT_OUT = "further messages are left out"
 
 _messages: dict[int, deque[str]] = {}
+_files: dict[int, LogFile] = {}
 _keys = count(1)
+
+
+class LogFile:
+    """Where the messages of the instance `name` are written. It may be moved meanwhile, and other
+    instances, of other processes too, write there as well. time: where the instance stands (s)."""
+
+    def __init__(self, path: str, name: str, time: Callable[[], float]) -> None:
+        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        self._name, self._time, self._written = name, time, 0
+
+    def write(self, status: str, category: str, text: str) -> None:
+        """Append a message, the last one with a note that it is the last."""
+        if self._written >= MAX_WRITTEN:
+            return
+        self._written += 1
+        fields = [f"{self._time():.9g}", self._name, status, category, text]
+        line = "\t".join(" ".join(field.split()) for field in fields)
+        if self._written == MAX_WRITTEN:
+            line += f"\n{self._time():.9g}\t{self._name}\t\t\t{LEFT_OUT}"
+        with suppress(OSError):  # a message is no reason to end a run
+            os.write(self._file, f"{line}\n".encode(errors="replace"))
+
+    def close(self) -> None:
+        os.close(self._file)
 
 
 def open_log() -> int:
@@ -21,12 +62,22 @@ def open_log() -> int:
     return key
 
 
-def keep_message(key: int, status: int, message: bytes) -> None:
-    """Keep a message of instance `key`, to be shown if a call fails."""
+def write_to(key: int, path: str, name: str, time: Callable[[], float]) -> None:
+    """Write the messages of instance `key` to a file, too."""
+    _files[key] = LogFile(path, name, time)
+
+
+def keep_message(key: int, status: int, message: bytes, category: bytes = b"") -> None:
+    """Keep a message of instance `key`, to be shown if a call fails, and write it down."""
     own = _messages.get(key)
-    if own is not None and status != 0:
-        text = (message or b"")[: 4 * MAX_LENGTH].decode("utf-8", "replace")
-        own.append(text.strip()[:MAX_LENGTH])
+    if own is None:
+        return
+    text = (message or b"")[: 4 * MAX_LENGTH].decode("utf-8", "replace").strip()[:MAX_LENGTH]
+    if status != 0:
+        own.append(text)
+    if file := _files.get(key):
+        named = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+        file.write(named, (category or b"").decode("utf-8", "replace"), text)
 
 
 def newest_messages(key: int) -> list[str]:
@@ -35,6 +86,27 @@ def newest_messages(key: int) -> list[str]:
 
 def close_log(key: int) -> None:
     _messages.pop(key, None)
+    if file := _files.pop(key, None):
+        file.close()
+
+
+def count_messages(path: Path) -> dict[str, dict[str, int]]:
+    """The number of messages in a log, by instance and status."""
+    found: dict[str, Counter[str]] = {}
+    for name, status in _read_statuses(path):
+        found.setdefault(name, Counter())[status] += 1
+    return {name: dict(counts) for name, counts in found.items()}
+
+
+def _read_statuses(path: Path) -> Iterator[tuple[str, str]]:
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return
+    for line in lines:
+        fields = line.split("\t")
+        if len(fields) == 5 and fields[2]:
+            yield fields[1], fields[2]
 
 
 def callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
@@ -45,7 +117,7 @@ def callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
 
 
 def _log(key: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
-    keep_message(key or 0, status, message)
+    keep_message(key or 0, status, message, category)
 
 
 _CALLBACKS = fmi2.fmi2CallbackFunctions()

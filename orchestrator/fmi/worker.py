@@ -44,11 +44,18 @@ class HostedFmu:
         return self._instance
 
     def load(
-        self, name: str, description: Description, starts: Any, policy: Any, folder: str = ""
+        self,
+        name: str,
+        description: Description,
+        starts: Any,
+        policy: Any,
+        folder: str = "",
+        log_path: str = "",
     ) -> None:
         self._inputs = {s.name: s for s in description.scalars if s.causality != "output"}
         kind, outputs = in_process(description), np.zeros(len(description.outputs))
         self._instance = kind(name, description, outputs, starts, policy, folder)
+        self.instance.log_path = log_path
         self.instance.__enter__()
 
     def connect(self, names: Sequence[str]) -> int:

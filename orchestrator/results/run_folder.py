@@ -4,6 +4,7 @@ one are on the disk."""
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
@@ -12,6 +13,7 @@ from pathlib import Path
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base import interrupt, temporary_folders, text_files
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
+from hapticlink.orchestrator.fmi.messages import count_messages
 from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_record import (
     End,
@@ -31,7 +33,7 @@ from hapticlink.orchestrator.results.write_files import (
 
 ROOM = 1 << 14
 """Bytes reserved in run.json for how the run ends, in case the disk is full by then."""
-RUN = "run.json"
+RUN, LOG = "run.json", "fmus.log"
 
 
 class RunFolder(RunResults):
@@ -49,6 +51,8 @@ class RunFolder(RunResults):
         # What the first row needs, before the time of the loop is taken.
         self._earlier = _list_files(folder)
         self._begun = self._text(End(process=os.getpid()))
+        self._log = folder / f".{LOG}.{os.getpid()}"
+        self.log_path = str(self._log)
 
     def __enter__(self) -> RunFolder:
         interrupt.add(self._interrupted)
@@ -59,6 +63,19 @@ class RunFolder(RunResults):
         if error is not None:
             with suppress(OSError):
                 self._broken_off("fault", error)
+        with suppress(OSError):
+            self._keep_log()
+
+    def _keep_log(self) -> None:
+        """Where FMUs have logged something, in a run whose results are here, the log stays."""
+        if not self.published or not self._log.stat().st_size:
+            self._log.unlink(missing_ok=True)
+        elif self._log.name != LOG:
+            os.replace(self._log, self.folder / LOG)
+
+    def count_logged(self) -> dict[str, dict[str, int]]:
+        """The number of messages in the log, by FMU and status."""
+        return count_messages(self._log)
 
     def _recorder_of(self, clock: str) -> Callable[..., FileRecorder]:
         return partial(FileRecorder, self.folder / f"{clock}.csv")
@@ -79,6 +96,9 @@ class RunFolder(RunResults):
         write_atomically(self.folder / RUN, self._begun + b" " * ROOM)
         super()._publish()
         own = {RUN, *(name for recorder in recorders for name in recorder.files)}
+        if sys.platform != "win32" and self._log.exists():  # which moves no open file
+            own.add(LOG)
+            self._log = self._log.replace(self.folder / LOG)
         for name in self._earlier - own:
             (self.folder / name).unlink(missing_ok=True)
 
@@ -148,4 +168,5 @@ def _list_files(folder: Path) -> set[str]:
         return set()
     rows = {Path(n).with_suffix(rows_file.SUFFIX).name for n in files if n.endswith(".csv")}
     files = {n for n in files if not (folder / n).is_dir() or (folder / n).is_symlink()}
+    files |= {LOG} if (folder / LOG).is_file() else set()
     return files | {name for name in rows if (folder / name).exists()}

@@ -203,6 +203,8 @@ class RunEnding:
     beyond all that it was given."""
     isolated: dict[str, str] = field(default_factory=dict)
     """Why an FMU ran in a process of its own."""
+    logged: dict[str, dict[str, int]] = field(default_factory=dict)
+    """The number of messages in fmus.log, by FMU and status."""
     held_outputs: dict[str, int] = field(default_factory=dict)
     """How often outputs were held since they were not finite."""
     in_python: dict[str, str] = field(default_factory=dict)

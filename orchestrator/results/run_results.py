@@ -104,7 +104,9 @@ class Recorder:
 
 class RunResults:
     """Results that are in no file. `published`: every table has a row. `folder` is where they are,
-    for messages."""
+    for messages. log_path: the file of what FMUs log, "" for none."""
+
+    log_path = ""
 
     def __init__(self, folder: Path = Path("memory")) -> None:
         self.folder, self.published = folder, False

@@ -44,9 +44,10 @@ def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
 
 class LoadedFmus:
     """The FMUs of a system, loaded: `instances` by name, each of which fills its outputs among the
-    `signals`; `stack` closes them. isolated: as of the function."""
+    `signals`; `stack` closes them. isolated: as of the function. log_path: the file that what they
+    log is written to."""
 
-    def __init__(self, system: System, stack: ExitStack) -> None:
+    def __init__(self, system: System, stack: ExitStack, log_path: str = "") -> None:
         self.system, self.signals = system, SignalVector(system)
         self.isolated = find_isolated(system.fmus)
         self.instances: dict[str, Instance] = {}
@@ -56,7 +57,7 @@ class LoadedFmus:
             outputs = self.signals.values[self.signals.fmu(fmu.name)]
             opening = partial(Remote, fmu.served) if fmu.served else kind
             instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
-            instance.recorded_only = fmu.recorded_only
+            instance.recorded_only, instance.log_path = fmu.recorded_only, log_path
             self.instances[fmu.name] = stack.enter_context(instance)
 
     def setter(

@@ -50,7 +50,7 @@ class Simulation(LoadedFmus):
 
     def __init__(self, system: System, results: RunResults, stack: ExitStack) -> None:
         self.library = library = load()
-        super().__init__(system, stack)
+        super().__init__(system, stack, results.log_path)
         stack.callback(self._dismiss)
         self.pace: Pace | None = None
         self.beside: Mapping[str, str] = {}

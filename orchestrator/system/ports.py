@@ -39,7 +39,10 @@ def scalars_of(fmus: Mapping[str, Fmu], name: str, *causalities: str) -> tuple[S
     description = fmus[fmu].description
     if scalars := description.port(port, *causalities):
         return scalars
-    every = dict.fromkeys(s.port for s in description.scalars if s.causality in causalities)
+    if texts := [s for s in description.strings if s.name == port and s.causality in causalities]:
+        return tuple(texts)
+    both = (*description.scalars, *description.strings)
+    every = dict.fromkeys(s.port for s in both if s.causality in causalities)
     raise InputFault(f"{fmu}: {unknown(' or '.join(causalities), port, every)}")
 
 

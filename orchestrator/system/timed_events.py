@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.fmi.transfer import as_signal
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import TimedEvent, Value
@@ -125,19 +126,21 @@ class _Events:
 
 
 def _numbers(name: str, value: Value, scalars: tuple[Scalar, ...]) -> tuple[float, ...]:
-    numbers = tuple(entries_of(value, scalars[-1].indices, name))
-    if texts := [entry for entry in numbers if isinstance(entry, str)]:
-        raise ValueError(f"{name} = {texts[0]!r}: give numbers")
-    if len(numbers) != len(scalars):
-        raise ValueError(f"{len(numbers)} values for the {len(scalars)} of {name}")
-    for scalar, number in zip(scalars, numbers, strict=True):
-        _require_type(scalar, number)
-    return tuple(map(float, numbers))
+    entries = tuple(entries_of(value, scalars[-1].indices, name))
+    if len(entries) != len(scalars):
+        raise ValueError(f"{len(entries)} values for the {len(scalars)} of {name}")
+    for scalar, entry in zip(scalars, entries, strict=True):
+        _require_type(scalar, entry)
+    return tuple(as_signal(*each) for each in zip(scalars, entries, strict=True))
 
 
-def _require_type(scalar: Scalar, number: bool | float) -> None:
+def _require_type(scalar: Scalar, number: bool | float | str) -> None:
     """Raises ValueError for a value that the variable's type does not hold: none is rounded."""
-    if scalar.type == "Boolean":
+    if scalar.type == "String":
+        takes = "" if isinstance(number, str) else "a text"
+    elif isinstance(number, str):
+        takes = "a number"
+    elif scalar.type == "Boolean":
         takes = "" if number in (0, 1) else "true or false"
     elif isinstance(number, bool):
         takes = "a number"

@@ -56,3 +56,45 @@ def test_instances_that_share_a_class_each_have_their_own_exceptions(tmp_path):
         assert "first says" not in fault
         step = sys.modules[module.stem].Shared.do_step
         assert not hasattr(step.__wrapped__, "__wrapped__")
+
+
+TALKS = """from pythonfmu.enums import Fmi2Status
+        if self.steps == 3:
+            self.log("the valve is\\tshut", Fmi2Status.warning)
+        if self.steps < 3 * self.gain:
+            self.log("turning", Fmi2Status.ok)
+        self.y = time"""
+
+
+@pytest.mark.parametrize("isolate", ["", "isolate = true\n"])
+def test_what_fmus_log_in_a_run_that_succeeds_is_in_a_file(tmp_path, isolate):
+    python_fmu(tmp_path, "Talks", TALKS)
+    quiet = "start.gain = 0.0\n"
+    path = scene(tmp_path, fmu_table("one", "Talks", isolate) + fmu_table("two", "Talks", quiet))
+    found = simulate(str(path), tmp_path / "out").results
+    lines = (tmp_path / "out" / "fmus.log").read_text().splitlines()
+    warning = f"{2 / 64:g}", "warning", "the valve is shut"
+    for name in ("one", "two"):
+        own = [line.split("\t") for line in lines if line.split("\t")[1] == name]
+        assert [(t, status, text) for t, _, status, _, text in own if status != "ok"] == [warning]
+    assert found.record.logged["two"] == {"warning": 1}
+    said = [line for line in found.record.warnings or () if "fmus.log" in line]
+    assert said == [] or len(said) == 2
+    path.write_text(path.read_text().replace("Talks", "Quiet"))
+    python_fmu(tmp_path, "Quiet")
+    simulate(str(path), tmp_path / "out")
+    assert not [*(tmp_path / "out").glob("*log*")]
+
+
+def test_a_log_ends_with_a_note_that_more_was_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(messages, "MAX_WRITTEN", 3)
+    key = messages.open_log()
+    messages.write_to(key, str(tmp_path / "log"), "one", lambda: 0.25)
+    for i in range(5):
+        messages.keep_message(key, 1, b"%d" % i, b"logAll")
+    messages.close_log(key)
+    said = (tmp_path / "log").read_text()
+    assert said == "".join(f"0.25\tone\twarning\tlogAll\t{i}\n" for i in range(3)) + (
+        "0.25\tone\t\t\tfurther messages are left out\n"
+    )
+    assert messages.count_messages(tmp_path / "log") == {"one": {"warning": 3}}

@@ -123,3 +123,16 @@ def test_lines_in_the_figures():
 def test_one_program_of_a_scene_with_events_is_refused(tmp_path):
     with pytest.raises(InputFault, match="at given times"):
         hl.build("scenario", as_one=True, out=tmp_path)
+
+
+def test_a_text_is_set(tmp_path):
+    variables = ("input", {"mode": "idle"}), ("output", {"y": 0.0})
+    slave(tmp_path, "Modes", *variables, body="self.y = float(self.mode == 'run')")
+    text = fmu_table("one", "Modes") + '[[at]]\ntime = 0.25\nset = { "one.mode" = "run" }\n'
+    found = hl.run(scene(tmp_path, text), out=tmp_path / "out", figures=False)
+    y, t = found["one.y"], found.haptics["time"]
+    np.testing.assert_array_equal(y, t > 0.25)
+    for wrong, said in (("true", "takes a text"), ("1.5", "takes a text")):
+        path = scene(tmp_path, text.replace('"run"', wrong))
+        with pytest.raises(InputFault, match=said):
+            hl.run(path, out=tmp_path / "other", figures=False)
