@@ -9,7 +9,6 @@ text, with tabs between.
 
 from __future__ import annotations
 
-import os
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -32,12 +31,12 @@ _keys = count(1)
 
 
 class LogFile:
-    """Where the messages of the instance `name` are written. It may be moved meanwhile, and other
-    instances, of other processes too, write there as well. time: where the instance stands (s)."""
+    """Where the messages of the instance `name` are written, and those of other instances, of other
+    processes too. time: where the instance stands (s). No file stays open, which an FMU might close.
+    """
 
     def __init__(self, path: str, name: str, time: Callable[[], float]) -> None:
-        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-        self._name, self._time, self._written = name, time, 0
+        self._path, self._name, self._time, self._written = path, name, time, 0
 
     def write(self, status: str, category: str, text: str) -> None:
         """Append a message, the last one with a note that it is the last."""
@@ -49,10 +48,8 @@ class LogFile:
         if self._written == MAX_WRITTEN:
             line += f"\n{self._time():.9g}\t{self._name}\t\t\t{LEFT_OUT}"
         with suppress(OSError):  # a message is no reason to end a run
-            os.write(self._file, f"{line}\n".encode(errors="replace"))
-
-    def close(self) -> None:
-        os.close(self._file)
+            with open(self._path, "ab", buffering=0) as file:  # a line is one write
+                file.write(f"{line}\n".encode(errors="replace"))
 
 
 def open_log() -> int:
@@ -86,8 +83,7 @@ def newest_messages(key: int) -> list[str]:
 
 def close_log(key: int) -> None:
     _messages.pop(key, None)
-    if file := _files.pop(key, None):
-        file.close()
+    _files.pop(key, None)
 
 
 def count_messages(path: Path) -> dict[str, dict[str, int]]:

@@ -23,8 +23,11 @@ def record_crash(folder: Path, process: int) -> None:
     from hapticlink.orchestrator.results.folder_lock import find_process  # slow to load
     from hapticlink.orchestrator.results.read_results import load
     from hapticlink.orchestrator.results.recover import recover
+    from hapticlink.orchestrator.results.run_folder import LOG, unfinished_log
 
     temporary_folders.clear(process)
+    with suppress(OSError):
+        unfinished_log(folder, process).replace(folder / LOG)
     temporary_folders.clear_unfinished(folder, process)
     remedy = (
         "an FMU may have crashed it: with isolate = true each FMU has a process of its own, and "

@@ -4,7 +4,6 @@ one are on the disk."""
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
@@ -36,6 +35,11 @@ ROOM = 1 << 14
 RUN, LOG = "run.json", "fmus.log"
 
 
+def unfinished_log(folder: Path, process: int) -> Path:
+    """Where the run of a process has what its FMUs log, until it ends."""
+    return folder / f".{LOG}.{process}"
+
+
 class RunFolder(RunResults):
     """The folder of a run. `setup` is in run.json from the first row on.
 
@@ -51,7 +55,7 @@ class RunFolder(RunResults):
         # What the first row needs, before the time of the loop is taken.
         self._earlier = _list_files(folder)
         self._begun = self._text(End(process=os.getpid()))
-        self._log = folder / f".{LOG}.{os.getpid()}"
+        self._log = unfinished_log(folder, os.getpid())
         self.log_path = str(self._log)
 
     def __enter__(self) -> RunFolder:
@@ -68,10 +72,10 @@ class RunFolder(RunResults):
 
     def _keep_log(self) -> None:
         """Where FMUs have logged something, in a run whose results are here, the log stays."""
-        if not self.published or not self._log.stat().st_size:
-            self._log.unlink(missing_ok=True)
-        elif self._log.name != LOG:
+        if self.published:
             os.replace(self._log, self.folder / LOG)
+        else:
+            self._log.unlink(missing_ok=True)
 
     def count_logged(self) -> dict[str, dict[str, int]]:
         """The number of messages in the log, by FMU and status."""
@@ -96,9 +100,6 @@ class RunFolder(RunResults):
         write_atomically(self.folder / RUN, self._begun + b" " * ROOM)
         super()._publish()
         own = {RUN, *(name for recorder in recorders for name in recorder.files)}
-        if sys.platform != "win32" and self._log.exists():  # which moves no open file
-            own.add(LOG)
-            self._log = self._log.replace(self.folder / LOG)
         for name in self._earlier - own:
             (self.folder / name).unlink(missing_ok=True)
 

@@ -77,13 +77,13 @@ class FileRecorder(Recorder):
             self._published = True
 
     def finish(self) -> None:
-        if self._file and self.last is not None:
+        if self._published and self.last is not None:
             table = rows_file.RowsFile(self.target)
             make_csv(self.path, table)
             self._require_rows(table)
 
     def require_whole(self) -> None:
-        if self._file and self.last is not None:
+        if self._published and self.last is not None:
             self._require_rows(rows_file.RowsFile(self.target))
 
     def _require_rows(self, table: rows_file.RowsFile) -> None:
