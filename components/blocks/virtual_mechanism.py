@@ -261,13 +261,15 @@ class _Equations:
         return initial | {name: directed.first for name, directed in self._directions.items()}
 
     def _initial_deflections(self) -> dict[str, ca.SX]:
-        """The deflections of friction at the start pose and rates: contacts have none."""
+        """The deflections of friction at the start pose and rates: contacts have none, and are kept
+        on no side."""
         x, (joints, contacts) = self._block.x, DEFLECTIONS
         initial = {name: ca.SX(*x[name].shape) for name in DEFLECTIONS if name in x}
         if joints in initial:
             Q = self._applied + self._pushed
             z = starting_friction.start(self._space, Q, *self._start, self._block.t)
-            none = x.get(contacts, ca.SX(0, 1))
+            of_contacts = (x[name] for name in (contacts, kept_sides.NAME) if name in x)
+            none = ca.vertcat(ca.SX(0, 1), *(ca.vec(state) for state in of_contacts))
             symbols = ca.vertcat(self.model.tabled, none)
             known = ca.vertcat(time_signals.at(self.signals, ca.SX(0)), ca.SX(*none.shape))
             initial[joints] = ca.substitute(z, symbols, ca.densify(known))

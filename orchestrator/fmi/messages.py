@@ -32,8 +32,8 @@ _keys = count(1)
 
 class LogFile:
     """Where the messages of the instance `name` are written, and those of other instances, of other
-    processes too. time: where the instance stands (s). No file stays open, which an FMU might close.
-    """
+    processes too. time: where the instance stands (s). No file stays open, which an FMU might
+    close."""
 
     def __init__(self, path: str, name: str, time: Callable[[], float]) -> None:
         self._path, self._name, self._time, self._written = path, name, time, 0
@@ -47,9 +47,10 @@ class LogFile:
         line = "\t".join(" ".join(field.split()) for field in fields)
         if self._written == MAX_WRITTEN:
             line += f"\n{self._time():.9g}\t{self._name}\t\t\t{LEFT_OUT}"
-        with suppress(OSError):  # a message is no reason to end a run
-            with open(self._path, "ab", buffering=0) as file:  # a line is one write
-                file.write(f"{line}\n".encode(errors="replace"))
+        content = f"{line}\n".encode(errors="replace")  # a line is one write
+        # A message is no reason to end a run.
+        with suppress(OSError), open(self._path, "ab", buffering=0) as file:
+            file.write(content)
 
 
 def open_log() -> int:
