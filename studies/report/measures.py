@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.read_results import Results, Vector
+from studies.report import appendix_a
 
 
 def held(results: Results, signal: str) -> Vector:
@@ -80,6 +84,14 @@ class Count:
         """The intervals (s)."""
         return ", ".join(f"{a:.3f}-{b:.3f}" for a, b in self.episodes)
 
+    @property
+    def described(self) -> str:
+        """The episodes, and how many the frames miss."""
+        if not self.episodes:
+            return "never two constraints"
+        missed = f", of which {self.unseen} fall between the frames" if self.unseen else ""
+        return f"two constraints in {len(self.episodes)} episodes ({self.listed} s){missed}"
+
 
 def count(results: Results) -> Count:
     """Compares the graphics frames of a run with its mechanism."""
@@ -95,9 +107,43 @@ def count(results: Results) -> Count:
     return Count(len(seen), wrong, tuple(found), unseen, float(fold.max(initial=0.0)))
 
 
+class ByCount(NamedTuple):
+    """While the mechanism has one constrained direction, and while it has two: median distance
+    |x_S - x_D| (mm), RMS of |F_T| (N; NaN without) and of |lambda| (N)."""
+
+    distance: tuple[float, float]
+    wrench: tuple[float, float]
+    multipliers: tuple[float, float]
+
+
+def by_count(results: Results) -> ByCount:
+    """Distances, topology forces and multipliers by the number of constrained directions."""
+    haptics = results.haptics
+    two = haptics["virtual_mechanism.n_constraints"] >= 2
+    gap = tracking(results)[1]
+    multipliers = np.linalg.norm(haptics["virtual_mechanism.lambda"], axis=1)
+    named = "controller.F_constraint"
+    wrench = haptics[named] if named in haptics else np.full((len(gap), 3), np.nan)
+    force = np.hypot(wrench[:, 0], wrench[:, 1])
+
+    def both(of: Callable[[Vector], Vector], values: Vector) -> tuple[float, float]:
+        one, more = (float(of(values[m])) if m.any() else np.nan for m in (~two, two))
+        return one, more
+
+    return ByCount(both(np.median, gap), both(rms, force), both(rms, multipliers))
+
+
 def folding(q4: Vector) -> Vector:
     """Angle (rad) between links 3 and 4, 0 where they are collinear."""
     return np.asarray(np.abs(np.arctan2(np.sin(2 * q4), np.cos(2 * q4))) / 2)
+
+
+def closure_gap(results: Results) -> Vector:
+    """By how much the loop of the five-bar of Table 6.1 is open (m), from the recorded joint angles
+    by the constraint equations of Appendix A, which the mechanism does not use."""
+    return np.asarray(
+        np.linalg.norm(appendix_a.h(results.haptics["virtual_mechanism.q"].T), axis=0)
+    )
 
 
 def acceleration_error(results: Results) -> float:

@@ -5,12 +5,17 @@ plus sign that is missing in print, w has two rows (printed: four), C its two mi
 lengths, inertias and fractions are those of Table 6.1 if not given.
 """
 
+import math
+
 import numpy as np
 
-from tests.mechanisms import TABLE_6_1
-
-M, L, J = (TABLE_6_1[name] for name in "mlI")
+L = (0.042, 0.042, 0.0184, 0.0564)
+M = (1.0, 1.0, 0.5, 0.5)
+J = (2.1e-4, 2.1e-4, 1.05e-4, 1.05e-4)
 F = (0.5,) * 4
+Q0 = (math.pi / 4, -math.pi / 2, -0.4 * math.pi, math.pi / 2)
+WRENCH = (-0.5, 0.0, -0.0025)
+"""Lengths (m), masses (kg), inertias (kg.m2), start and wrench of chapter 6; F is not given."""
 
 
 def trig(q):
