@@ -1,5 +1,5 @@
-"""Reproduces the report's figures from runs of the FMUs, and compares all that the report states with
-what was found."""
+"""Reproduces the report's figures from runs of the FMUs, and compares all that the report states
+with what was found."""
 
 from __future__ import annotations
 

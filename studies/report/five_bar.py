@@ -34,6 +34,7 @@ class Terms:
     w: Vector
     h: Vector
     x_h: Vector
+    centers: Matrix
     J_h: Matrix
     energy: float
     Lambda_inv: Matrix
@@ -83,12 +84,21 @@ class MovingFiveBar:
         qdd, multipliers = space.motion(model.J_h.T @ ca.DM(WRENCH))
         free, _ = OperationalSpace(arm).motion(arm.J_h.T @ ca.DM(WRENCH))
         found: dict[str, ca.SX] = {
-            "D": model.D, "C_qd": model.C_qd, "W": model.W, "w": model.w, "h": model.h,
-            "x_h": model.x_h, "J_h": model.J_h, "energy": model.kinetic_energy,
+            "D": model.D,
+            "C_qd": model.C_qd,
+            "W": model.W,
+            "w": model.w,
+            "h": model.h,
+            "x_h": model.x_h,
+            "centers": ca.horzcat(*model.centers.values()).T,
+            "J_h": model.J_h,
+            "energy": model.kinetic_energy,
             "Lambda_inv": space.Lambda_inv,
             "open_Lambda_inv": OperationalSpace(arm).Lambda_inv,
-            "qdd": qdd, "multipliers": multipliers, "a_bias": space.a_bias,
-        }  # fmt: skip
+            "qdd": qdd,
+            "multipliers": multipliers,
+            "a_bias": space.a_bias,
+        }
         counts = {
             "closed": ca.Function("f", [q, qd, p.vector], [qdd]).n_instructions(),
             "open": ca.Function("f", [q, qd, p.vector], [free]).n_instructions(),
@@ -112,11 +122,14 @@ class MovingFiveBar:
         step = 1e-6
         return np.array(
             [
-                (getattr(self.at(self.q + e, self.qd), name) -
-                 getattr(self.at(self.q - e, self.qd), name)) / (2 * step)
+                (
+                    getattr(self.at(self.q + e, self.qd), name)
+                    - getattr(self.at(self.q - e, self.qd), name)
+                )
+                / (2 * step)
                 for e in step * np.eye(4)
             ]
-        )  # fmt: skip
+        )
 
     def rate(self, name: str) -> Any:
         """A term's time derivative along the motion, at constant qd."""

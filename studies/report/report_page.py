@@ -28,8 +28,9 @@ Euler (`closed-loop`, `closed-loop-b1`). *Idealised*: pose, velocity and hand wr
 loops closed by projection, an exact graphics copy (`closed-loop-ideal`). Under each figure stand
 the premises of its runs.
 
-[All statements of the report](statements.md), {counts}, with numbers and commands, those that
-differ first. The methods of section B.2 (partitioning, embedding, multipliers) are compared in
+[All statements of the report](statements.md) stand in a table with numbers and commands, those that
+differ first: {counts}.
+The methods of section B.2 (partitioning, embedding, multipliers) are compared in
 [results/formulations](../formulations/README.md).
 """
 

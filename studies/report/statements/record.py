@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 Verdict = Literal["agrees", "differs", "cannot be compared"]
 ROUNDING = 1e-9
 """Relative deviation below which two computations of the same number agree."""
+SLOPE = 1e-6
+"""The same where one of them takes central differences."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,8 @@ class Statement:
     verdict: Verdict
     number: str
     command: str
+    misprint: bool = False
+    """Whether it differs in print alone."""
 
 
 def compare(place: str, text: str, holds: object, number: str, command: str) -> Statement:
@@ -46,7 +50,14 @@ def misprint(
     """An equation whose printed form misses by `printed` of itself; with the remedy by
     `corrected`."""
     number = f"as printed off by {printed:.2g} of it; with {remedy} met to {corrected:.0e}"
-    return compare(place, text, printed < ROUNDING, number, test_command(test))
+    if printed < ROUNDING or corrected > SLOPE:
+        raise ValueError(f"{place}: not the misprint that it is taken for: {number}")
+    return misprinted(place, text, number, test_command(test))
+
+
+def misprinted(place: str, text: str, number: str, command: str) -> Statement:
+    """A statement that contradicts itself or another one, as it is printed, and what is meant."""
+    return Statement(place, text, "differs", number, command, misprint=True)
 
 
 def test_command(test: str) -> str:
