@@ -51,8 +51,8 @@ def C(
     q: Any,
     qd: Any,
     m: Sequence[float] = M,
-    l: Sequence[float] = L,
-    f: Sequence[float] = F,  # noqa: E741
+    l: Sequence[float] = L,  # noqa: E741
+    f: Sequence[float] = F,
 ) -> Any:
     _, (_, _, _, _, s2, s4) = trig(q)
     k2, k4 = m[1] * l[0] * f[1] * l[1] * s2, m[3] * l[2] * f[3] * l[3] * s4

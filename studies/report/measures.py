@@ -78,6 +78,7 @@ class Count:
     episodes: tuple[tuple[float, float], ...]
     unseen: int
     fold: float  # rad, largest angle between links 3 and 4 with two constrained directions
+    held: bool  # whether the mechanism counts by the frames' own matrices (local model)
 
     @property
     def listed(self) -> str:
@@ -89,6 +90,11 @@ class Count:
         """The episodes, and how many the frames miss."""
         if not self.episodes:
             return "never two constraints"
+        if self.held:
+            return (
+                f"two constraints in {len(self.episodes)} episodes ({self.listed} s), by the "
+                "matrices of the frames"
+            )
         missed = f", of which {self.unseen} fall between the frames" if self.unseen else ""
         return f"two constraints in {len(self.episodes)} episodes ({self.listed} s){missed}"
 
@@ -104,7 +110,8 @@ def count(results: Results) -> Count:
     found = episodes(haptics["time"], own)
     unseen = sum(not np.any((times >= a) & (times <= b)) for a, b in found)
     fold = folding(haptics["virtual_mechanism.q"][:, 3])[own >= 2]
-    return Count(len(seen), wrong, tuple(found), unseen, float(fold.max(initial=0.0)))
+    held = bool(results.record.scene["local_model"])
+    return Count(len(seen), wrong, tuple(found), unseen, float(fold.max(initial=0.0)), held)
 
 
 class ByCount(NamedTuple):

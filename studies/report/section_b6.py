@@ -80,7 +80,7 @@ def _draw(runs: Runs, way: str, folder: Path, name: str) -> str:
         row[1].set_title(f"(b) apart by at most {apart:.3g} mm", fontsize="medium")
         if way == ON:
             _wrench(row[2], results)
-    for axis in axes[:columns]:
+    for axis in (axes[-columns], *axes[1:columns]):
         axis.legend(fontsize="small")
     return draw.save(figure, folder, name)
 
@@ -89,7 +89,8 @@ def _count(axis: Any, results: Results) -> None:
     haptics, graphics = results.haptics, results.graphics
     own = haptics["virtual_mechanism.n_constraints"]
     seen = graphics["virtual_environment.n_constraints"]
-    axis.step(haptics["time"], own, where="post", color=draw.GREY, label="mechanism")
+    if not results.record.scene["local_model"]:  # whose mechanism counts by the frames' matrices
+        axis.step(haptics["time"], own, where="post", color=draw.GREY, label="mechanism")
     axis.step(graphics["time"], seen, where="post", color=draw.BLUE, label="frames")
     axis.set(xlabel="time (s)", yticks=[0, 1, 2, 3], ylim=(0, 3))
     axis.set_title(f"(a) two in {100 * np.mean(own >= 2):.0f} % of the time", fontsize="medium")
