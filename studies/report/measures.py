@@ -1,4 +1,9 @@
-"""Measures of a haptic run for the page."""
+"""Measures of a haptic run for the page.
+
+What is measured is not what has produced it: closures by Appendix A and not by the mechanism's own
+h, F_T against the mechanism's P_c of the instant and not the held one that has made it, two plants
+against each other and not a law against its own terms. With the local model the mechanism counts
+its directions by the matrices of the frames (`Count.held`): there the two are not compared."""
 
 from __future__ import annotations
 

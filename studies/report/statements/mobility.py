@@ -123,7 +123,7 @@ def statements(runs: Runs) -> Iterator[Statement]:
     operations = t.operations
     yield compare(
         "5.2",
-        "computed on the graphics side they save time at the haptic rate",
+        "computed at the graphics rate they save time at the haptic rate",
         operations["Lambda_inv"] > 0,
         f"Lambda^-1 takes {operations['Lambda_inv']} "
         f"operations, the accelerations {operations['closed']}",
