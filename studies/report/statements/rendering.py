@@ -211,7 +211,7 @@ def _impedance(runs: Runs) -> Iterator[Statement]:
     )
     yield compare(
         "4.2.1",
-        "because of numerical drift and the device's limited stiffness",
+        "numerical drift and the device's limited stiffness are what lets the hand leave them",
         gap["idealised"] < 20,
         f"also without encoders and with ideal motors ({gap['idealised']:.0f} mm): what "
         f"drives them apart is mostly the neglected velocity terms; with these sent "
