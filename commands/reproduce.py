@@ -9,8 +9,8 @@ from hapticlink.commands.progress import time_command
 
 
 def reproduce(*, out: Out = None) -> int:
-    """Reproduce the report's figures from runs of the FMUs, with a page of the findings, in OUT
-    (default results/report)."""
+    """Reproduce the report's figures from runs of the FMUs, with a page of the findings and a table
+    of all its statements, in OUT (default results/report)."""
     make = checkout.function("reproduce", "studies.report:reproduce")
 
     def tell(what: str) -> None:

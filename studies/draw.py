@@ -8,14 +8,17 @@ from typing import Any
 BLUE, ORANGE, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#777777"
 
 
-def panels(count: int, *, width: float = 4.6, height: float = 3.8, **options: Any) -> Any:
-    """A figure and its `count` axes side by side; `width` of each and `height` in inches."""
+def panels(
+    count: int, *, rows: int = 1, width: float = 4.6, height: float = 3.8, **options: Any
+) -> Any:
+    """A figure and its `count` axes side by side, or in `rows` rows of as many, one after the
+    other; `width` and `height` of each in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width * count, height), layout="constrained")
+    figure = Figure(figsize=(width * count, height * rows), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(1, count, squeeze=False, **options)[0]
+    axes = figure.subplots(rows, count, squeeze=False, **options).ravel()
     for each in axes:
         each.grid(alpha=0.3)
     return figure, axes

@@ -11,14 +11,10 @@ from hapticlink.components.component import Signals
 from hapticlink.components.dynamics.variables import parameters
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop, OperationalPoint
+from studies.report import appendix_a
 
-TABLE_6_1 = {
-    "l": (0.042, 0.042, 0.0184, 0.0564),
-    "m": (1.0, 1.0, 0.5, 0.5),
-    "I": (2.1e-4, 2.1e-4, 1.05e-4, 1.05e-4),
-}
-Q0 = (math.pi / 4, -math.pi / 2, -0.4 * math.pi, math.pi / 2)
-WRENCH = (-0.5, 0.0, -0.0025)
+TABLE_6_1 = {"l": appendix_a.L, "m": appendix_a.M, "I": appendix_a.J}
+Q0, WRENCH = appendix_a.Q0, appendix_a.WRENCH
 MOBILITY = np.array(
     [
         [0.3415204956524712, -0.1971892092835345, 4.867264929294315],

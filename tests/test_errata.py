@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from hapticlink.components.specs.linkage import Directions
+from studies.report import appendix_a
+from studies.report.appendix_a import L
 from tests.blocks import running
-from tests.components import appendix_a
-from tests.components.appendix_a import L
 from tests.mechanisms import Q0, WRENCH, five_bar, open_arm, terms
 
 F_CM = (0.3, 0.6, 0.45, 0.7)  # not 1/2: f and 1 - f must differ

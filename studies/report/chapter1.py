@@ -74,7 +74,13 @@ def _figure_1_4(folder: Path) -> Entry:
     )
     stated = "; ".join(f"{rule}: {STATED[rule]}" for rule in RULES)
     return Entry(
-        "Figure 1.4, stable regions of the three rules", name, stated, found, "hapticlink reproduce"
+        "Figure 1.4, stable regions of the three rules",
+        f"{100 * unstable['forward']:.0f} % of stable poles become unstable by the forward rule",
+        name,
+        stated,
+        found,
+        ("steps of the FMU `discrete_equivalent`, one pole each",),
+        "hapticlink reproduce",
     )
 
 
@@ -100,9 +106,11 @@ def _figure_1_5(runs: Runs, folder: Path) -> Entry:
     error = np.abs(energy - energy[0] - gained).max() / gained[-1]
     return Entry(
         "Figure 1.5, energy of a sampled spring",
+        f"the hold generates {energy[-1] - energy[0]:.3g} J in {time[-1]:g} s",
         draw.save(figure, folder, "figure_1_5.png"),
         "a virtual spring with a zero-order hold always generates energy",
         f"energy rises from {energy[0]:.3g} J to {energy[-1]:.3g} J in {time[-1]:g} s at "
         f"20 Hz, as 1/2 K sum dx^2 says to {error:.0e} of it",
+        ("a mass on a spring that is sampled at 20 Hz and held",),
         command("sampled-spring"),
     )

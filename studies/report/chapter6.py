@@ -12,118 +12,161 @@ from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
 from studies.report import measures
-from studies.report.report_page import Entry, Runs, command
+from studies.report.report_page import Entry, Runs, premises
+from studies.report.systems import IDEAL_6, OF_CHAPTER_6, OFF, ON, STATED_6, VARYING_6, System
 
-DIRECTIONS = "mechanism.directions=true"
-ON = ("controller.topology=true", DIRECTIONS)
-OFF = ("controller.topology=false", DIRECTIONS)
 LENGTH_SCALE = (0.042 + 0.042 + 0.0184 + 0.0564) / 4  # m, mean link length of Table 6.1
-PANELS = ("(a) topology controller active", "(b) inactive")
+CONTROLLERS = {ON: "topology on", OFF: "topology off"}
+FULL = "controller.bias=full"
 
 
 def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
-    on, off = runs("closed-loop-ideal", *ON), runs("closed-loop-ideal", *OFF)
-    yield _trajectories(on, off, folder)
-    yield from _coordinates(on, off, folder)
+    yield _trajectories(runs, folder)
+    yield from _coordinates(runs, folder)
     yield _velocity_terms(runs, folder)
     yield _order_of_calls(runs, folder)
 
 
-def path(axis: Any, results: Results, point_name: str) -> Any:
+def path(axis: Any, results: Results) -> Any:
     """The trajectories of handle and operational point; returns the latter, (k, 3), in mm."""
     point = 1e3 * results.haptics["virtual_mechanism.x"]
     handle = 1e3 * results.haptics["haptic_device.x_true"]
-    axis.plot(point[:, 0], point[:, 1], color=draw.BLUE, label=point_name)
+    axis.plot(point[:, 0], point[:, 1], color=draw.BLUE, label="operational point, x_S")
     axis.plot(handle[:, 0], handle[:, 1], "--", color=draw.ORANGE, label="handle, x_D")
     axis.set(xlabel="x (mm)", ylabel="y (mm)")
     axis.set_aspect("equal", adjustable="datalim")
     return point
 
 
-def _trajectories(on: Results, off: Results, folder: Path) -> Entry:
-    figure, axes = draw.panels(2)
-    for axis, results, name in zip(axes, (on, off), PANELS, strict=True):
-        axis.plot(*path(axis, results, "operational point, x_S")[0, :2], "k.", ms=8, label="start")
-        axis.set_title(f"{name}: apart by at most {tracking(results)[1].max():.3g} mm")
+def describe_end(results: Results) -> str:
+    """When and how a run has ended."""
+    end = results.record.end
+    how = {"duration": "within the workspace", "stop_when": "stopped at the workspace limit"}
+    return f"{how.get(end.reason, end.reason)} at {end.time:.2f} s"
+
+
+def describe_premises(runs: Runs, systems: tuple[System, ...]) -> list[str]:
+    """Those of systems with the topology controller on."""
+    return [premises(system.name, system.run(runs, ON)) for system in systems]
+
+
+def _commands(*systems: System) -> str:
+    return "; ".join(system.command(way) for system in systems for way in (ON, OFF))
+
+
+def _trajectories(runs: Runs, folder: Path) -> Entry:
+    figure, axes = draw.panels(len(OF_CHAPTER_6), rows=2, width=4.2, height=3.6)
+    found = []
+    for way, row in zip((ON, OFF), axes.reshape(2, -1), strict=True):
+        for system, axis in zip(OF_CHAPTER_6, row, strict=True):
+            results = system.run(runs, way)
+            axis.plot(*path(axis, results)[0, :2], "k.", ms=8, label="start")
+            time, gap = tracking(results)
+            title = f"{CONTROLLERS[way]}, {system.name}:\n{gap.max():.3g} mm apart"
+            axis.set_title(f"{title} in {time[-1]:.2f} s", fontsize="medium")
     axes[0].legend(fontsize="small")
-    time, gap = tracking(on)
-    ended, wide = tracking(off)
-    common = gap[time <= ended[-1]].max()
-    count, left = measures.count(on), off.record.end.reason == "stop_when"
+    for system in OF_CHAPTER_6:
+        (_, gap), (_, wide) = (tracking(system.run(runs, way)) for way in (ON, OFF))
+        found.append(
+            f"{system.name}: {gap.max():.2g} mm apart with it, {wide.max():.0f} mm without, "
+            f"{describe_end(system.run(runs, OFF))}"
+        )
+    on = IDEAL_6.run(runs, ON)
+    count, (median, ninetieth) = measures.count(on), measures.free_work(on, LENGTH_SCALE)
+    gaps = {way: tracking(STATED_6.run(runs, way))[1].max() for way in (ON, OFF)}
     return Entry(
         "Figure 6.1, hand trajectories",
+        f"{gaps[ON]:.2g} mm apart with the topology controller, {gaps[OFF]:.0f} mm without",
         draw.save(figure, folder, "figure_6_1.png"),
         "with the topology controller the device follows the simulated hand; without it the "
         "experiment is stopped before the device reaches its workspace limits",
-        f"active: at most {gap.max():.2g} mm apart in 3 s; inactive: "
-        f"{np.interp(2, ended, wide):.0f} mm at 2 s, {wide.max() / common:.0f} times more over the "
-        f"common interval, {'out of' if left else 'within'} the workspace at {ended[-1]:.2f} s. "
-        f"Device acceleration at "
-        f"t = 0 is Lambda^-1 F_h to {measures.acceleration_error(on):.0e}; F_T leaves "
-        f"{measures.free_work(on, LENGTH_SCALE):.0e} of itself on free motion. The mechanism's "
-        f"own count of constrained directions is 2 in {len(count.episodes)} episodes "
-        f"({count.listed} s), links 3 and 4 then "
-        f"within {count.fold:.2f} rad of a line; of {count.frames} frames {count.wrong} disagree "
-        f"with it, and {count.unseen} episodes fall between frames",
-        command("closed-loop-ideal", *ON),
+        f"{'; '.join(found)}. Idealised, with the topology controller: after the first period the "
+        f"velocities of device and mechanism differ by {measures.acceleration_error(on):.0e} of "
+        f"themselves; of F_T {100 * median:.2g} % (median; 90th percentile {100 * ninetieth:.2g} "
+        "%) acts on what the mechanism leaves free at that instant, since its directions are those "
+        "of the last frame; the mechanism's own count of constrained directions is 2 in "
+        f"{len(count.episodes)} episodes ({count.listed} s), links 3 and 4 then within "
+        f"{count.fold:.2f} rad of a line; of {count.frames} frames {count.wrong} disagree with it, "
+        f"and {count.unseen} episodes fall between frames",
+        describe_premises(runs, OF_CHAPTER_6),
+        _commands(STATED_6, VARYING_6, IDEAL_6),
     )
 
 
-def _coordinates(on: Results, off: Results, folder: Path) -> Iterator[Entry]:
-    for i, axis_name in enumerate("xy"):
-        figure, axes = draw.panels(2)
-        worst = []
-        for axis, results, name in zip(axes, (on, off), PANELS, strict=True):
-            haptics = results.haptics
-            time = haptics["time"]
-            point = 1e3 * haptics["virtual_mechanism.x"][:, i]
-            handle = 1e3 * haptics["haptic_device.x_true"][:, i]
-            axis.plot(time, point, color=draw.BLUE, label="operational point, x_S")
-            axis.plot(time, handle, "--", color=draw.ORANGE, label="handle, x_D")
-            worst.append(np.abs(point - handle).max())
-            title = f"{name}: {axis_name} differs by at most {worst[-1]:.3g} mm"
-            axis.set(xlabel="time (s)", ylabel=f"{axis_name} (mm)", title=title)
+def _coordinates(runs: Runs, folder: Path) -> Iterator[Entry]:
+    for i, name in enumerate("xy"):
+        figure, axes = draw.panels(len(OF_CHAPTER_6), rows=2, width=4.2, height=3.2)
+        worst: dict[tuple[str, str], float] = {}
+        for way, row in zip((ON, OFF), axes.reshape(2, -1), strict=True):
+            for system, axis in zip(OF_CHAPTER_6, row, strict=True):
+                haptics = system.run(runs, way).haptics
+                point = 1e3 * haptics["virtual_mechanism.x"][:, i]
+                handle = 1e3 * haptics["haptic_device.x_true"][:, i]
+                axis.plot(haptics["time"], point, color=draw.BLUE, label="operational point")
+                axis.plot(haptics["time"], handle, "--", color=draw.ORANGE, label="handle")
+                apart = worst[system.name, way] = float(np.abs(point - handle).max())
+                title = f"{CONTROLLERS[way]}, {system.name}:\n{name} differs by {apart:.3g} mm"
+                axis.set_title(title, fontsize="medium")
+                axis.set(xlabel="time (s)", ylabel=f"{name} (mm)")
         axes[0].legend(fontsize="small")
+        found = (
+            f"{system.name}: at most {worst[system.name, ON]:.2g} mm with it, "
+            f"{worst[system.name, OFF]:.3g} mm without"
+            for system in OF_CHAPTER_6
+        )
+        with_it, without = (worst[STATED_6.name, way] for way in (ON, OFF))
         yield Entry(
-            f"Figure 6.{i + 2}, {axis_name}-position of the trajectories",
+            f"Figure 6.{i + 2}, {name}-position of the trajectories",
+            f"{with_it:.2g} mm apart with the topology controller, {without:.0f} mm without",
             draw.save(figure, folder, f"figure_6_{i + 2}.png"),
             "the difference of handle (HD) and operational point (HS) is smaller with the topology "
             "controller than without",
-            f"at most {worst[0]:.2g} mm with it, {worst[1]:.3g} mm without",
-            f"{command('closed-loop-ideal', *ON)}; {command('closed-loop-ideal', *OFF)}",
+            "; ".join(found),
+            describe_premises(runs, OF_CHAPTER_6),
+            _commands(STATED_6, VARYING_6, IDEAL_6),
         )
 
 
 def _velocity_terms(runs: Runs, folder: Path) -> Entry:
-    none = runs("closed-loop-ideal", *ON)
-    full = runs("closed-loop-ideal", *ON, "controller.bias=full")
-    figure, axes = draw.panels(2)
-    worst, sizes = {}, {}
-    for results, label, colour in ((none, "none", draw.BLUE), (full, "full", draw.ORANGE)):
-        time, gap = tracking(results)
-        worst[label], sizes[label] = gap.max(), measures.neglected(results)
-        axes[0].semilogy(time, np.maximum(gap, 1e-4), color=colour, label=f"bias = {label}")
-        drift = results.haptics["controller.F_drift"]
-        axes[1].plot(time, np.hypot(drift[:, 0], drift[:, 1]), color=colour)
-    axes[1].axhline(sizes["none"].hand_force, color=draw.GREY, ls="--", label="|F_h|")
-    title = f"Coriolis compensation on: {worst['none']:.2g} mm become {worst['full']:.2g} mm"
-    axes[0].set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)", title=title)
-    largest = sizes["none"].largest_drift / sizes["none"].hand_force
-    title = f"F_drift reaches {largest:.2g} F_h without them"
-    axes[1].set(xlabel="time (s)", ylabel="force (N)", title=title)
-    axes[0].legend()
-    axes[1].legend()
-    a, b = sizes["none"], sizes["full"]
+    systems = (STATED_6, IDEAL_6)
+    figure, axes = draw.panels(2, rows=2, width=5.2, height=3.4)
+    found, worst = [], {}
+    for system, row in zip(systems, axes.reshape(2, 2), strict=True):
+        sizes = {}
+        cases = (((), "none", draw.BLUE), ((FULL,), "full", draw.ORANGE))
+        for options, bias, colour in cases:
+            results = system.run(runs, ON, *options)
+            time, gap = tracking(results)
+            worst[system, bias], sizes[bias] = gap.max(), measures.neglected(results)
+            row[0].semilogy(time, np.maximum(gap, 1e-4), color=colour, label=f"bias = {bias}")
+            drift = results.haptics["controller.F_drift"]
+            row[1].plot(time, np.hypot(drift[:, 0], drift[:, 1]), color=colour)
+        none, full = sizes["none"], sizes["full"]
+        row[1].axhline(none.hand_force, color=draw.GREY, ls="--", label="|F_h|")
+        of, to = worst[system, "none"], worst[system, "full"]
+        row[0].set_title(f"{system.name}: sent, {of:.2g} mm become {to:.2g} mm", fontsize="medium")
+        row[0].set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)")
+        largest = none.largest_drift / none.hand_force
+        row[1].set_title(f"F_drift reaches {largest:.2g} F_h without them", fontsize="medium")
+        row[1].set(xlabel="time (s)", ylabel="force |F_drift| (N)")
+        row[0].legend(fontsize="small")
+        row[1].legend(fontsize="small")
+        found.append(
+            f"{system.name}: RMS {none.bias[0]:.2g} m/s2 left out against {none.rendered[0]:.2g} "
+            f"m/s2 rendered, {none.bias[1]:.3g} against {none.rendered[1]:.3g} rad/s2; F_drift "
+            f"{none.drift_force:.2g} N RMS, {none.largest_drift:.2g} N at most, against F_h "
+            f"{none.hand_force:.2g} N, and {of:.2g} mm; with them F_drift {full.drift_force:.2g} N "
+            f"RMS, {full.largest_drift:.2g} N at most, and {to:.2g} mm"
+        )
+    ratio = worst[STATED_6, "none"] / worst[STATED_6, "full"]
     return Entry(
         "Section B.4, the neglected velocity terms",
+        f"they are not negligible; sent, the distance is {ratio:.2g} times smaller",
         draw.save(figure, folder, "velocity_terms.png"),
         "Coriolis and centripetal effects are negligible; F_drift is small against F_h",
-        f"not in this experiment: bias none, RMS {a.bias[0]:.2g} m/s2 left out against "
-        f"{a.rendered[0]:.2g} m/s2 rendered, {a.bias[1]:.3g} against {a.rendered[1]:.3g} rad/s2; "
-        f"F_drift {a.drift_force:.2g} N RMS, {a.largest_drift:.2g} N at most, against F_h "
-        f"{a.hand_force:.2g} N, and {worst['none']:.2g} mm. Bias full: F_drift "
-        f"{b.drift_force:.2g} N RMS, {b.largest_drift:.2g} N at most, and {worst['full']:.2g} mm",
-        command("closed-loop-ideal", *ON, "controller.bias=full"),
+        f"not in this experiment: {'; '.join(found)}",
+        describe_premises(runs, systems),
+        "; ".join(system.command(ON, FULL) for system in systems),
     )
 
 
@@ -131,34 +174,44 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
     jacobi = "coupling=jacobi"
     weaker = "controller.teleoperation.damping=[70.0, 70.0, 0.2]"
     cases = (
-        ("Gauss-Seidel, printed gains", runs("closed-loop-ideal", *ON), draw.BLUE),
-        ("Jacobi, printed gains", runs("closed-loop-ideal", *ON, jacobi), draw.ORANGE),
-        ("Jacobi, B_pc,theta = 0.2", runs("closed-loop-ideal", *ON, jacobi, weaker), draw.GREEN),
+        ("Gauss-Seidel, printed gains", (), draw.BLUE),
+        ("Jacobi, printed gains", (jacobi,), draw.ORANGE),
+        ("Jacobi, B_pc,theta = 0.2", (jacobi, weaker), draw.GREEN),
     )
-    figure, axes = draw.panels(2)
-    jumps = []
-    for label, results, colour in cases:
-        time, gap = tracking(results)
-        torque = results.haptics["controller.F_drift"][:, 2]
-        jumps.append(float(np.abs(np.diff(torque)).max()))
-        axes[0].semilogy(time, np.maximum(gap, 1e-3), color=colour, label=label)
-        axes[1].semilogy(time[1:], np.maximum(np.abs(np.diff(torque)), 1e-7), color=colour)
-    title = "One sample of delay destabilises the printed gains"
-    axes[0].set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)", title=title)
+    systems = (STATED_6, IDEAL_6)
+    figure, axes = draw.panels(2, rows=2, width=5.2, height=3.4)
+    jumps = {}
+    for system, row in zip(systems, axes.reshape(2, 2), strict=True):
+        for label, options, colour in cases:
+            results = system.run(runs, ON, *options)
+            time, gap = tracking(results)
+            jump = np.abs(np.diff(results.haptics["controller.F_drift"][:, 2]))
+            jumps[system, label] = float(jump.max())
+            row[0].semilogy(time, np.maximum(gap, 1e-3), color=colour, label=label)
+            row[1].semilogy(time[1:], np.maximum(jump, 1e-7), color=colour)
+        row[0].set(xlabel="time (s)", ylabel="distance |x_S - x_D| (mm)")
+        row[0].set_title(f"{system.name}: one sample of delay, printed gains", fontsize="medium")
+        row[1].set(xlabel="time (s)", ylabel="change of the drift\ntorque in a tick (N.m)")
+        most = jumps[system, "Jacobi, printed gains"]
+        row[1].set_title(f"the torque jumps by up to {most:.2g} N.m a tick", fontsize="medium")
     axes[0].legend(fontsize="small")
-    title = "The drift torque chatters from tick to tick"
-    axes[1].set(xlabel="time (s)", ylabel="change of F_drift,theta in a tick (N.m)", title=title)
-    unlimited = runs("closed-loop-ideal", *ON, jacobi, "device.torque_limit=500.0").record.end
+    unlimited = IDEAL_6.run(runs, ON, jacobi, "device.torque_limit=500.0").record.end
+    found = "; ".join(
+        f"{system.name}: by up to {jumps[system, 'Jacobi, printed gains']:.2g} N.m a tick "
+        f"({jumps[system, 'Gauss-Seidel, printed gains']:.1e} under Gauss-Seidel, "
+        f"{jumps[system, 'Jacobi, B_pc,theta = 0.2']:.1e} with 0.2)"
+        for system in systems
+    )
     return Entry(
-        "Order of calls: Jacobi against Gauss-Seidel",
+        "Order of calls",
+        "one sample of delay destabilises the printed gains",
         draw.save(figure, folder, "order_of_calls.png"),
         "not discussed; the report's loop has its own computing delay",
         "plain Jacobi (get all, set all, step all) delays the controller's wrenches by one "
-        f"sample. The loop is then stable for B_pc,theta below about "
-        f"1/(2 T lambda_max(Lambda^-1)), which the printed 0.375 exceeds with Table 6.1: the drift "
-        f"torque jumps by up to "
-        f"{jumps[1]:.2g} N.m a tick ({jumps[0]:.1e} under Gauss-Seidel, {jumps[2]:.1e} with "
-        f"0.2). Only the motors' torque limit of 0.5 N.m bounds it: with 500 N.m the run "
-        f"diverges at {unlimited.time:.2f} s",
-        command("closed-loop-ideal", jacobi),
+        "sample. The loop is then stable for B_pc,theta below about 1/(2 T lambda_max(Lambda^-1)), "
+        f"which the printed 0.375 exceeds with Table 6.1: the drift torque jumps, {found}. Only "
+        "the motors' torque limit of 0.5 N.m bounds it: with 500 N.m the idealised run ends "
+        f"({unlimited.reason}) at {unlimited.time:.2f} s",
+        describe_premises(runs, systems),
+        "; ".join(system.command(ON, jacobi) for system in systems),
     )

@@ -1,12 +1,21 @@
-"""Measures of a haptic run for the page."""
+"""Measures of a haptic run for the page.
+
+What is measured is not what has produced it: closures by Appendix A and not by the mechanism's own
+h, F_T against the mechanism's P_c of the instant and not the held one that has made it, two plants
+against each other and not a law against its own terms. With the local model the mechanism counts
+its directions by the matrices of the frames (`Count.held`): there the two are not compared."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.read_results import Results, Vector
+from studies.report import appendix_a
 
 
 def held(results: Results, signal: str) -> Vector:
@@ -74,11 +83,25 @@ class Count:
     episodes: tuple[tuple[float, float], ...]
     unseen: int
     fold: float  # rad, largest angle between links 3 and 4 with two constrained directions
+    held: bool  # whether the mechanism counts by the frames' own matrices (local model)
 
     @property
     def listed(self) -> str:
         """The intervals (s)."""
         return ", ".join(f"{a:.3f}-{b:.3f}" for a, b in self.episodes)
+
+    @property
+    def described(self) -> str:
+        """The episodes, and how many the frames miss."""
+        if not self.episodes:
+            return "never two constraints"
+        if self.held:
+            return (
+                f"two constraints in {len(self.episodes)} episodes ({self.listed} s), by the "
+                "matrices of the frames"
+            )
+        missed = f", of which {self.unseen} fall between the frames" if self.unseen else ""
+        return f"two constraints in {len(self.episodes)} episodes ({self.listed} s){missed}"
 
 
 def count(results: Results) -> Count:
@@ -92,12 +115,47 @@ def count(results: Results) -> Count:
     found = episodes(haptics["time"], own)
     unseen = sum(not np.any((times >= a) & (times <= b)) for a, b in found)
     fold = folding(haptics["virtual_mechanism.q"][:, 3])[own >= 2]
-    return Count(len(seen), wrong, tuple(found), unseen, float(fold.max(initial=0.0)))
+    held = bool(results.record.scene["local_model"])
+    return Count(len(seen), wrong, tuple(found), unseen, float(fold.max(initial=0.0)), held)
+
+
+class ByCount(NamedTuple):
+    """While the mechanism has one constrained direction, and while it has two: median distance
+    |x_S - x_D| (mm), RMS of |F_T| (N; NaN without) and of |lambda| (N)."""
+
+    distance: tuple[float, float]
+    wrench: tuple[float, float]
+    multipliers: tuple[float, float]
+
+
+def by_count(results: Results) -> ByCount:
+    """Distances, topology forces and multipliers by the number of constrained directions."""
+    haptics = results.haptics
+    two = haptics["virtual_mechanism.n_constraints"] >= 2
+    gap = tracking(results)[1]
+    multipliers = np.linalg.norm(haptics["virtual_mechanism.lambda"], axis=1)
+    named = "controller.F_constraint"
+    wrench = haptics[named] if named in haptics else np.full((len(gap), 3), np.nan)
+    force = np.hypot(wrench[:, 0], wrench[:, 1])
+
+    def both(of: Callable[[Vector], Vector], values: Vector) -> tuple[float, float]:
+        one, more = (float(of(values[m])) if m.any() else np.nan for m in (~two, two))
+        return one, more
+
+    return ByCount(both(np.median, gap), both(rms, force), both(rms, multipliers))
 
 
 def folding(q4: Vector) -> Vector:
     """Angle (rad) between links 3 and 4, 0 where they are collinear."""
     return np.asarray(np.abs(np.arctan2(np.sin(2 * q4), np.cos(2 * q4))) / 2)
+
+
+def closure_gap(results: Results) -> Vector:
+    """By how much the loop of the five-bar of Table 6.1 is open (m), from the recorded joint angles
+    by the constraint equations of Appendix A, which the mechanism does not use."""
+    return np.asarray(
+        np.linalg.norm(appendix_a.h(results.haptics["virtual_mechanism.q"].T), axis=0)
+    )
 
 
 def acceleration_error(results: Results) -> float:

@@ -3,10 +3,12 @@ share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from hapticlink.analysis.findings.report_premises import CHAPTER_6, describe_experiment
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Results
@@ -19,18 +21,31 @@ virtual linkages with closed loops* (University of Victoria). It does not print 
 its device; those used here are assumed (`components/specs/`), so trajectories are compared
 qualitatively, not point by point. Unless stated otherwise: graphics at 30 Hz, haptics at 512 Hz,
 zero-order holds, Gauss-Seidel order (no added delay).
+
+Two systems are shown where they do not agree. *As stated*: encoders, observer and Baumgarte's
+stabilisation, in section B.6 also the pulled graphics copy, the local model and semi-implicit
+Euler (`closed-loop`, `closed-loop-b1`). *Idealised*: pose, velocity and hand wrench known exactly,
+loops closed by projection, an exact graphics copy (`closed-loop-ideal`). Under each figure stand
+the premises of its runs.
+
+[All statements of the report](statements.md) stand in a table with numbers and commands, those that
+differ first: {counts}.
+The methods of section B.2 (partitioning, embedding, multipliers) are compared in
+[results/formulations](../formulations/README.md).
 """
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure of the report: what the report states about it, what was found, and the command that
-    runs it."""
+    """A figure of the report: what the report states about it, what was found, the premises of its
+    runs, and the command that runs it. `finding`: the finding in a few words."""
 
     title: str
+    finding: str
     figure: str
     stated: str
     found: str
+    premises: Sequence[str]
     command: str
 
 
@@ -54,16 +69,39 @@ class Runs:
 
 def command(scene: str, *options: str) -> str:
     """The command line of a run."""
-    return " ".join(["hapticlink run", scene, *map(as_command_line, options)])
+    quoted = (as_command_line(option) for option in options)
+    return " ".join(
+        ["hapticlink run", scene, *(f"--set '{o[6:]}'" if " " in o[6:] else o for o in quoted)]
+    )
 
 
-def write(folder: Path, entries: Sequence[Entry]) -> Path:
-    """Writes README.md of `folder`; returns its path."""
-    parts = [HEAD]
+def premises(name: str, results: Results) -> str:
+    """On what a run rests: in what it differs from the experiment of the report that it is, or the
+    settings of one that is none."""
+    scene: Mapping[str, Any] = results.record.scene
+    of_the_report = "".join(describe_experiment(scene))
+    if of_the_report:
+        return f"{name}: {of_the_report}"
+    values = (f"{p.key} = {_setting(scene, p.key)}" for p in CHAPTER_6)
+    return f"{name}: not an experiment of the report; {', '.join(values)}"
+
+
+def _setting(scene: Mapping[str, Any], key: str) -> object:
+    value: Any = scene
+    for name in key.split("."):
+        value = (value or {}).get(name)
+    return value
+
+
+def write(folder: Path, entries: Sequence[Entry], counts: str) -> Path:
+    """Writes README.md of `folder`, with the counts of the statements' verdicts; returns its
+    path."""
+    parts = [HEAD.format(counts=counts)]
     for e in entries:
         parts.append(
-            f"## {e.title}\n\n![{e.title}]({e.figure})\n\n- Stated: {e.stated}.\n"
-            f"- Found: {e.found}.\n- Run: `{e.command}`\n"
+            f"## {e.title}: {e.finding}\n\n- The report: {e.stated}.\n- Found: {e.found}.\n\n"
+            f"![{e.title}]({e.figure})\n\nPremises: {'; '.join(e.premises)}.\n\n"
+            f"Run: `{e.command}`\n"
         )
     path = folder / "README.md"
     path.write_text("\n".join(parts), encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,64 +12,94 @@ from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.results.read_results import Results
 from studies import draw
 from studies.report import measures
-from studies.report.chapter6 import OFF, ON, path
-from studies.report.report_page import Entry, Runs, command
-
-SCENE = "closed-loop-b1"
+from studies.report.chapter6 import describe_end, describe_premises, path
+from studies.report.report_page import Entry, Runs
+from studies.report.systems import IDEAL_B6, OF_SECTION_B6, OFF, ON, STATED_B6
 
 
 def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
-    on, off = runs(SCENE, *ON), runs(SCENE, *OFF)
-    count = measures.count(on)
-    two = np.asarray(on.haptics["virtual_mechanism.n_constraints"]) >= 2
-    wrench = on.haptics["controller.F_constraint"]
-    force = np.hypot(wrench[:, 0], wrench[:, 1])
-    yield Entry(
+    yield _stiffness(runs, folder)
+    yield _impedance(runs, folder)
+
+
+def _stiffness(runs: Runs, folder: Path) -> Entry:
+    found = []
+    for system in OF_SECTION_B6:
+        results = system.run(runs, ON)
+        by_count = measures.by_count(results)
+        apart = tracking(results)[1].max()
+        found.append(
+            f"{system.name}: {measures.count(results).described}; at most {apart:.2g} mm apart; "
+            f"|F_T| {by_count.wrench[1]:.2g} N RMS while the mechanism has two, "
+            f"{by_count.wrench[0]:.2g} N otherwise; {describe_end(results)}"
+        )
+    apart, ideal = (tracking(s.run(runs, ON))[1].max() for s in (STATED_B6, IDEAL_B6))
+    return Entry(
         "Figure B.5, joint constraints by stiffness control",
-        _draw(on, folder, "figure_b_5.png"),
+        f"the device follows within {apart:.2g} mm, idealised {ideal:.2g}",
+        _draw(runs, ON, folder, "figure_b_5.png"),
         "at least one constraint throughout, two while the loop closure is active; the device "
         "follows the operational point; the constraint wrench is larger while two are active",
-        f"one constraint throughout, two in {len(count.episodes)} episodes "
-        f"({count.listed} s), of which {count.unseen} "
-        f"fall between the frames; at most {tracking(on)[1].max():.2g} mm apart; |F_T| "
-        f"{measures.rms(force[two]) if two.any() else 0:.2g} N RMS while the mechanism has two, "
-        f"{measures.rms(force[~two]):.2g} N otherwise",
-        command(SCENE, *ON),
+        "; ".join(found),
+        describe_premises(runs, OF_SECTION_B6),
+        "; ".join(system.command(ON) for system in OF_SECTION_B6),
     )
-    time, gap = tracking(off)
-    own = measures.count(off)
-    yield Entry(
+
+
+def _impedance(runs: Runs, folder: Path) -> Entry:
+    found = []
+    for system in OF_SECTION_B6:
+        off, on = (system.run(runs, way) for way in (OFF, ON))
+        gap, under = tracking(off)[1].max(), tracking(on)[1].max()
+        found.append(
+            f"{system.name}: {gap:.0f} mm apart, {gap / under:.0f} times more than under stiffness "
+            f"control, {describe_end(off)}; {measures.count(off).described}"
+        )
+    off = STATED_B6.run(runs, OFF)
+    return Entry(
         "Figure B.6, joint constraints by impedance control",
-        _draw(off, folder, "figure_b_6.png"),
+        f"{tracking(off)[1].max():.0f} mm apart, {describe_end(off)}",
+        _draw(runs, OFF, folder, "figure_b_6.png"),
         "significant drift between the trajectories; ended after approximately 3 s, just after "
         "the loop closure constraint becomes active, before the device's workspace limit",
-        f"{gap.max():.0f} mm apart at {time[-1]:.2f} s ({off.run['end']['reason']}), "
-        f"{gap.max() / tracking(on)[1].max():.0f} times more than under stiffness control; two "
-        f"constraints in {len(own.episodes)} episodes",
-        command(SCENE, *OFF),
+        "; ".join(found),
+        describe_premises(runs, OF_SECTION_B6),
+        "; ".join(system.command(OFF) for system in OF_SECTION_B6),
     )
 
 
-def _draw(results: Results, folder: Path, name: str) -> str:
+def _draw(runs: Runs, way: str, folder: Path, name: str) -> str:
+    columns = 3 if way == ON else 2
+    figure, axes = draw.panels(columns, rows=len(OF_SECTION_B6), width=4.4, height=3.2)
+    for system, row in zip(OF_SECTION_B6, axes.reshape(-1, columns), strict=True):
+        results = system.run(runs, way)
+        _count(row[0], results)
+        row[0].set_ylabel(f"{system.name}\nconstrained directions")
+        path(row[1], results)
+        apart = tracking(results)[1].max()
+        row[1].set_title(f"(b) apart by at most {apart:.3g} mm", fontsize="medium")
+        if way == ON:
+            _wrench(row[2], results)
+    for axis in (axes[-columns], *axes[1:columns]):
+        axis.legend(fontsize="small")
+    return draw.save(figure, folder, name)
+
+
+def _count(axis: Any, results: Results) -> None:
     haptics, graphics = results.haptics, results.graphics
-    wrench = "controller.F_constraint" in haptics
-    figure, axes = draw.panels(3 if wrench else 2)
     own = haptics["virtual_mechanism.n_constraints"]
     seen = graphics["virtual_environment.n_constraints"]
-    axes[0].step(haptics["time"], own, where="post", color=draw.GREY, label="mechanism, 512 Hz")
-    axes[0].step(graphics["time"], seen, where="post", color=draw.BLUE, label="frames, 30 Hz")
-    axes[0].set(xlabel="time (s)", ylabel="constrained directions", yticks=[0, 1, 2, 3])
-    axes[0].set_title(f"(a) two in {100 * np.mean(own >= 2):.1f} % of the time")
-    axes[0].legend(fontsize="small")
-    path(axes[1], results, "operational point (OP)")
-    axes[1].set_title(f"(b) apart by at most {tracking(results)[1].max():.3g} mm")
-    axes[1].legend(fontsize="small")
-    if wrench:
-        force = haptics["controller.F_constraint"]
-        for i, (label, colour) in enumerate((("x", draw.BLUE), ("y", draw.ORANGE))):
-            axes[2].plot(haptics["time"], force[:, i], color=colour, label=f"F_{label} (N)")
-        axes[2].plot(haptics["time"], 10 * force[:, 2], color=draw.GREEN, label="10 T_z (N.m)")
-        axes[2].set(xlabel="time (s)", ylabel="constraint wrench")
-        axes[2].set_title(f"(c) up to {np.abs(force[:, :2]).max():.2g} N")
-        axes[2].legend(fontsize="small")
-    return draw.save(figure, folder, name)
+    if not results.record.scene["local_model"]:  # whose mechanism counts by the frames' matrices
+        axis.step(haptics["time"], own, where="post", color=draw.GREY, label="mechanism")
+    axis.step(graphics["time"], seen, where="post", color=draw.BLUE, label="frames")
+    axis.set(xlabel="time (s)", yticks=[0, 1, 2, 3], ylim=(0, 3))
+    axis.set_title(f"(a) two in {100 * np.mean(own >= 2):.0f} % of the time", fontsize="medium")
+
+
+def _wrench(axis: Any, results: Results) -> None:
+    time, force = results.haptics["time"], results.haptics["controller.F_constraint"]
+    for i, (label, colour) in enumerate((("x", draw.BLUE), ("y", draw.ORANGE))):
+        axis.plot(time, force[:, i], color=colour, label=f"F_{label} (N)")
+    axis.plot(time, 10 * force[:, 2], color=draw.GREEN, label="10 T_z (N.m)")
+    axis.set(xlabel="time (s)", ylabel="constraint wrench (N; 0.1 N.m)")
+    axis.set_title(f"(c) up to {np.abs(force[:, :2]).max():.2g} N", fontsize="medium")

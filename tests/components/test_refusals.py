@@ -18,8 +18,8 @@ from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.hand import ArmHand, ProfileHand
 from hapticlink.components.specs.linkage import Body, Joint, Limits, Linkage, OperationalPoint
 from hapticlink.components.specs.paths import CoordinateSine
+from studies.report.appendix_a import L
 from tests.blocks import running
-from tests.components.appendix_a import L
 from tests.mechanisms import five_bar, four_bar, one_body, terms
 
 BODY = Body(name="b", mass=1, inertia=1)

@@ -5,6 +5,8 @@ import pytest
 
 from hapticlink.analysis.findings.tracking import tracking
 from hapticlink.orchestrator.experiment import simulate
+from studies.report import measures
+from studies.report.chapter6 import LENGTH_SCALE
 from tests.shared_fixtures import run_once
 
 
@@ -36,24 +38,24 @@ def test_distance_with_velocity_terms_sent(runs):
 
 
 def test_device_accelerates_as_the_mechanism_at_the_start(runs):
-    """M_d^-1 (F_motor + F_hand - c) = Lambda^-1 F_h at t = 0, to rounding."""
-    haptics, graphics = runs["true", "none"].haptics, runs["true", "none"].graphics
-    wrench = haptics["hand.F"][0]
-    force = haptics["controller.F_motor"][0] + wrench - haptics["haptic_device.c"][0]
-    a = np.linalg.solve(haptics["haptic_device.M"][0], force)
-    expected = graphics["virtual_environment.Lambda_inv"][0] @ wrench
-    np.testing.assert_allclose(a, expected, rtol=1e-12)
+    """Two plants, whose velocities after the first period are compared, not the law that has made
+    the wrench of one of them."""
+    assert measures.acceleration_error(runs["true", "none"]) < 1e-4
 
 
-@pytest.mark.parametrize("bias", ["none", "full"])
-def test_topology_wrench_does_no_work_on_free_motion(runs, bias):
-    """(1 - P_c) S^-1 F_T = 0 with the projector that is held, to rounding."""
-    haptics, graphics = runs["true", bias].haptics, runs["true", bias].graphics
-    frame = np.searchsorted(graphics["time"], haptics["time"], side="right") - 1
-    P = graphics["virtual_environment.P_c"][frame]
-    scaled = haptics["controller.F_constraint"] / (1, 1, np.mean((0.042, 0.042, 0.0184, 0.0564)))
-    free = scaled - np.einsum("kij,kj->ki", P, scaled)
-    assert np.abs(free).max() < 1e-13 * np.abs(scaled).max()
+def test_topology_wrench_acts_on_free_motion_as_far_as_frames_are_old():
+    """Against the mechanism's own P_c of the instant: with the held one, which has made F_T, there
+    would be nothing at any rate. components/blocks/test_controller.py has the law itself."""
+    shares = {
+        rate: measures.free_work(
+            run_once("closed-loop-ideal", ("mechanism.directions=true", f"graphics.rate={rate}")),
+            LENGTH_SCALE,
+        )
+        for rate in (10, 30, 512)
+    }
+    medians = [median for median, _ in shares.values()]
+    assert medians == pytest.approx([0.204, 0.0877, 0.0031], rel=0.05)
+    assert shares[30][1] == pytest.approx(0.216, rel=0.05)
 
 
 def test_one_or_two_directions_are_resisted(runs):

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy
+from studies.report import appendix_a
+from studies.report.appendix_a import L
 from tests.blocks import Running, running, virtual_environment
-from tests.components import appendix_a
-from tests.components.appendix_a import L
 from tests.mechanisms import WRENCH, five_bar
 
 

@@ -6,9 +6,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from hapticlink.components.integrators import METHODS
+from studies.report import appendix_a
+from studies.report.appendix_a import L
 from tests.blocks import Running, order, running
-from tests.components import appendix_a
-from tests.components.appendix_a import L
 from tests.mechanisms import Q0, WRENCH, five_bar, open_arm
 
 

@@ -12,9 +12,9 @@ from hapticlink.components.dynamics import closure_diagnostics
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.specs.linkage import Directions, FurtherPoint, GraphicsCopy
 from hapticlink.orchestrator import open_scene
+from studies.report import appendix_a
+from studies.report.appendix_a import L
 from tests.blocks import Running, running, virtual_environment
-from tests.components import appendix_a
-from tests.components.appendix_a import L
 from tests.mechanisms import WRENCH, evaluated, five_bar, linkages
 
 

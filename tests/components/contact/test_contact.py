@@ -15,9 +15,9 @@ from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
 from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
+from studies.report import appendix_a
+from studies.report.appendix_a import L
 from tests.blocks import Running, once, running, virtual_environment
-from tests.components import appendix_a
-from tests.components.appendix_a import L
 from tests.mechanisms import five_bar, one_body
 
 R, LENGTH = 0.05, 0.4

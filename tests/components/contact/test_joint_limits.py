@@ -9,8 +9,8 @@ import pytest
 from hapticlink.components.contact.joint_limits import damping_ratio
 from hapticlink.components.specs.linkage import Limits
 from hapticlink.orchestrator import open_scene
+from studies.report import appendix_a
 from tests.blocks import RATES, errors, order, running, state_after
-from tests.components import appendix_a
 from tests.components.contact import piecewise
 from tests.mechanisms import five_bar, one_body, rod
 

@@ -10,9 +10,9 @@ import pytest
 from hapticlink.components.blocks import mechanism_steps
 from hapticlink.components.integrators import METHODS
 from hapticlink.components.specs.contacts import Disc
+from studies.report import appendix_a
+from studies.report.appendix_a import L
 from tests.blocks import RATES, errors, order, running, state_after
-from tests.components import appendix_a
-from tests.components.appendix_a import L
 from tests.components.contact import piecewise
 from tests.components.contact.test_contact import BAR, FLOOR, LENGTH, POINT, R, link4, loose, shaped
 

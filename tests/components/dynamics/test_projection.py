@@ -4,8 +4,8 @@ import numpy as np
 
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.projection import projection
+from studies.report import appendix_a
 from tests.blocks import running
-from tests.components import appendix_a
 from tests.mechanisms import evaluated, five_bar
 
 

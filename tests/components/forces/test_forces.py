@@ -8,8 +8,8 @@ from scipy.special import ellipk
 
 from hapticlink.components.specs.drives import ConstantDrive, PDDrive, ProfileDrive
 from hapticlink.components.specs.linkage import Body, Spring
+from studies.report import appendix_a
 from tests.blocks import advance, running
-from tests.components import appendix_a
 from tests.mechanisms import five_bar, one_body, rod
 
 

@@ -11,7 +11,7 @@ from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.linkage.poses import poses
 from hapticlink.components.specs.linkage import Body, Joint, Linkage, OperationalPoint
-from tests.components import appendix_a
+from studies.report import appendix_a
 from tests.mechanisms import evaluated, five_bar, linkages, one_body, terms
 
 F_CM = (0.3, 0.6, 0.45, 0.7)

@@ -5,22 +5,37 @@ plus sign that is missing in print, w has two rows (printed: four), C its two mi
 lengths, inertias and fractions are those of Table 6.1 if not given.
 """
 
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
-from tests.mechanisms import TABLE_6_1
-
-M, L, J = (TABLE_6_1[name] for name in "mlI")
+L = (0.042, 0.042, 0.0184, 0.0564)
+M = (1.0, 1.0, 0.5, 0.5)
+J = (2.1e-4, 2.1e-4, 1.05e-4, 1.05e-4)
 F = (0.5,) * 4
+Q0 = (math.pi / 4, -math.pi / 2, -0.4 * math.pi, math.pi / 2)
+WRENCH = (-0.5, 0.0, -0.0025)
+"""Lengths (m), masses (kg), inertias (kg.m2), start and wrench of chapter 6; F is not given."""
 
 
-def trig(q):
+def trig(q: Any) -> Any:
     return (
         np.cos([q[0], q[0] + q[1], q[2], q[2] + q[3], q[1], q[3]]),
         np.sin([q[0], q[0] + q[1], q[2], q[2] + q[3], q[1], q[3]]),
     )
 
 
-def D(q, m=M, l=L, J=J, f=F):  # noqa: E741
+def D(
+    q: Any,
+    m: Sequence[float] = M,
+    l: Sequence[float] = L,  # noqa: E741
+    J: Sequence[float] = J,
+    f: Sequence[float] = F,
+) -> Any:
     (_, _, _, _, c2, c4), _ = trig(q)
     out = np.zeros((4, 4))
     for o, (a, b, c) in ((0, (0, 1, c2)), (2, (2, 3, c4))):
@@ -32,7 +47,13 @@ def D(q, m=M, l=L, J=J, f=F):  # noqa: E741
     return out
 
 
-def C(q, qd, m=M, l=L, f=F):  # noqa: E741
+def C(
+    q: Any,
+    qd: Any,
+    m: Sequence[float] = M,
+    l: Sequence[float] = L,  # noqa: E741
+    f: Sequence[float] = F,
+) -> Any:
     _, (_, _, _, _, s2, s4) = trig(q)
     k2, k4 = m[1] * l[0] * f[1] * l[1] * s2, m[3] * l[2] * f[3] * l[3] * s4
     return np.array(
@@ -45,7 +66,7 @@ def C(q, qd, m=M, l=L, f=F):  # noqa: E741
     )
 
 
-def h(q, l=L):  # noqa: E741
+def h(q: Any, l: Sequence[float] = L) -> Any:  # noqa: E741
     (c1, c12, c3, c34, *_), (s1, s12, s3, s34, *_) = trig(q)
     return np.array(
         [
@@ -55,7 +76,7 @@ def h(q, l=L):  # noqa: E741
     )
 
 
-def W(q, l=L):  # noqa: E741
+def W(q: Any, l: Sequence[float] = L) -> Any:  # noqa: E741
     (c1, c12, c3, c34, *_), (s1, s12, s3, s34, *_) = trig(q)
     return np.array(
         [
@@ -65,7 +86,7 @@ def W(q, l=L):  # noqa: E741
     )
 
 
-def w(q, qd, l=L):  # noqa: E741
+def w(q: Any, qd: Any, l: Sequence[float] = L) -> Any:  # noqa: E741
     (c1, c12, c3, c34, *_), (s1, s12, s3, s34, *_) = trig(q)
     a, b, c, d = qd[0] ** 2, (qd[0] + qd[1]) ** 2, qd[2] ** 2, (qd[2] + qd[3]) ** 2
     return np.array(
@@ -76,30 +97,30 @@ def w(q, qd, l=L):  # noqa: E741
     )
 
 
-def r_h(q, l=L, f=F):  # noqa: E741
+def r_h(q: Any, l: Sequence[float] = L, f: Sequence[float] = F) -> Any:  # noqa: E741
     (c1, c12, *_), (s1, s12, *_) = trig(q)
     return np.array([l[0] * c1 + f[1] * l[1] * c12, l[0] * s1 + f[1] * l[1] * s12, q[0] + q[1]])
 
 
-def J_h(q, l=L, f=F):  # noqa: E741
+def J_h(q: Any, l: Sequence[float] = L, f: Sequence[float] = F) -> Any:  # noqa: E741
     (c1, c12, *_), (s1, s12, *_) = trig(q)
     a, b = f[1] * l[1] * s12, f[1] * l[1] * c12
     return np.array([[-l[0] * s1 - a, -a, 0, 0], [l[0] * c1 + b, b, 0, 0], [1, 1, 0, 0]])
 
 
-def solution(q, qd, Q):
+def solution(q: Any, qd: Any, Q: Any) -> Any:
     """(qdd, lambda) of (2.3) and (3.1) under the joint efforts Q, by a dense solve."""
     K = np.block([[D(q), -W(q).T], [W(q), np.zeros((2, 2))]])
     solved = np.linalg.solve(K, np.concatenate([Q - C(q, qd) @ qd, -w(q, qd)]))
     return solved[:4], solved[4:]
 
 
-def acceleration(q, qd, wrench):
+def acceleration(q: Any, qd: Any, wrench: Any) -> Any:
     """(qdd, lambda) under a wrench of the hand."""
     return solution(q, qd, J_h(q).T @ wrench)
 
 
-def joint_mobility(q):
+def joint_mobility(q: Any) -> Any:
     """D^-1 (1 - W' (W D^-1 W')^-1 W D^-1): joint accelerations by joint efforts."""
     D_inv, closures = np.linalg.inv(D(q)), W(q)
     through = closures @ D_inv

@@ -1,0 +1,146 @@
+"""Chapter 5: the inertia at the hand, without and with closed loops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from studies.report import appendix_a, measures
+from studies.report.five_bar import FRACTIONS, WRENCH, MovingFiveBar
+from studies.report.report_page import Runs
+from studies.report.statements.record import (
+    Statement,
+    compare,
+    deviation,
+    equation,
+    misprint,
+    misprinted,
+)
+from studies.report.systems import IDEAL_6, ON, STATED_6
+
+CLOSED = "test_errata.py::test_mobility_of_the_closed_chain"
+OPEN = "test_errata.py::test_mobility_of_the_open_chain"
+
+
+def statements(runs: Runs) -> Iterator[Statement]:
+    bar = MovingFiveBar()
+    t = bar.terms
+    D, W = appendix_a.D(bar.q, f=FRACTIONS), appendix_a.W(bar.q)
+    J, D_inv = appendix_a.J_h(bar.q, f=FRACTIONS), np.linalg.inv(D)
+    opened, closed = (np.linalg.eigvalsh(m) for m in (t.open_Lambda_inv, t.Lambda_inv))
+    yield compare(
+        "5",
+        "closed loops enter Lambda, unlike that of serial linkages",
+        abs(opened[-1] / closed[-1] - 1) > 0.1,
+        "eigenvalues of Lambda^-1 "
+        f"{', '.join(f'{v:.3g}' for v in opened)} with the loop open, "
+        f"{', '.join(f'{v:.3g}' for v in closed)} closed",
+        f"pytest tests/{CLOSED}",
+    )
+    yield from neglected_terms(runs, "5.1")
+    free = D_inv @ J.T @ WRENCH
+    yield equation(
+        "5.1 (5.1)", "open: qdd = D^-1 J_h' F_h", deviation(D @ free, J.T @ WRENCH), OPEN
+    )
+    open_by_hand = J @ D_inv @ J.T
+    error = deviation(t.open_Lambda_inv, open_by_hand)
+    yield equation("5.1 (5.2)", "Lambda xdd = F_h", error, OPEN)
+    yield equation(
+        "5.1 (5.3)",
+        "xdd = J_h qdd = Lambda^-1 F_h",
+        deviation(t.open_Lambda_inv @ WRENCH, J @ free),
+        OPEN,
+    )
+    yield misprinted(
+        "5.1 (5.4)",
+        "Lambda^-1 = J' D^-1 J'",
+        f"J is 3 x 4: no product; J D^-1 J' is met to {error:.0e}",
+        f"pytest tests/{OPEN}",
+    )
+    kept = D_inv - D_inv @ W.T @ np.linalg.solve(W @ D_inv @ W.T, W @ D_inv)
+    qdd = kept @ J.T @ WRENCH
+    multipliers = -np.linalg.solve(W @ D_inv @ W.T, W @ D_inv @ J.T @ WRENCH)
+    right = J.T @ WRENCH + W.T @ multipliers
+    by_hand = J @ kept @ J.T
+    yield equation(
+        "5.2 (5.5)", "closed: D qdd = J_h' F_h + W' lambda", deviation(D @ qdd, right), CLOSED
+    )
+    yield misprint(
+        "5.2 (5.6)",
+        "qdd = D (J_h' F_h + W' lambda)",
+        deviation(D @ right, qdd),
+        "D^-1",
+        deviation(D_inv @ right, qdd),
+        OPEN,
+    )
+    yield equation(
+        "5.2 (5.7)",
+        "xdd = J_h qdd = Lambda^-1 F_h",
+        deviation(t.Lambda_inv @ WRENCH, J @ qdd),
+        CLOSED,
+    )
+    yield equation(
+        "5.2 (5.8)",
+        "Lambda^-1 F_h = J_h D^-1 (J_h' F_h + W' lambda)",
+        deviation(t.Lambda_inv @ WRENCH, J @ D_inv @ right),
+        CLOSED,
+    )
+    still = bar.at(bar.q, np.zeros(4)).multipliers
+    yield equation(
+        "5.2 (5.9)",
+        "lambda = -(W D^-1 W')^-1 W D^-1 J_h' F_h",
+        deviation(still, multipliers),
+        CLOSED,
+    )
+    inner = np.linalg.solve(W @ D_inv @ W.T, W @ D_inv @ J.T)
+    corrected = deviation(J @ D_inv @ (J.T - W.T @ inner), t.Lambda_inv)
+    for place, text in (
+        ("5.2 (5.10)", "the same, put in"),
+        ("5.2 (5.11)", "Lambda^-1 of the closed loop"),
+    ):
+        yield misprinted(
+            place,
+            f"{text}, with W' - (...) for W' (...)",
+            f"W' is 4 x 2, the bracket {inner.shape[0]} x {inner.shape[1]}: no difference; "
+            f"with the product, as (B.13), met to {corrected:.0e}",
+            f"pytest tests/{CLOSED}",
+        )
+    null = np.linalg.svd(by_hand)[0][:, -1]
+    P = IDEAL_6.run(runs, ON).haptics["virtual_mechanism.P_c"][0]
+    at_start = np.linalg.svd(IDEAL_6.run(runs, ON).haptics["virtual_mechanism.Lambda_inv"][0])
+    scale = (1, 1, np.mean(appendix_a.L))
+    n = at_start[0][:, -1] / scale
+    yield compare(
+        "5.2",
+        "singular directions follow from a singular value decomposition",
+        deviation(P @ n, n) < 1e-6,
+        f"P_c keeps that of the SVD to {deviation(P @ n, n):.0e} "
+        f"(scaled by the mean link length; {len(null)} directions)",
+        "pytest tests/components/dynamics/test_constrained_directions.py::"
+        "test_null_directions_are_columns_of_U_and_not_its_rows",
+    )
+    operations = t.operations
+    yield compare(
+        "5.2",
+        "computed at the graphics rate they save time at the haptic rate",
+        operations["Lambda_inv"] > 0,
+        f"Lambda^-1 takes {operations['Lambda_inv']} "
+        f"operations, the accelerations {operations['closed']}",
+        "hapticlink bench skip",
+    )
+
+
+def neglected_terms(runs: Runs, place: str) -> Iterator[Statement]:
+    """The statement that velocity terms may be neglected."""
+    for system in (STATED_6, IDEAL_6):
+        sizes = measures.neglected(system.run(runs, ON))
+        yield compare(
+            place,
+            "velocities are small: Coriolis and centripetal terms are ignored",
+            sizes.bias[0] < 0.1 * sizes.rendered[0],
+            f"{system.name}: {sizes.bias[0]:.2g} "
+            f"m/s2 RMS left out against {sizes.rendered[0]:.2g} rendered, "
+            f"{sizes.bias[1]:.3g} against {sizes.rendered[1]:.3g} rad/s2",
+            system.command(ON),
+        )
