@@ -96,7 +96,7 @@ class Bodies:
         ]
         mass = np.array([[b.mass, b.mass, b.inertia] for b in linkage.body])
         self.mechanism = Maximal(mass, pins)
-        op = linkage.operational_point
+        op = linkage.held
         self.tip = self.end(op.body, op.at)
         self.weight = mass * (*(linkage.gravity or (0.0, 0.0)), 0.0)
 

@@ -77,7 +77,7 @@ def prepare(
     linkage: Linkage, wrench: np.ndarray, q: np.ndarray, qd: np.ndarray, method: str, h: float
 ) -> Callable[[int], tuple[float, float, float]]:
     plant = _plant(linkage, h)
-    op = linkage.operational_point
+    op = linkage.held
     body, at = _body(plant, op.body), _place(op.at)
     joints = [plant.GetJointByName(joint.name) for joint in linkage.joint]
     order = [

@@ -86,7 +86,7 @@ def _build(linkage: Linkage, wrench: np.ndarray, z: np.ndarray, zd: np.ndarray) 
     pins += [(a, b) for loop in linkage.loop for a, b in [map(marker, loop.bodies, loop.at)]]
     for ends in pins:
         mbs.AddObject(item.ObjectJointRevolute2D(markerNumbers=list(ends)))
-    op = linkage.operational_point
+    op = linkage.held
     hand = marker(op.body, op.at)
     if np.any(wrench):
         mbs.AddLoad(item.LoadForceVector(markerNumber=hand, loadVector=[*wrench[:2], 0.0]))

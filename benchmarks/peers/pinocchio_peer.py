@@ -67,7 +67,7 @@ class Terms:
                 parent, inertia, self._bodies[joint.child][1] * _at(body.center)
             )
         self.order = np.array([i for j in linkage.joint for i in order[j.name]])
-        op = linkage.operational_point
+        op = linkage.held
         self._hand = self._frame("operational_point", op.body, op.at)
         self._ends = [
             [self._frame(f"loop{i}.{k}", loop.bodies[k], loop.at[k]) for k in (0, 1)]

@@ -40,6 +40,8 @@ def _virtual_mechanism(
     local_model: bool = False,
     felt: bool = False,
     users: tuple[str, ...] = (),
+    coupled: bool = False,
+    followed: bool = False,
 ) -> Component:
     from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 
@@ -49,6 +51,8 @@ def _virtual_mechanism(
         "frame_s": frame_s,
         "felt": felt,
         "users": users,
+        "coupled": coupled,
+        "followed": followed,
     }
     return virtual_mechanism(linkage, mechanism, directions, contacts, **options)
 
@@ -79,13 +83,15 @@ def _haptic_device(device: Device, encoders: bool = False) -> Component:
     return haptic_device(device, encoders)
 
 
-def _controller(controller: Controller, linkage: Linkage, directions: Directions) -> Component:
+def _controller(
+    controller: Controller, linkage: Linkage, directions: Directions, clutch: bool = False
+) -> Component:
     from hapticlink.components.blocks import controller as block
     from hapticlink.components.linkage.parameters import mean_link_length
 
     given = directions.length_scale
     length = mean_link_length(linkage) if given is None else given
-    return block.controller(controller, linkage.space, length)
+    return block.controller(controller, linkage.space, length, clutch=clutch)
 
 
 def _hand(hand: Hand) -> Component:

@@ -16,7 +16,9 @@ parameter; without the impedance part the wrenches act on the device as they are
 
     u = F_drift + F_env - B_d v - K_d (x - x_ref) + F_T
 
-Only a passivity controller has memory.
+While the hand holds no point of the mechanism (grasp.py), F_drift, F_env and F_T are 0 and the
+device has its own inertia, u = C_d v - B_d v - K_d (x - x_ref). Only a passivity controller has
+memory.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
+from hapticlink.components.dynamics import grasp
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import SpringPorts
 from hapticlink.components.specs.control import Controller, PassivityLaw, Topology
@@ -33,7 +36,9 @@ _DRIFT = SpringPorts("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force=
 """F_drift between the operational point and the handle."""
 
 
-def _signals(spec: Controller, space: PortSpace, law: Topology | None) -> list[Variable]:
+def _signals(
+    spec: Controller, space: PortSpace, law: Topology | None, clutch: bool
+) -> list[Variable]:
     """The inputs that the chosen parts need."""
     coupled, shaped = bool(spec.teleoperation or law), spec.impedance
     posed = coupled or spec.stiffness is not None or bool(spec.passivity)
@@ -58,6 +63,7 @@ def _signals(spec: Controller, space: PortSpace, law: Topology | None) -> list[V
         ),
         ("P_c", *space.projector, 0.0, "projector on the constrained directions", bool(law)),
         ("a_bias", *space.acceleration, 0.0, bias, spec.bias == "full"),
+        (grasp.HELD, (), "1", 1.0, "point that the hand holds, 0 for none", clutch),
     )
     return [Variable(*declared) for *declared, needed in rows if needed]
 
@@ -99,8 +105,11 @@ def _outputs(spec: Controller, space: PortSpace, law: Topology | None) -> list[V
     return outputs
 
 
-def controller(spec: Controller, space: PortSpace, length_scale: float) -> Component:
-    """The controller of a port with the parts of `spec` that are on. length_scale is L (m).
+def controller(
+    spec: Controller, space: PortSpace, length_scale: float, *, clutch: bool = False
+) -> Component:
+    """The controller of a port with the parts of `spec` that are on. length_scale is L (m). With a
+    clutch it has the input held_point (grasp.py).
 
     Raises ValueError for bias "full" without the impedance part, which carries it.
     """
@@ -118,7 +127,10 @@ def controller(spec: Controller, space: PortSpace, length_scale: float) -> Compo
         states = passivity.states(guard, space)
         outputs += passivity.OUTPUTS
     block = Block(
-        inputs=_signals(spec, space, law), parameters=parameters, states=states, outputs=outputs
+        inputs=_signals(spec, space, law, clutch),
+        parameters=parameters,
+        states=states,
+        outputs=outputs,
     )
     output = _wrenches(spec, space, law, block)
     initial: dict[str, ca.SX] = {}
@@ -147,12 +159,18 @@ def _wrenches(
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
     force = ca.SX.zeros(space.size)
+
+    def held(wrench: ca.SX, otherwise: ca.SX | float = 0.0) -> ca.SX:
+        """A wrench of the mechanism, and what stands in its place while no point is held."""
+        return ca.if_else(u[grasp.HELD] > 0.5, wrench, otherwise) if grasp.HELD in u else wrench
+
     if spec.teleoperation:
         output["F_drift"] = p["K_pc"] * space.difference(u["x_S"], u["x_D"])
         output["F_drift"] += p["B_pc"] * (u["v_S"] - u["v_D"])
+        output["F_drift"] = held(output["F_drift"])
         force += output["F_drift"]
     if spec.contact:
-        force += u["F_env"]
+        force += held(u["F_env"])
     if spec.damping is not None:
         force -= p["B_d"] * u["v_D"]
     if spec.stiffness is not None:
@@ -163,10 +181,10 @@ def _wrenches(
         a = u["Lambda_inv"] @ (u["F_hand"] + force)
         if spec.bias == "full":
             a += u["a_bias"]
-        motor = u["M"] @ a + u["c"] - u["F_hand"]
+        motor = held(u["M"] @ a + u["c"] - u["F_hand"], u["c"] + force)
     if law:
         pull = p["k_j"] * space.difference(u["x_S"], u["x_D"])
         pull += p["b_j"] * (u["v_S"] - u["v_D"])
-        F_T = topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"])
+        F_T = held(topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"]))
         output["F_constraint"], motor = F_T, motor + F_T
     return output | {"F_motor": motor}

@@ -13,7 +13,7 @@ from hapticlink.components.contact import located_events
 from hapticlink.components.contact.kept_sides import NAME
 from hapticlink.components.contact.located_events import LocatedEvents
 from hapticlink.components.contact.one_sided_spring import OneSidedForces
-from hapticlink.components.dynamics import further_points, joint_ports
+from hapticlink.components.dynamics import further_points, grasp, joint_ports
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import (
     ClosedLoopSolver,
@@ -47,7 +47,7 @@ class MechanismSteps(MechanicalSystem):
     applied: generalised forces (n x 1) of hands, couplings and motors outside; touching: the
     contacts and joint limits, if there are any; energy: kinetic and potential (J); signals: those
     of drives over time, which are known within a step; kept_sides: of contacts, for the whole
-    step, in the place of the state.
+    step, and held_point: of the hand, each in the place of the state.
     """
 
     def __init__(
@@ -61,6 +61,7 @@ class MechanismSteps(MechanicalSystem):
         signals: list[TimeSignal],
         *,
         kept_sides: ca.SX | None = None,
+        held_point: ca.SX | None = None,
     ) -> None:
         self._block, self._mechanism, self._space = block, mechanism, space
         self._applied, self._touching, self._energy = applied, touching, energy
@@ -78,6 +79,9 @@ class MechanismSteps(MechanicalSystem):
         if kept_sides is not None:
             self._symbols = ca.vertcat(self._symbols, ca.vec(block.x[NAME].T))
             self.u = ca.vertcat(self.u, ca.vec(kept_sides.T))
+        if held_point is not None:
+            self._symbols = ca.vertcat(self._symbols, block.x[grasp.HELD])
+            self.u = ca.vertcat(self.u, held_point)
 
     def _known(self, expression: ca.SX) -> ca.SX:
         """An expression of the signals' values at an instant in terms of what is known of them
@@ -152,9 +156,21 @@ class MechanismSteps(MechanicalSystem):
         return further_points.forces_at_points(self._model, self._block.u)
 
     @cached_property
+    def _hands(self) -> list[tuple[ca.SX, ca.SX]]:
+        """Pose of the operational point and wrench on it, of each that the hand can hold."""
+        model, wrench = self._model, self._block.u["F_hand"] - self._block.u["F_drift"]
+        if model.point is None:
+            return [(model.x_h, wrench)]
+        held = [(ca.SX(k + 1), model.point) for k in range(len(model.linkage.choices))]
+        return [
+            (model.pose_of_choice(k), ca.if_else(grasp.same(point, k), wrench, 0))
+            for k, point in held
+        ]
+
+    @cached_property
     def _displacements(self) -> ca.SX:
-        model = self._model
-        return ca.vertcat(model.x_h, *(point.x for point in self._further_points), model.q)
+        further = (point.x for point in self._further_points)
+        return ca.vertcat(*(x for x, _ in self._hands), *further, self._model.q)
 
     @cached_property
     def rates(self) -> ca.Function:
@@ -181,8 +197,9 @@ class MechanismSteps(MechanicalSystem):
     @cached_property
     def input_efforts(self) -> ca.Function:
         u = self._block.u
-        wrenches = [u["F_hand"] - u["F_drift"], *(point.wrench for point in self._further_points)]
-        efforts = ca.vertcat(*wrenches, joint_ports.efforts(self._model, u))
+        wrenches = [wrench for _, wrench in self._hands]
+        further = (point.wrench for point in self._further_points)
+        efforts = ca.vertcat(*wrenches, *further, joint_ports.efforts(self._model, u))
         return ca.Function("input_efforts", [self._symbols], [efforts])
 
     def _kinematics(self, name: str, result: ca.SX) -> ca.Function:

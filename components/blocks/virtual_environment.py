@@ -16,7 +16,7 @@ import numpy as np
 from hapticlink.components.component import FRAME_SIZE, Block, Component, Variable
 from hapticlink.components.contact import contact_forces, kept_sides
 from hapticlink.components.contact.kept_sides import KeptSides
-from hapticlink.components.dynamics import follow_mechanism, further_points
+from hapticlink.components.dynamics import follow_mechanism, further_points, grasp
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.light_bodies import require_inertia
@@ -64,13 +64,16 @@ def virtual_environment(
         contacts = None
     counts = further_points.counts(users) if directions else []
     sides = kept_sides.states(linkage, contacts) if contacts else []
+    ready = [Variable(grasp.READY)] if linkage.choices else []
     block = Block(
-        inputs=follow_mechanism.inputs(linkage, copy),
+        inputs=[*follow_mechanism.inputs(linkage, copy), *grasp.inputs_of_copy(linkage)],
         parameters=_parameters(linkage, copy, directions, contacts, frame_s),
-        states=[*states(linkage), *(Variable(name) for name in counts), *sides],
+        states=[*states(linkage), *(Variable(name) for name in counts), *sides, *ready],
         outputs=_outputs(linkage, directions, contacts, users, mobility, local_model),
     )
-    model = LinkageModel(linkage, block.p, block.x["q"], block.x["qd"])
+    model = LinkageModel(
+        linkage, block.p, block.x["q"], block.x["qd"], point=block.x.get(grasp.READY)
+    )
     q1, qd1 = follow_mechanism.step(block, model, copy)
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial, step = {"q": q0, "qd": qd0}, {"q": q1, "qd": qd1}
@@ -80,7 +83,9 @@ def virtual_environment(
         output["Lambda_inv"] = space.Lambda_inv
         output |= further_points.mobilities(space, users)
     if directions:
-        for name, directed in further_points.directions(block, space, users, q0, q1).items():
+        points = grasp.points_of_copy(block) if linkage.choices else None
+        found = further_points.directions(block, space, users, q0, q1, points)
+        for name, directed in found.items():
             initial[name], step[name] = directed.first, directed.after
             output |= directed.output
     if linkage.closed:
@@ -94,6 +99,9 @@ def virtual_environment(
         output["contacts"] = contact_forces.detect_contacts(model, contacts, kept, held_s)
     if local_model:
         output |= held_matrices.values(model)
+    if linkage.choices:
+        initial[grasp.READY] = step[grasp.READY] = block.u[grasp.ASKED]
+        output[grasp.READY] = block.x[grasp.READY]
     component = block.component(
         "virtual_environment",
         "Graphics-rate copy of the linkage, its mobility and constrained directions",
@@ -149,6 +157,7 @@ def _outputs(
         *(_BRANCH if linkage.closed else []),
         *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
         *(held_matrices.ports(linkage) if local_model else []),
+        *grasp.outputs_of_copy(linkage),
     ]
 
 

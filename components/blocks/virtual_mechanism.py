@@ -10,7 +10,7 @@ of position and velocity after each step. The start pose is assembled in initial
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -28,6 +28,7 @@ from hapticlink.components.contact.one_sided_spring import AllOneSidedForces, On
 from hapticlink.components.dynamics import (
     closure_diagnostics,
     further_points,
+    grasp,
     joint_ports,
     local_model,
     starting_friction,
@@ -65,11 +66,14 @@ def virtual_mechanism(
     frame_s: float | None = None,
     felt: bool = False,
     users: further_points.Users = (),
+    coupled: bool = False,
+    followed: bool = False,
 ) -> Component:
     """The FMU `virtual_mechanism`. With `directions` it has its own Lambda_inv and P_c as outputs;
     `felt`, the efforts of others (further hands, motors on joints) are in F_env, as contacts are;
     `users` are the further points that a device holds (further_points.py); with frame_s (s) it is
-    the local model (B.15), with D, W, w and J_h as inputs, held for a frame.
+    the local model (B.15), with D, W, w and J_h as inputs, held for a frame. Of a linkage with
+    several points for the hand, `coupled` and `followed` are those of grasp.py.
 
     The parameter `step_size` starts at step_s (s), and `frame_size` at frame_s: defaults depend on
     them (step_defaults.py). length_scale (m) is L where `directions` does not give it. Raises
@@ -85,6 +89,8 @@ def virtual_mechanism(
         contacts = None
     felt = felt and bool(linkage.point or joint_ports.inputs(linkage))
     parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt, users, method)
+    if linkage.choices:
+        parts = replace(parts, coupled=coupled, followed=followed)
     defaults = StepDefaults(linkage, mechanism, contacts, step_s, frame_s)
     block = _block(parts, defaults, length_scale)
     defaults.define(block.p)
@@ -120,6 +126,8 @@ class _Parts:
     felt: bool
     users: further_points.Users
     method: Integrator
+    coupled: bool = False
+    followed: bool = False
 
     @property
     def touches(self) -> bool:
@@ -132,9 +140,10 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
     linkage, directions, contacts = parts.linkage, parts.directions, parts.contacts
     space = linkage.space
     drift = "virtual coupling, acts with - on the mechanism"
+    moved = grasp.PATH if linkage.choices else "x"
     inputs = [
-        Variable("F_hand", *space.wrench, description="wrench of the hand", power=Power("x")),
-        Variable("F_drift", *space.wrench, description=drift, power=Power("x", sign=-1.0)),
+        Variable("F_hand", *space.wrench, description="wrench of the hand", power=Power(moved)),
+        Variable("F_drift", *space.wrench, description=drift, power=Power(moved, sign=-1.0)),
     ]
     parameters = mechanism_parameters(linkage, parts.mechanism, defaults.baumgarte.beta)
     parameters += defaults.parameters
@@ -171,6 +180,11 @@ def _block(parts: _Parts, defaults: StepDefaults, length_scale: float | None) ->
         outputs.append(mobility_output(space))
         for user in ("", *parts.users):
             outputs += direction_outputs(space, user)
+    if linkage.choices:
+        inputs += grasp.inputs(linkage, coupled=parts.coupled, followed=parts.followed)
+        parameters += grasp.parameters(linkage)
+        memory += grasp.states(linkage)
+        outputs += grasp.outputs(linkage)
     return Block(inputs=inputs, parameters=parameters, states=memory, outputs=outputs)
 
 
@@ -182,8 +196,9 @@ class _Equations:
         self.signals = drives.signals(parts.linkage)
         tabled = ca.SX.sym("tabled", 2 * len(self.signals))
         pose = block.x["q"], block.x["qd"]
-        deflection = block.x.get("deflection")
-        self.model = LinkageModel(parts.linkage, block.p, *pose, tabled, block.t, deflection)
+        deflection, point = block.x.get("deflection"), block.x.get(grasp.HELD)
+        self.model = LinkageModel(parts.linkage, block.p, *pose, tabled, block.t, deflection, point)
+        self._grasp = None if point is None else grasp.Grasp(block, self.model)
         held = local_model.held_terms(self.model, block.u) if parts.frame_s else None
         self._space = OperationalSpace(self.model, held)
         drawn = self._space.terms.J_h.T @ (block.u["F_hand"] - block.u["F_drift"])
@@ -227,7 +242,12 @@ class _Equations:
         parts, model, n = self._parts, self.model, self.model.q.numel()
         acting = self._applied, self.touching, self._energy, self.signals
         steps = MechanismSteps(
-            self._block, parts.mechanism, self._space, *acting, kept_sides=self._sides_in_step
+            self._block,
+            parts.mechanism,
+            self._space,
+            *acting,
+            kept_sides=self._sides_in_step,
+            held_point=self._grasp and self._grasp.held,
         )
         after = integrators.mechanism_step(parts.method, steps)
         if k := model.deflection.numel():
@@ -249,8 +269,10 @@ class _Equations:
         """The constrained directions of operational points by state, if there are any."""
         if not self._parts.directions:
             return {}
-        q0, q1 = self._start[0], self._after[: self.model.q.numel()]
-        return further_points.directions(self._block, self._space, self._parts.users, q0, q1)
+        moves = self._start[0], self._after[: self.model.q.numel()]
+        points = self._grasp.points if self._grasp else None
+        users = self._parts.users
+        return further_points.directions(self._block, self._space, users, *moves, points)
 
     def initial(self) -> dict[str, ca.SX]:
         """All states at t = 0."""
@@ -258,7 +280,8 @@ class _Equations:
         if (kept := self._block.x.get(kept_sides.NAME)) is not None:
             initial[kept_sides.NAME] = ca.SX(*kept.shape)
         initial |= dict.fromkeys(self._parts.method.counters, ca.SX(0))
-        return initial | {name: directed.first for name, directed in self._directions.items()}
+        initial |= {name: directed.first for name, directed in self._directions.items()}
+        return initial | (self._grasp.initial if self._grasp else {})
 
     def _initial_deflections(self) -> dict[str, ca.SX]:
         """The deflections of friction at the start pose and rates: contacts have none, and are kept
@@ -272,6 +295,9 @@ class _Equations:
             none = ca.vertcat(ca.SX(0, 1), *(ca.vec(state) for state in of_contacts))
             symbols = ca.vertcat(self.model.tabled, none)
             known = ca.vertcat(time_signals.at(self.signals, ca.SX(0)), ca.SX(*none.shape))
+            if self._grasp:
+                symbols = ca.vertcat(symbols, x[grasp.HELD])
+                known = ca.vertcat(known, self._grasp.initial[grasp.HELD])
             initial[joints] = ca.substitute(z, symbols, ca.densify(known))
         return initial
 
@@ -291,6 +317,7 @@ class _Equations:
             kept,
             ca.vertcat(ca.SX(0, 1), *counted) + growth,
             *(directed.after for directed in self._directions.values()),
+            *(self._grasp.begun.values() if self._grasp else ()),
         )
 
     def output(self) -> dict[str, ca.SX]:
@@ -315,6 +342,7 @@ class _Equations:
             output["Lambda_inv"] = space.Lambda_inv
         for directed in self._directions.values():
             output |= directed.output
+        output |= self._grasp.output if self._grasp else {}
         if not self.signals:
             return output
         now = ca.densify(time_signals.at(self.signals, block.t))

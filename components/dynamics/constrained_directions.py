@@ -100,6 +100,16 @@ def projector(eigenvalues: ca.SX, vectors: ca.SX, number: ca.SX) -> ca.SX:
 
 
 @dataclass(frozen=True)
+class Points:
+    """The number of the operational point at the start and over a step, and whether it changes: the
+    directions at another point are counted without hysteresis."""
+
+    first: ca.SX
+    after: ca.SX
+    changes: ca.SX
+
+
+@dataclass(frozen=True)
 class ConstrainedDirections:
     """The state n_constrained at the start and after a step, and the outputs."""
 
@@ -115,24 +125,30 @@ def constrained_directions(
     q1: ca.SX,
     J: ca.SX | None = None,
     prefix: str = "",
+    points: Points | None = None,
 ) -> ConstrainedDirections:
     """The constrained directions of a block with the state n_constrained that starts at q0 and
     steps from q to q1: at the operational point, or at a point with Jacobian J, whose names have
-    the prefix."""
+    the prefix. points: of an operational point that changes."""
     p, before, q = block.p, block.x[f"{prefix}n_constrained"], space.model.q
+    own = [] if space.model.point is None else [space.model.point]
     S = scaling(space.model.linkage.space, p["length_scale"])
     mobility = space.Lambda_inv if J is None else space.mobility(J)
     opened = space.open_mobility(space.terms.J_h if J is None else J)
-    given, both = (block.u.vector, p.vector), [S @ mobility @ S, locking_threshold(S @ opened @ S)]
+    given, both = (block.u.vector, p.vector, *own), [S @ mobility @ S, locking_threshold(S @ opened @ S)]
     scaled = ca.Function("scaled", [q, *given], both, {"cse": True})
     tolerance, hysteresis = p["rank_tolerance"], p["hysteresis"]
 
-    def number(q: ca.SX, before: ca.SX) -> ca.SX:
-        mobility, least = scaled(q, *given)
+    def number(q: ca.SX, before: ca.SX, *point: ca.SX) -> ca.SX:
+        mobility, least = scaled(q, block.u.vector, p.vector, *point)
         return count(eigen(mobility)[0], before, tolerance, hysteresis, least)
 
     output = {
         f"{prefix}P_c": projector(*eigen(scaled(q, *given)[0]), before),
         f"{prefix}n_constraints": before,
     }
-    return ConstrainedDirections(number(q0, ca.SX(0)), number(q1, before), output)
+    first, after = own, own
+    if points:
+        first, after = [points.first], [points.after]
+        before = ca.if_else(points.changes, 0, before)
+    return ConstrainedDirections(number(q0, ca.SX(0), *first), number(q1, before, *after), output)

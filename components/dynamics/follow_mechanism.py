@@ -81,7 +81,7 @@ def pull_copy(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.S
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
         space, K_g, B_g = model.linkage.space, ca.diag(p["K_g"]), ca.diag(p["B_g"])
-        added = {model.linkage.operational_point.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
+        added = {model.linkage.held.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
         solver = ClosedLoopSolver(TreeInertia(model, added), model.W, rows(model.linkage), MU)
         pull = model.J_h.T @ (K_g @ space.difference(u["x_ref"], model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)

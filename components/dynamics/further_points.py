@@ -23,6 +23,7 @@ import casadi as ca
 from hapticlink.components.component import Block, Signals, Variable
 from hapticlink.components.dynamics.constrained_directions import (
     ConstrainedDirections,
+    Points,
     constrained_directions,
 )
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
@@ -129,10 +130,16 @@ def values(
 
 
 def directions(
-    block: Block, space: OperationalSpace, users: Users, q0: ca.SX, q1: ca.SX
+    block: Block,
+    space: OperationalSpace,
+    users: Users,
+    q0: ca.SX,
+    q1: ca.SX,
+    points: Points | None = None,
 ) -> dict[str, ConstrainedDirections]:
-    """The constrained directions at the operational point and at those of users, by state."""
-    constrained = [constrained_directions(block, space, q0, q1)]
+    """The constrained directions at the operational point and at those of users, by state.
+    points: of an operational point that changes."""
+    constrained = [constrained_directions(block, space, q0, q1, points=points)]
     for name, J in _jacobians(space.model, users).items():
         constrained.append(constrained_directions(block, space, q0, q1, J, f"{name}."))
     return dict(zip(counts(users), constrained, strict=True))

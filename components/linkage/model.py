@@ -63,11 +63,13 @@ class LinkageModel:
         tabled: ca.SX | None = None,
         t: ca.SX | None = None,
         deflection: ca.SX | None = None,
+        point: ca.SX | None = None,
     ) -> None:
         self.linkage, self.p, self.q, self.qd = linkage, p, q, qd
         self.tabled = ca.SX(0, 1) if tabled is None else tabled
         self.t = ca.SX(math.nan) if t is None else t
         self.deflection = ca.SX.nan(linkage.rubbing, 1) if deflection is None else deflection
+        self.point = point
 
     @classmethod
     def symbolic(cls, linkage: Linkage, p: Signals) -> LinkageModel:
@@ -229,7 +231,20 @@ class LinkageModel:
     @cached_property
     def x_h(self) -> ca.SX:
         """Pose (x, y, theta) of the operational point (2.16)."""
-        return self.pose(self.linkage.operational_point.body, "operational_point.at")
+        if self.point is None:
+            return self.pose(self.linkage.held.body, f"{self.linkage.held_name}.at")
+        return self.pose_of_choice(self.point)
+
+    def pose_of_choice(self, number: ca.SX) -> ca.SX:
+        """Pose of the linkage's choice with that number, from 1; of 0, which holds no point, 0."""
+        pose = ca.SX(self.linkage.space.size, 1)
+        for k, name in enumerate(self.linkage.choices, 1):
+            there = self.pose(self.linkage.points[name].body, f"{name}.at")
+            if number.is_constant():
+                pose = there if int(number) == k else pose
+            else:
+                pose += ca.if_else(ca.fabs(number - k) < 0.5, there, 0)
+        return pose
 
     def pose(self, body: str, point: str) -> ca.SX:
         """Pose (x, y, theta) of the point of a body that a parameter gives, or of its origin."""

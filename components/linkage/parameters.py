@@ -43,13 +43,12 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
         if not loop.kind.turns:
             text = f"angle of {loop.bodies[0]} from {loop.bodies[1]}"
             rows.append(fixed(f"{name}.angle", "rad", loop.angle or 0.0, text))
-    if linkage.operational_point.at is not None:
-        at, body = linkage.operational_point.at, linkage.operational_point.body
-        rows.append(fixed("operational_point.at", "m", at, f"operational point on {body}"))
-    for point in linkage.point:
+    named = {name: (linkage.points[name], name) for name in linkage.choices}
+    own = {"operational_point": (linkage.held, "operational point")}
+    further = {point.name: (point, point.name) for point in linkage.point}
+    for name, (point, text) in {**(named or own), **further}.items():
         if point.at is not None:
-            text = f"{point.name} on {point.body}"
-            rows.append(fixed(f"{point.name}.at", "m", point.at, text))
+            rows.append(fixed(f"{name}.at", "m", point.at, f"{text} on {point.body}"))
     return tuple(rows)
 
 

@@ -198,6 +198,10 @@ class Gear:
     """Prefix of its FMU parameters; by default gear1, gear2, ..."""
 
 
+NO_POINT = "none"
+"""What stands for the name of a point where the hand holds none."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class OperationalPoint:
     """The point that the hand holds."""
@@ -224,8 +228,11 @@ class Linkage:
     """The bodies."""
     joint: tuple[Joint, ...]
     """The joints of the tree: every body is the child of exactly one."""
-    operational_point: OperationalPoint
-    """The point that the hand holds."""
+    operational_point: OperationalPoint | str
+    """The point that the hand holds, or the name of one of `points`."""
+    points: Mapping[str, OperationalPoint] = field(default_factory=dict)
+    """Points by name, between which the hand can change:
+    [another link](mechanisms.md#another-link-in-the-hand)."""
     point: tuple[FurtherPoint, ...] = ()
     """Further operational points, for further hands."""
     loop: tuple[Loop, ...] = ()
@@ -245,6 +252,23 @@ class Linkage:
     start_velocity: Mapping[str, Velocity | Twist] = field(default_factory=dict)
     """Joint velocities at t = 0 by the joint's name; three for a free joint. Given ones are kept;
     the others are the smallest that are consistent with the loops."""
+
+    @property
+    def held(self) -> OperationalPoint:
+        """The operational point at the start."""
+        point = self.operational_point
+        return self.points[point] if isinstance(point, str) else point
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The names of the points between which the hand can change, none of a single one."""
+        return tuple(self.points) if len(self.points) > 1 else ()
+
+    @property
+    def held_name(self) -> str:
+        """The prefix of the parameters of `held`."""
+        point = self.operational_point
+        return point if isinstance(point, str) and self.choices else "operational_point"
 
     @property
     def space(self) -> PortSpace:
@@ -275,7 +299,7 @@ class Linkage:
     @property
     def objects(self) -> set[str]:
         """The free bodies that no hand holds and that carry no other body: movable objects."""
-        held = {point.body for point in (self.operational_point, *self.point)}
+        held = {point.body for point in (self.held, *self.points.values(), *self.point)}
         return self.free - held - {j.parent for j in self.joint}
 
     @property

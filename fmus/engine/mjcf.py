@@ -84,7 +84,7 @@ def mjcf(
 
 def points(linkage: Linkage) -> Iterator[tuple[str, str, Point | None]]:
     """Name, body and position of each operational point."""
-    hand = linkage.operational_point
+    hand = linkage.held
     yield HAND, hand.body, hand.at
     for point in linkage.point:
         yield point.name, point.body, point.at

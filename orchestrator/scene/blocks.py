@@ -129,6 +129,8 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
             "directions": scene.directions,
             "linkage": scene.linkage,
         }
+        if not user and scene.linkage and scene.linkage.choices:
+            settings["clutch"] = True
         yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
     for user, device in scene.all_devices.items():
         settings = {"device": device}
@@ -154,6 +156,9 @@ def _mechanism(scene: Scene) -> dict[str, Any]:
         settings["length_scale"] = scene.directions.length_scale
     if scene.local_model:
         settings["local_model"] = True
+    if scene.linkage.choices:
+        settings["coupled"] = bool(scene.device)
+        settings["followed"] = bool(scene.graphics and from_graphics(scene).names)
     return settings
 
 

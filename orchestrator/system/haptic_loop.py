@@ -50,6 +50,10 @@ _LOOP: tuple[Row, ...] = (
     ("virtual_environment.W", "virtual_mechanism.W"),
     ("virtual_environment.w", "virtual_mechanism.w"),
     ("virtual_environment.J_h", "virtual_mechanism.J_h"),
+    ("haptic_device.x", "virtual_mechanism.x_handle"),
+    ("virtual_mechanism.asked_point", "virtual_environment.asked_point"),
+    ("virtual_environment.ready_point", "virtual_mechanism.ready_point"),
+    ("virtual_mechanism.held_point", "controller.held_point"),
     ("controller.F_motor", "haptic_device.F_motor"),
     ("controller.F_drift", "virtual_mechanism.F_drift"),
 )

@@ -61,7 +61,7 @@ class MovingFiveBar:
         bodies = tuple(
             replace(body, center=(f[i] * lengths[i], 0.0)) for i, body in enumerate(linkage.body)
         )
-        point = replace(linkage.operational_point, at=(f[1] * lengths[1], 0.0))
+        point = replace(linkage.held, at=(f[1] * lengths[1], 0.0))
         self.linkage = replace(linkage, body=bodies, operational_point=point)
         q = np.array(appendix_a.Q0)
         for _ in range(6):

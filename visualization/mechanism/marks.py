@@ -149,7 +149,7 @@ def attachment_points(linkage: Linkage, body: str) -> Iterator[Point]:
         yield from (
             at or ORIGIN for name, at in zip(loop.bodies, loop.at, strict=True) if name == body
         )
-    for point in (linkage.operational_point, *linkage.point):
+    for point in (linkage.held, *linkage.points.values(), *linkage.point):
         if point.body == body:
             yield point.at or ORIGIN
 
@@ -175,7 +175,7 @@ def contact_shape(body: Body) -> Points:
 
 def point_of(linkage: Linkage, user: str) -> Place:
     """The point that a user holds."""
-    held = [p for p in linkage.point if p.name == user] if user else [linkage.operational_point]
+    held = [p for p in linkage.point if p.name == user] if user else [linkage.held]
     return _on(held[0].body, held[0].at)
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from hapticlink.components.specs.drives import ConstantDrive
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import NO_POINT, Linkage
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
@@ -33,9 +33,7 @@ def check_linkage(scene: Scene) -> Iterator[Problem]:
     yield from _cuts(linkage)
     yield from _gears(linkage)
     yield from _limits(linkage)
-    if linkage.operational_point.body not in bodies:
-        message = unknown("body", linkage.operational_point.body, bodies)
-        yield (*here, "operational_point", "body"), message
+    yield from _choices(linkage, bodies)
     joints = {j.name: j for j in linkage.joint}
     for table in ("start", "start_velocity"):
         for name, value in getattr(linkage, table).items():
@@ -44,6 +42,27 @@ def check_linkage(scene: Scene) -> Iterator[Problem]:
             elif (len(value) if isinstance(value, tuple) else 1) != joint.kind.size:
                 wanted = f"{joint.kind.count} number{'s' if joint.kind.size > 1 else ''}"
                 yield (*here, table, name), f"{value!r}: a {joint.type} joint takes {wanted}"
+
+
+def _choices(linkage: Linkage, bodies: Sequence[str]) -> Iterator[Problem]:
+    """Problems of the operational point, and of those that it is chosen from."""
+    here: Path = ("linkage", "operational_point")
+    chosen, named = linkage.operational_point, linkage.points
+    if not isinstance(chosen, str):
+        if named:
+            yield here, f"give one of linkage.points, which it is chosen from: {', '.join(named)}"
+        if chosen.body not in bodies:
+            yield (*here, "body"), unknown("body", chosen.body, bodies)
+    elif chosen not in named:
+        yield here, f"{unknown('point', chosen, named)}: add [linkage.points.{chosen}]"
+    for name, point in named.items():
+        path: Path = ("linkage", "points", name)
+        if not name.isidentifier() or name == NO_POINT:
+            yield path, f"{name!r}: a name of letters, digits and _, not {NO_POINT!r}"
+        elif name in {each.name for each in linkage.point}:
+            yield path, f"{name!r} is taken by [[linkage.point]]: name each point once"
+        if point.body not in bodies:
+            yield (*path, "body"), unknown("body", point.body, bodies)
 
 
 def _cuts(linkage: Linkage) -> Iterator[Problem]:

@@ -34,11 +34,11 @@ def _experiment(runs: Runs) -> Iterator[Statement]:
         f"two runs differ by {same:g}",
         STATED_6.command(ON),
     )
-    at = (linkage.operational_point.at or (0.0, 0.0))[0]
+    at = (linkage.held.at or (0.0, 0.0))[0]
     yield compare(
         "6",
         "the user holds the centre of mass of the second link",
-        linkage.operational_point.body == "link2" and at == appendix_a.L[1] / 2,
+        linkage.held.body == "link2" and at == appendix_a.L[1] / 2,
         f"link2 at {1e3 * at:g} mm",
         INFO,
     )

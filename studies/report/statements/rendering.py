@@ -284,7 +284,7 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
         STATED_6.command(ON, PULLED),
     )
     q, x = (results.graphics[f"virtual_environment.{name}"] for name in ("q", "x"))
-    link1, link2 = 0.042, shipped().operational_point.at or (0.0, 0.0)
+    link1, link2 = 0.042, shipped().held.at or (0.0, 0.0)
     found = np.array(
         [
             link1 * np.cos(q[:, 0]) + link2[0] * np.cos(q[:, 0] + q[:, 1]),
