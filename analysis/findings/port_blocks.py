@@ -31,7 +31,12 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import UserSignals, of_port, table_of
+from hapticlink.analysis.findings.tracking import (
+    UserSignals,
+    of_port,
+    path_of_point,
+    table_of,
+)
 from hapticlink.analysis.findings.work_of_wrenches import Works
 from hapticlink.orchestrator.results.read_results import Results, Vector
 
@@ -45,7 +50,7 @@ def needed_signals(results: Results, users: Iterable[UserSignals]) -> set[str]:
     """The signals from which the blocks of these users are found, as far as a run has them."""
     signals: set[str] = set()
     for user in users:
-        own = user.point, user.handle, user.motors, *_wrenches(user).values()
+        own = path_of_point(results, user), user.handle, user.motors, *_wrenches(user).values()
         signals |= {*own, *(source for source, _ in _sources(results, user))}
     return signals
 
@@ -71,6 +76,7 @@ def by_block(
         return np.subtract(*works.of(signal, position)) if there else None
 
     for user, done in put_in.items():
+        point = path_of_point(results, user)
         shaping -= done
         for name, signal in _wrenches(user).items():
             if (energy := ideal(signal, user.handle)) is not None:
@@ -79,14 +85,14 @@ def by_block(
         if (energy := made_by_hold(user.motors, user.handle)) is not None:
             shaping -= energy
             add(f"hold of {user.motors}", energy)
-        if (energy := ideal(user.environment, user.point)) is not None:
+        if (energy := ideal(user.environment, point)) is not None:
             shaping += energy
             add("environment", np.negative(energy, out=energy))
         for source, target in _sources(results, user):
-            if not (table_of(results, source) and of_port(results, user.point)):
+            if not (table_of(results, source) and of_port(results, point)):
                 continue
             sign = -1.0 if target.endswith("F_drift") else 1.0
-            held, energy = works.of(source, user.point, sign, f"{source} -> {target}")
+            held, energy = works.of(source, point, sign, f"{source} -> {target}")
             mechanism -= held
             if source == user.drift:
                 held -= energy

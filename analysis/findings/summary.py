@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hapticlink.analysis.findings import friction_speed
+from hapticlink.analysis.findings.changes_of_point import describe_changes
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.report_premises import describe_experiment
@@ -127,6 +128,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
         yield from _describe_saturation(measures)
     if port := measures.port:
         yield _energy(port)
+    yield from describe_changes(results)
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
             yield f"held {name} {describe_generated(energy.peak, energy.generated)}"

@@ -17,10 +17,12 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
     HANDLE_POSE,
+    HELD_POINT,
     MEASURED_HANDLE_POSE,
     MOTOR_WRENCH,
     PASSIVITY_DAMPING,
     PASSIVITY_ENERGY,
+    POINT_PATH,
     POINT_POSE,
     TOPOLOGY_WRENCH,
     WORKSPACE_MARGIN,
@@ -122,8 +124,9 @@ def has_tracking(results: Results, user: UserSignals = FIRST) -> bool:
 
 
 def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
-    """Tracking error of a user at the mechanism's samples up to the device's last one; the handle's
-    pose is interpolated linearly where its clock differs. Raises KeyError without these signals."""
+    """Tracking error of a user at the mechanism's samples up to the device's last one at which the
+    hand holds a point; the handle's pose is interpolated linearly where its clock differs. Raises
+    KeyError without these signals."""
     point, handle = user.point, user.handle
     mechanism, device = of_port(results, point), of_port(results, handle)
     if mechanism is None or device is None:
@@ -139,7 +142,16 @@ def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
 
     rows = rows_until(mechanism, times[-1])
     distance, angle = mechanism.by_row(error, "time", point)
-    return Tracking(mechanism["time"][rows], distance[rows], angle[rows])
+    found = [mechanism["time"][rows], distance[rows], angle[rows]]
+    if user == FIRST and of_block(results, HELD_POINT) is mechanism:
+        found = [each[mechanism[HELD_POINT][rows] > 0] for each in found]
+    return Tracking(*found)
+
+
+def path_of_point(results: Results, user: UserSignals) -> str:
+    """The signal with which wrenches at a user's point are paired for their work."""
+    changes = user == FIRST and of_port(results, POINT_PATH) is not None
+    return POINT_PATH if changes else user.point
 
 
 def rows_until(table: Table, time: float) -> slice:

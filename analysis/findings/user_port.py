@@ -30,6 +30,7 @@ from hapticlink.analysis.findings.tracking import (
     find_users,
     of_block,
     of_port,
+    path_of_point,
     rows_until,
     table_of,
 )
@@ -51,7 +52,6 @@ from hapticlink.orchestrator.base.signal_names import (
     MECHANISM,
     MECHANISM_ENERGY,
     MOBILITIES,
-    POINT_POSE,
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
@@ -189,7 +189,8 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
         if of_port(results, signal) and of_port(results, user.handle)
     }
     if contact := of_port(results, ENVIRONMENT_WRENCH):
-        done = work_of_source(time, contact, ENVIRONMENT_WRENCH, contact, POINT_POSE)
+        path = path_of_point(results, FIRST)
+        done = work_of_source(time, contact, ENVIRONMENT_WRENCH, contact, path)
         found["F_env on the mechanism"] = last(done)
     if (added := _hold_mobility(results, device)) is not None:
         done = work_as_held(time, added.__getitem__, device["time"], device, HANDLE_POSE)

@@ -41,9 +41,7 @@ def prepare(
     body = model.body(linkage.held.body).id
     places = [int(model.joint(j.name).qposadr[0]) for j in linkage.joint]
     center = next(b.center for b in linkage.body if b.name == linkage.held.body)
-    if np.any(wrench) and not np.allclose(
-        center or (0, 0), linkage.held.at or (0, 0), atol=1e-12
-    ):
+    if np.any(wrench) and not np.allclose(center or (0, 0), linkage.held.at or (0, 0), atol=1e-12):
         raise ValueError("MuJoCo's xfrc_applied acts at the centre of mass only")
 
     def run(steps: int) -> tuple[float, float, float]:

@@ -94,10 +94,10 @@ def _controller(
     return block.controller(controller, linkage.space, length, clutch=clutch)
 
 
-def _hand(hand: Hand) -> Component:
+def _hand(hand: Hand, clutch: bool = False) -> Component:
     from hapticlink.components.blocks import hand as block
 
-    return block.hand(hand)
+    return block.hand(hand, clutch=clutch)
 
 
 def _discrete_equivalent(rule: str) -> Component:

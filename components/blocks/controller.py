@@ -94,7 +94,9 @@ def _gains(
     return gains
 
 
-def _outputs(spec: Controller, space: PortSpace, law: Topology | None) -> list[Variable]:
+def _outputs(
+    spec: Controller, space: PortSpace, law: Topology | None, clutch: bool
+) -> list[Variable]:
     outputs = [Variable("F_motor", *space.wrench, description="u, desired wrench of the motors")]
     if spec.teleoperation:
         text = "virtual coupling, + on the device, - on the mechanism"
@@ -102,6 +104,9 @@ def _outputs(spec: Controller, space: PortSpace, law: Topology | None) -> list[V
     if law:
         text = "F_T, wrench of the topology controller"
         outputs += [Variable("F_constraint", *space.wrench, description=text)]
+    if clutch:
+        text = "energy in the springs of F_drift and F_T, lost where the hand lets go"
+        outputs += [Variable("spring_energy", (), "J", description=text)]
     return outputs
 
 
@@ -120,7 +125,7 @@ def controller(
         )
     law = Topology() if spec.topology is True else (spec.topology or None)
     guard = PassivityLaw() if spec.passivity is True else (spec.passivity or None)
-    outputs, parameters = _outputs(spec, space, law), _gains(spec, space, law, length_scale)
+    outputs, parameters = _outputs(spec, space, law, clutch), _gains(spec, space, law, length_scale)
     states: list[Variable] = []
     if guard:
         parameters += [*passivity.parameters(guard), passivity.PERIOD]
@@ -158,14 +163,16 @@ def _wrenches(
     """u of the motors, before the passivity controller, with F_drift and F_T where they are."""
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
-    force = ca.SX.zeros(space.size)
+    force, spring_energy = ca.SX.zeros(space.size), ca.SX(0)
 
     def held(wrench: ca.SX, otherwise: ca.SX | float = 0.0) -> ca.SX:
         """A wrench of the mechanism, and what stands in its place while no point is held."""
         return ca.if_else(u[grasp.HELD] > 0.5, wrench, otherwise) if grasp.HELD in u else wrench
 
     if spec.teleoperation:
-        output["F_drift"] = p["K_pc"] * space.difference(u["x_S"], u["x_D"])
+        e = space.difference(u["x_S"], u["x_D"])
+        output["F_drift"] = p["K_pc"] * e
+        spring_energy += ca.dot(e, output["F_drift"]) / 2
         output["F_drift"] += p["B_pc"] * (u["v_S"] - u["v_D"])
         output["F_drift"] = held(output["F_drift"])
         force += output["F_drift"]
@@ -183,8 +190,14 @@ def _wrenches(
             a += u["a_bias"]
         motor = held(u["M"] @ a + u["c"] - u["F_hand"], u["c"] + force)
     if law:
-        pull = p["k_j"] * space.difference(u["x_S"], u["x_D"])
-        pull += p["b_j"] * (u["v_S"] - u["v_D"])
-        F_T = held(topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"]))
+
+        def constrain(pull: ca.SX) -> ca.SX:
+            return topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"])
+
+        e = space.difference(u["x_S"], u["x_D"])
+        F_T = held(constrain(p["k_j"] * e + p["b_j"] * (u["v_S"] - u["v_D"])))
+        spring_energy += ca.dot(e, constrain(p["k_j"] * e)) / 2
         output["F_constraint"], motor = F_T, motor + F_T
+    if grasp.HELD in u:
+        output["spring_energy"] = held(spring_energy)
     return output | {"F_motor": motor}

@@ -3,7 +3,8 @@
 Sampled: F(t_k) from the handle's x and v at t_k. An arm or spring may be continuous instead, a
 plant with F(t_{k+1}) at the end of its step. F acts with + on the handle.
 
-Constant or over time: F = F(t) - B v; x is no input, and v only where there is damping.
+Constant or over time: F = F(t) - B v; x is no input, and v only where there is damping. It is 0
+while the hand holds no point of a mechanism (grasp.py).
 
 Arm: a mass that a spring and damper pull to a target path; F acts through the spring and damper of
 the grip, with the handle's x and v held over each step. It starts at the handle's x and v with
@@ -21,6 +22,7 @@ import casadi as ca
 
 from hapticlink.components import integrators, time_signals
 from hapticlink.components.component import Block, Component, Timing, Variable
+from hapticlink.components.dynamics import grasp
 from hapticlink.components.paths import signal
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
@@ -49,9 +51,11 @@ def _hand(
     )
 
 
-def _wrench(spec: ConstantHand | ProfileHand) -> Component:
-    """F = F(t) - B v, with a damper to ground if the spec has one."""
-    parameters, inputs = [], []
+def _wrench(spec: ConstantHand | ProfileHand, clutch: bool) -> Component:
+    """F = F(t) - B v, with a damper to ground if the spec has one; 0 while a hand with a clutch
+    holds no point."""
+    parameters = []
+    inputs = [Variable(grasp.HELD, (), "1", 1.0, "point that the hand holds")] if clutch else []
     if isinstance(spec, ConstantHand):
         parameters += [Variable("wrench", *SPACE.wrench, spec.wrench, "wrench on the handle")]
     if spec.damping is not None:
@@ -65,6 +69,8 @@ def _wrench(spec: ConstantHand | ProfileHand) -> Component:
         F, kind = signals[0].value(block.t), "a wrench over time"
     if spec.damping is not None:
         F = F - block.p["damping"] * block.u["v"]
+    if clutch:
+        F = ca.if_else(block.u[grasp.HELD] > 0.5, F, 0)
     return _hand(block, kind, "sampled", F, signals)
 
 
@@ -123,8 +129,9 @@ def _spring(spec: SpringHand) -> Component:
     return _hand(block, "a spring to a target path", spec.timing, F, signals)
 
 
-def hand(spec: Hand) -> Component:
-    """The hand that `spec` describes."""
+def hand(spec: Hand, *, clutch: bool = False) -> Component:
+    """The hand that `spec` describes. clutch: it lets go of the points of a mechanism (grasp.py),
+    and then its wrench is 0; an arm and a spring keep the handle."""
     if isinstance(spec, ArmHand):
         return _arm(spec)
-    return _spring(spec) if isinstance(spec, SpringHand) else _wrench(spec)
+    return _spring(spec) if isinstance(spec, SpringHand) else _wrench(spec, clutch)

@@ -247,7 +247,7 @@ class _Equations:
             self._space,
             *acting,
             kept_sides=self._sides_in_step,
-            held_point=self._grasp and self._grasp.held,
+            held_point=self._grasp.held if self._grasp else None,
         )
         after = integrators.mechanism_step(parts.method, steps)
         if k := model.deflection.numel():

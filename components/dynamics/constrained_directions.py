@@ -135,7 +135,10 @@ def constrained_directions(
     S = scaling(space.model.linkage.space, p["length_scale"])
     mobility = space.Lambda_inv if J is None else space.mobility(J)
     opened = space.open_mobility(space.terms.J_h if J is None else J)
-    given, both = (block.u.vector, p.vector, *own), [S @ mobility @ S, locking_threshold(S @ opened @ S)]
+    given, both = (
+        (block.u.vector, p.vector, *own),
+        [S @ mobility @ S, locking_threshold(S @ opened @ S)],
+    )
     scaled = ca.Function("scaled", [q, *given], both, {"cse": True})
     tolerance, hysteresis = p["rank_tolerance"], p["hysteresis"]
 

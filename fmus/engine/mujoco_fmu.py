@@ -91,6 +91,8 @@ def _misfits(component: Component, settings: Mapping[str, Any]) -> Iterator[str]
     if component.name not in ("virtual_mechanism", "virtual_environment"):
         yield "it is the engine of virtual_mechanism and virtual_environment"
     names = {v.name for v in (*component.inputs, *component.outputs)}
+    if settings["linkage"].choices:
+        yield "it holds one point: take linkage.points out and give linkage.operational_point"
     if "D" in names:
         yield "D, W, w and J_h are not passed on: take local_model = false"
     if "contacts" in names:

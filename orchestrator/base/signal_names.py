@@ -30,6 +30,8 @@ WORKSPACE_MARGIN = f"{DEVICE}.workspace_margin"
 
 DRIFT_WRENCH = f"{CONTROLLER}.F_drift"
 TOPOLOGY_WRENCH = f"{CONTROLLER}.F_constraint"
+SPRING_ENERGY = f"{CONTROLLER}.spring_energy"
+"""Of the springs of coupling and topology, where the operational point changes."""
 MOTOR_WRENCH = f"{CONTROLLER}.F_motor"
 PASSIVITY_DAMPING = f"{CONTROLLER}.passivity_damping"
 PASSIVITY_ENERGY = f"{CONTROLLER}.passivity_energy_left"

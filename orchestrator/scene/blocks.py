@@ -121,15 +121,19 @@ def _loop(scene: Scene, skip: bool) -> Iterator[BlockPlan]:
 
 
 def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
+    clutch = bool(scene.linkage and scene.linkage.choices)
     for user, hand in scene.all_hands.items():
-        yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", {"hand": hand})
+        settings: dict[str, Any] = {"hand": hand}
+        if clutch and not user:
+            settings["clutch"] = True
+        yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
     for user, controller in scene.all_controllers.items():
         settings = {
             "controller": replace(controller, contact=True) if others(scene) else controller,
             "directions": scene.directions,
             "linkage": scene.linkage,
         }
-        if not user and scene.linkage and scene.linkage.choices:
+        if clutch and not user:
             settings["clutch"] = True
         yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
     for user, device in scene.all_devices.items():

@@ -54,6 +54,7 @@ _LOOP: tuple[Row, ...] = (
     ("virtual_mechanism.asked_point", "virtual_environment.asked_point"),
     ("virtual_environment.ready_point", "virtual_mechanism.ready_point"),
     ("virtual_mechanism.held_point", "controller.held_point"),
+    ("virtual_mechanism.held_point", "hand.held_point"),
     ("controller.F_motor", "haptic_device.F_motor"),
     ("controller.F_drift", "virtual_mechanism.F_drift"),
 )

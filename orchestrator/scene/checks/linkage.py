@@ -34,6 +34,9 @@ def check_linkage(scene: Scene) -> Iterator[Problem]:
     yield from _gears(linkage)
     yield from _limits(linkage)
     yield from _choices(linkage, bodies)
+    if linkage.choices and scene.graphics and scene.graphics.sync == "operational":
+        message = "nothing pulls the copy while the hand holds no point: take 'exact' or 'joint'"
+        yield ("graphics", "sync"), message
     joints = {j.name: j for j in linkage.joint}
     for table in ("start", "start_velocity"):
         for name, value in getattr(linkage, table).items():

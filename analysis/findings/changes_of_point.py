@@ -1,0 +1,81 @@
+"""When the hand let go of a point of the linkage and held another, and what the springs of the
+coupling lost by that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from hapticlink.analysis.findings.tracking import of_any_shape, of_block
+from hapticlink.components.specs.linkage import NO_POINT
+from hapticlink.orchestrator.base.signal_names import (
+    HANDLE_INERTIA,
+    HANDLE_VELOCITY,
+    HELD_POINT,
+    SPRING_ENERGY,
+)
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.read_results import Results, Vector
+
+
+class ChangeOfPoint(NamedTuple):
+    """The points before and after a time (s), "none" where none is held, and what there is then: the
+    energy (J) in the springs of the coupling, which a hand that lets go loses, and the handle's
+    kinetic energy (J), of which neither has a part in that of the mechanism; None without them."""
+
+    time: float
+    before: str
+    after: str
+    springs: float | None
+    handle: float | None
+
+
+def changes_of_point(results: Results) -> list[ChangeOfPoint]:
+    """The changes in the order of their times."""
+    table = of_block(results, HELD_POINT)
+    if table is None:
+        return []
+    names = (NO_POINT, *results.record.scene["linkage"]["points"])
+    time, held = table["time"], table[HELD_POINT].astype(int)
+    changes = []
+    for row in np.flatnonzero(np.diff(held)).tolist():
+        springs = _last(results, time[row], SPRING_ENERGY)
+        v, M = (_last(results, time[row], s) for s in (HANDLE_VELOCITY, HANDLE_INERTIA))
+        handle = None if v is None or M is None else float(v @ M @ v) / 2
+        before, after = (names[k] for k in held[row : row + 2].tolist())
+        stored = None if springs is None else float(springs)
+        changes.append(ChangeOfPoint(float(time[row]), before, after, stored, handle))
+    return changes
+
+
+def _last(results: Results, time: float, signal: str) -> Vector | None:
+    """The newest sample of a signal at a time (s)."""
+    if (table := of_any_shape(results, signal)) is None or not len(table["time"]):
+        return None
+    row = int(np.searchsorted(table["time"], time + 1e-12, "right")) - 1
+    sample: Vector = table[signal][row]
+    return sample
+
+
+def describe_changes(results: Results) -> Iterator[str]:
+    """A line for each change."""
+    for change in changes_of_point(results):
+        when = f"at {change.time:.4g} s"
+        if change.before == NO_POINT:
+            moves = "" if change.handle is None else _with_energy(change.handle)
+            yield f"the hand took hold of {change.after} {when}{moves}"
+            continue
+        after = "" if change.after == NO_POINT else f" for {change.after}"
+        lost = ""
+        if change.springs is not None:
+            lost = f": the {short(1e3 * change.springs)} mJ in the springs of the coupling are lost"
+        yield f"the hand let go of {change.before}{after} {when}{lost}"
+
+
+def _with_energy(handle: float) -> str:
+    return (
+        f", the coupling relaxed: the handle came with {short(1e3 * handle)} mJ of its own motion, "
+        "of which the mechanism may get a part"
+    )
