@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["projector", "semidefinite", "angle", "table"]
+Kind = Literal["projector", "semidefinite", "angle", "table", "count"]
 """The kind of an output whose entries cannot be extrapolated independently: an orthogonal
 projector, a symmetric positive semidefinite matrix, wrapped angles, or a table, whose rows are
-records and have no values between two samples."""
+records and have no values between two samples, nor have whole numbers, a count."""
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from hapticlink.orchestrator.results.read_results import Results, Vector
 
 
 class ChangeOfPoint(NamedTuple):
-    """The points before and after a time (s), "none" where none is held, and what there is then: the
-    energy (J) in the springs of the coupling, which a hand that lets go loses, and the handle's
-    kinetic energy (J), of which neither has a part in that of the mechanism; None without them."""
+    """The points before and after a time (s), "none" where none is held, and what there is then
+    beside the mechanism's energy, None without a device: the energy (J) in the springs of the
+    coupling, which a hand that lets go loses, and the handle's kinetic energy (J)."""
 
     time: float
     before: str

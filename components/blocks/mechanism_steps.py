@@ -161,10 +161,10 @@ class MechanismSteps(MechanicalSystem):
         model, wrench = self._model, self._block.u["F_hand"] - self._block.u["F_drift"]
         if model.point is None:
             return [(model.x_h, wrench)]
-        held = [(ca.SX(k + 1), model.point) for k in range(len(model.linkage.choices))]
+        choices = [ca.SX(k + 1) for k in range(len(model.linkage.choices))]
         return [
-            (model.pose_of_choice(k), ca.if_else(grasp.same(point, k), wrench, 0))
-            for k, point in held
+            (model.pose_of_choice(k), ca.if_else(grasp.same(model.point, k), wrench, 0))
+            for k in choices
         ]
 
     @cached_property

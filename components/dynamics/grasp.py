@@ -43,7 +43,7 @@ def start(linkage: Linkage) -> int:
 
 def number(linkage: Linkage, name: str, text: str) -> Variable:
     """A signal that is the number of a point. It has no values between its samples."""
-    return Variable(name, (), "1", float(start(linkage)), f"{text}, {_list(linkage)}", kind="table")
+    return Variable(name, (), "1", float(start(linkage)), f"{text}, {_list(linkage)}", kind="count")
 
 
 def _list(linkage: Linkage) -> str:

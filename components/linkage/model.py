@@ -240,10 +240,7 @@ class LinkageModel:
         pose = ca.SX(self.linkage.space.size, 1)
         for k, name in enumerate(self.linkage.choices, 1):
             there = self.pose(self.linkage.points[name].body, f"{name}.at")
-            if number.is_constant():
-                pose = there if int(number) == k else pose
-            else:
-                pose += ca.if_else(ca.fabs(number - k) < 0.5, there, 0)
+            pose += ca.if_else(ca.fabs(number - k) < 0.5, there, 0)
         return pose
 
     def pose(self, body: str, point: str) -> ca.SX:

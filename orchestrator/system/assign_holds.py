@@ -111,7 +111,7 @@ def _with_springs(
 
 def _has_rows(c: Connection) -> bool:
     """Whether there is nothing between its samples that a hold could make."""
-    return c.kind == "table" or c.outputs[0].type in ("Clock", *WRITTEN)
+    return c.kind in ("table", "count") or c.outputs[0].type in ("Clock", *WRITTEN)
 
 
 def why_unsuitable(
@@ -129,7 +129,7 @@ def why_unsuitable(
     if _has_rows(c) and not HOLDS[hold].gives_samples:
         able = ", ".join(HOLDS.names(lambda kind: kind.gives_samples))
         counts = "clock, whose counts" if c.outputs[0].type == "Clock" else "text, which can"
-        what = "table, whose rows" if c.kind == "table" else counts
+        what = {"table": "table, whose rows", "count": "count, which can"}.get(c.kind or "", counts)
         return f"{c.source_port} is a {what} have no values in between; take {able}"
     if needs == "derivative" and not companion_outputs(c, fmus, hold):
         return (
