@@ -13,6 +13,7 @@ from hapticlink.components.specs.quantities import Elapsed, Quantity, Seed
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
+from hapticlink.orchestrator.base.signal_names import CHOSEN_POINT
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.apply_changes import InputSetter
@@ -23,8 +24,10 @@ from hapticlink.orchestrator.scene.arguments import require, require_name
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.changes import (
+    OPERATIONAL_POINT,
     check_change,
     choices,
+    number_of_point,
     require_other_rate,
     settable,
 )
@@ -104,10 +107,13 @@ class LiveRun:
 
     def set(self, name: str, value: ArrayLike) -> None:
         """Set an input that nothing feeds, or a tunable parameter, `fmu.port`, from the FMU's next
-        step on; entries in the order of their indices, in the FMU's units. Raises InputFault for
+        step on; entries in the order of their indices, in the FMU's units. The value of
+        `linkage.operational_point` is the name of a point, or "none". Raises InputFault for
         other names, for gains of a spring whose energy `pspm` limits, and for values of another
         number or that are not finite."""
         self._require_running()
+        if name == OPERATIONAL_POINT:
+            name, value = CHOSEN_POINT, number_of_point(self.scene.linkage, value)
         fmu = require_name("input or parameter", name).partition(".")[0]
         if name not in self._setters:
             change = InputChange(self.time, f"{name} set", fmu, settable(self.system, name))

@@ -37,7 +37,7 @@ def changes_of_point(results: Results) -> list[ChangeOfPoint]:
     table = of_block(results, HELD_POINT)
     if table is None:
         return []
-    names = (NO_POINT, *results.record.scene["linkage"]["points"])
+    names = (NO_POINT, *sorted(results.record.scene["linkage"]["points"]))
     time, held = table["time"], table[HELD_POINT].astype(int)
     changes = []
     for row in np.flatnonzero(np.diff(held)).tolist():

@@ -261,8 +261,9 @@ class Linkage:
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """The names of the points between which the hand can change, none of a single one."""
-        return tuple(self.points) if len(self.points) > 1 else ()
+        """The names of the points between which the hand can change in the order of their numbers,
+        from 1, which is that of the alphabet; none of a single one."""
+        return tuple(sorted(self.points)) if len(self.points) > 1 else ()
 
     @property
     def held_name(self) -> str:

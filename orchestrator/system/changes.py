@@ -5,7 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.components.specs.linkage import NO_POINT, Linkage
+from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import Latency
@@ -13,6 +14,20 @@ from hapticlink.orchestrator.system.assign_holds import why_unsuitable
 from hapticlink.orchestrator.system.ports import power_across_rates, scalars_of
 from hapticlink.orchestrator.system.springs import find_limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
+
+OPERATIONAL_POINT = "linkage.operational_point"
+"""The key that is set to the name of a point while a scene runs."""
+
+
+def number_of_point(linkage: Linkage | None, name: object) -> int:
+    """The value of `virtual_mechanism.point` for a point in the hand. Raises InputFault for a name
+    that the linkage does not have."""
+    names = (NO_POINT, *(linkage.choices if linkage else ()))
+    if len(names) == 1:
+        raise InputFault("name the points that it changes between, [linkage.points.NAME]")
+    if name not in names:
+        raise InputFault(unknown("point", str(name), names))
+    return names.index(str(name))
 
 
 def settable(system: System, name: str) -> tuple[Scalar, ...]:

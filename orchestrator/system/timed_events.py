@@ -6,8 +6,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 
-from hapticlink.components.specs.linkage import NO_POINT
-from hapticlink.orchestrator.base.errors import shorten, unknown
+from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.base.signal_names import CHOSEN_POINT
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.transfer import as_signal
@@ -15,14 +14,16 @@ from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import TimedEvent, Value
 from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem
-from hapticlink.orchestrator.system.changes import feeding, settable
+from hapticlink.orchestrator.system.changes import (
+    OPERATIONAL_POINT,
+    feeding,
+    number_of_point,
+    settable,
+)
 from hapticlink.orchestrator.system.fmu_tables import entries_of
 from hapticlink.orchestrator.system.ports import carries_power, scalars_of
 from hapticlink.orchestrator.system.system import Connection, InputChange, System
 from hapticlink.orchestrator.system.timeline import GRAPHICS_RATE
-
-OPERATIONAL_POINT = "linkage.operational_point"
-"""The key that an event sets to the name of a point."""
 
 
 def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[InputChange, ...]:
@@ -65,7 +66,7 @@ class _Events:
     def set_value(self, event: TimedEvent, key: str, name: str, value: Value) -> InputChange:
         """A value that is set once, or that overrides a connection."""
         if name == OPERATIONAL_POINT and key == "set":
-            name, value = CHOSEN_POINT, self._number_of_point(value)
+            name, value = CHOSEN_POINT, number_of_point(self._scene.linkage, value)
         if name == GRAPHICS_RATE and key == "set":
             begin = self._begin("graphics", event.time)
             return InputChange(begin, f"{name} = {value} Hz")
@@ -85,15 +86,6 @@ class _Events:
         return self._change(
             event, name, text, inputs=scalars, values=_numbers(name, value, scalars)
         )
-
-    def _number_of_point(self, name: Value) -> int:
-        linkage = self._scene.linkage
-        names = (NO_POINT, *(linkage.choices if linkage else ()))
-        if len(names) == 1:
-            raise ValueError("name the points that it changes between, [linkage.points.NAME]")
-        if name not in names:
-            raise ValueError(unknown("point", str(name), names))
-        return names.index(str(name))
 
     def disturb(self, event: TimedEvent, name: str, noise: float) -> InputChange:
         """An input that is frozen, or gets noise."""

@@ -31,6 +31,13 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
     ("two-hands", {"mechanism.directions": True}),
     ("two-users", {"mechanism.directions": True}),
     ("two-hands", {"fmu": [WALL], "connection": [{"from": "hand.F", "to": "wall.v"}]}),
+    (
+        "closed-loop-ideal",
+        {
+            "linkage.points": {n: {"body": "link2"} for n in "ab"},
+            "linkage.operational_point": "a",
+        },
+    ),
     ("two-hands", {"linkage.joint.0.ports": ("effort", "position", "velocity")}),
 ]
 """Scenes that have every port among them; n = 4 joint coordinates and one loop, m = 2, in each."""

@@ -18,7 +18,7 @@ from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
 
 GAINS = (HAND, CONTROLLER)
 """Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""
-OTHERS = ("length_scale", "target", "rank_tolerance")
+OTHERS = ("length_scale", "target", "rank_tolerance", "point")
 """Tunable parameters of theirs that are none."""
 TOPOLOGY = ("k_j", "b_j")
 """The gains of the topology controller."""

@@ -23,8 +23,8 @@ from tests.blocks import Running, virtual_environment, virtual_mechanism
 H = 1 / 512
 M, INERTIA, C, L = (0.6, 0.4), (3e-3, 2e-3), 0.1, 0.25
 POINTS = {
-    "near": OperationalPoint(body="upper", at=(0.15, 0.02)),
-    "far": OperationalPoint(body="lower", at=(0.2, 0.0)),
+    "inner": OperationalPoint(body="upper", at=(0.15, 0.02)),
+    "outer": OperationalPoint(body="lower", at=(0.2, 0.0)),
 }
 ARM = Linkage(
     body=tuple(
@@ -35,7 +35,7 @@ ARM = Linkage(
         Joint(name="shoulder", child="upper"),
         Joint(name="elbow", parent="upper", child="lower", at_parent=(L, 0.0)),
     ),
-    operational_point="near",
+    operational_point="inner",
     points=POINTS,
     start={"shoulder": 0.3, "elbow": 0.7},
 )
@@ -77,9 +77,9 @@ def two_links(t, state, changes_at):
         return np.array([-s * at[0] - c * at[1], c * at[0] - s * at[1]])
 
     if t < changes_at:
-        Q = np.array([lever(q1, POINTS["near"].at) @ WRENCH[:2] + WRENCH[2], 0.0])
+        Q = np.array([lever(q1, POINTS["inner"].at) @ WRENCH[:2] + WRENCH[2], 0.0])
     else:
-        elbow, tip = lever(q1, (L, 0.0)), lever(q1 + q2, POINTS["far"].at)
+        elbow, tip = lever(q1, (L, 0.0)), lever(q1 + q2, POINTS["outer"].at)
         Q = np.array([(elbow + tip) @ WRENCH[:2], tip @ WRENCH[:2]]) + WRENCH[2]
     return [w1, w2, *np.linalg.solve(D, Q - coriolis)]
 
@@ -111,7 +111,7 @@ def test_from_a_change_on_the_wrench_acts_on_the_other_link(integrator):
 
 
 @pytest.mark.parametrize(
-    ("linkage", "names"), [(ARM, ("near", "far")), (five_bar("middle"), ("middle", "other"))]
+    ("linkage", "names"), [(ARM, ("inner", "outer")), (five_bar("middle"), ("middle", "other"))]
 )
 def test_a_changed_point_is_that_of_a_mechanism_that_has_it_from_the_start(linkage, names):
     parts = Mechanism(directions=True), Directions()

@@ -79,10 +79,10 @@ def test_of_two_links_the_other_is_pushed_from_the_change_on(tmp_path):
     text = """title = "Two links"
 duration = 0.5
 [linkage]
-operational_point = "near"
+operational_point = "inner"
 start = { shoulder = 0.3, elbow = 0.7 }
-points.near = { body = "upper", at = [0.15, 0.02] }
-points.far = { body = "lower", at = [0.2, 0.0] }
+points.inner = { body = "upper", at = [0.15, 0.02] }
+points.outer = { body = "lower", at = [0.2, 0.0] }
 body = [
   { name = "upper", mass = 0.6, inertia = 3e-3, center = [0.1, 0.0] },
   { name = "lower", mass = 0.4, inertia = 2e-3, center = [0.1, 0.0] },
@@ -96,14 +96,14 @@ wrench = [0.5, 0.2, 0.01]
 """
     path = tmp_path / "arm.toml"
     path.write_text(text)
-    event = {"time": 0.25, "set": {"linkage.operational_point": "far"}}
+    event = {"time": 0.25, "set": {"linkage.operational_point": "outer"}}
     run = hl.run(path, {"at": [event]}).haptics
     q, qd = ([run[f"virtual_mechanism.{n}[{i}]"] for i in (1, 2)] for n in ("q", "qd"))
     row, names = 128, ("shoulder", "elbow")
     assert run["time"][row] == event["time"]
     begin = {f"linkage.start.{n}": float(v[row]) for n, v in zip(names, q, strict=True)}
     begin |= {f"linkage.start_velocity.{n}": float(v[row]) for n, v in zip(names, qd, strict=True)}
-    from_there = hl.run(path, begin | {"linkage.operational_point": "far", "duration": 0.25})
+    from_there = hl.run(path, begin | {"linkage.operational_point": "outer", "duration": 0.25})
     for i, moved in enumerate(q, 1):
         found = from_there.haptics[f"virtual_mechanism.q[{i}]"]
         np.testing.assert_allclose(moved[row:], found, atol=1e-12)
@@ -123,6 +123,16 @@ wrench = [0.5, 0.2, 0.01]
 def test_points_that_are_not_there_are_refused(options, said):
     with pytest.raises(SceneFault, match=said):
         hl.run(SCENE, POINTS | options)
+
+
+def test_points_have_their_numbers_in_whatever_order_a_scene_names_them(changed):
+    points = POINTS["linkage.points"]
+    turned = POINTS | {"linkage.points": {name: points[name] for name in reversed(points)}}
+    asked = hl.run(
+        SCENE, turned | {"at": [{"time": LETS_GO, "set": {"virtual_mechanism.point": 2}}]}
+    )
+    for name in changed.haptics:
+        np.testing.assert_array_equal(changed.haptics[name], asked.haptics[name], name)
 
 
 def test_a_change_needs_points_with_names():
