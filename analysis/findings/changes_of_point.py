@@ -1,5 +1,5 @@
-"""When the hand let go of a point of the linkage and held another, and what the springs of the
-coupling lost by that."""
+"""When the hand let go of a point of the linkage and held another, and what the coupling lost by
+that."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from hapticlink.analysis.findings.tracking import of_any_shape, of_block
 from hapticlink.components.specs.linkage import NO_POINT
 from hapticlink.orchestrator.base.signal_names import (
+    COUPLING_ENERGY,
     HANDLE_INERTIA,
     HANDLE_VELOCITY,
     HELD_POINT,
-    SPRING_ENERGY,
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results, Vector
@@ -22,13 +22,13 @@ from hapticlink.orchestrator.results.read_results import Results, Vector
 
 class ChangeOfPoint(NamedTuple):
     """The points before and after a time (s), "none" where none is held, and what there is then
-    beside the mechanism's energy, None without a device: the energy (J) in the springs of the
-    coupling, which a hand that lets go loses, and the handle's kinetic energy (J)."""
+    beside the mechanism's energy, None without a device: the energy (J) stored in the coupling,
+    which a hand that lets go loses, and the handle's kinetic energy (J)."""
 
     time: float
     before: str
     after: str
-    springs: float | None
+    stored: float | None
     handle: float | None
 
 
@@ -41,11 +41,11 @@ def changes_of_point(results: Results) -> list[ChangeOfPoint]:
     time, held = table["time"], table[HELD_POINT].astype(int)
     changes = []
     for row in np.flatnonzero(np.diff(held)).tolist():
-        springs = _last(results, time[row], SPRING_ENERGY)
+        coupling = _last(results, time[row], COUPLING_ENERGY)
         v, M = (_last(results, time[row], s) for s in (HANDLE_VELOCITY, HANDLE_INERTIA))
         handle = None if v is None or M is None else float(v @ M @ v) / 2
         before, after = (names[k] for k in held[row : row + 2].tolist())
-        stored = None if springs is None else float(springs)
+        stored = None if coupling is None else float(coupling)
         changes.append(ChangeOfPoint(float(time[row]), before, after, stored, handle))
     return changes
 
@@ -69,8 +69,8 @@ def describe_changes(results: Results) -> Iterator[str]:
             continue
         after = "" if change.after == NO_POINT else f" for {change.after}"
         lost = ""
-        if change.springs is not None:
-            lost = f": the {short(1e3 * change.springs)} mJ in the springs of the coupling are lost"
+        if change.stored is not None:
+            lost = f": the {short(1e3 * change.stored)} mJ stored in the coupling are lost"
         yield f"the hand let go of {change.before}{after} {when}{lost}"
 
 

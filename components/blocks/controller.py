@@ -106,7 +106,7 @@ def _outputs(
         outputs += [Variable("F_constraint", *space.wrench, description=text)]
     if clutch:
         text = "energy in the springs of F_drift and F_T, lost where the hand lets go"
-        outputs += [Variable("spring_energy", (), "J", description=text)]
+        outputs += [Variable("coupling_energy", (), "J", description=text)]
     return outputs
 
 
@@ -163,7 +163,7 @@ def _wrenches(
     """u of the motors, before the passivity controller, with F_drift and F_T where they are."""
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
-    force, spring_energy = ca.SX.zeros(space.size), ca.SX(0)
+    force, coupling_energy = ca.SX.zeros(space.size), ca.SX(0)
 
     def held(wrench: ca.SX, otherwise: ca.SX | float = 0.0) -> ca.SX:
         """A wrench of the mechanism, and what stands in its place while no point is held."""
@@ -172,7 +172,7 @@ def _wrenches(
     if spec.teleoperation:
         e = space.difference(u["x_S"], u["x_D"])
         output["F_drift"] = p["K_pc"] * e
-        spring_energy += ca.dot(e, output["F_drift"]) / 2
+        coupling_energy += ca.dot(e, output["F_drift"]) / 2
         output["F_drift"] += p["B_pc"] * (u["v_S"] - u["v_D"])
         output["F_drift"] = held(output["F_drift"])
         force += output["F_drift"]
@@ -196,8 +196,8 @@ def _wrenches(
 
         e = space.difference(u["x_S"], u["x_D"])
         F_T = held(constrain(p["k_j"] * e + p["b_j"] * (u["v_S"] - u["v_D"])))
-        spring_energy += ca.dot(e, constrain(p["k_j"] * e)) / 2
+        coupling_energy += ca.dot(e, constrain(p["k_j"] * e)) / 2
         output["F_constraint"], motor = F_T, motor + F_T
     if grasp.HELD in u:
-        output["spring_energy"] = held(spring_energy)
+        output["coupling_energy"] = held(coupling_energy)
     return output | {"F_motor": motor}

@@ -53,7 +53,7 @@ def test_the_coupling_is_off_until_the_copy_has_the_other_point_and_then_relaxed
     assert np.abs(x_S - x_D - v_S / 512).max() < 0.2 * np.abs(v_S / 512).max()
 
 
-def test_no_energy_is_made_by_a_change_and_what_the_springs_lose_is_told(changed):
+def test_no_energy_is_made_by_a_change_and_what_the_coupling_loses_is_told(changed):
     port = user_port(changed)
     assert np.abs(port.blocks_J["mechanism"]).max() < 1e-8  # all that it has, wrenches brought it
     held = changed.haptics["virtual_mechanism.held_point"]
@@ -65,10 +65,10 @@ def test_no_energy_is_made_by_a_change_and_what_the_springs_lose_is_told(changed
     )[row]
     let_go, grasped = changes_of_point(changed)
     assert let_go[:3] == (LETS_GO, "middle", "none")
-    assert let_go.springs == pytest.approx(e @ (K * e) / 2, rel=1e-12)
-    assert (grasped.before, grasped.after, grasped.springs) == ("none", "other", 0.0)
+    assert let_go.stored == pytest.approx(e @ (K * e) / 2, rel=1e-12)
+    assert (grasped.before, grasped.after, grasped.stored) == ("none", "other", 0.0)
     told = [*describe_changes(changed)]
-    assert told[0].endswith("mJ in the springs of the coupling are lost")
+    assert told[0].endswith("mJ stored in the coupling are lost")
     assert told[1].startswith("the hand took hold of other at ")
     generated = port.generated_J[free]
     assert np.ptp(generated) < 1e-9  # while it holds nothing
