@@ -16,9 +16,7 @@ parameter; without the impedance part the wrenches act on the device as they are
 
     u = F_drift + F_env - B_d v - K_d (x - x_ref) + F_T
 
-While the hand holds no point of the mechanism (grasp.py), F_drift, F_env and F_T are 0 and the
-device has its own inertia, u = C_d v - B_d v - K_d (x - x_ref). Only a passivity controller has
-memory.
+Only a passivity controller has memory.
 """
 
 from __future__ import annotations
@@ -114,7 +112,10 @@ def controller(
     spec: Controller, space: PortSpace, length_scale: float, *, clutch: bool = False
 ) -> Component:
     """The controller of a port with the parts of `spec` that are on. length_scale is L (m). With a
-    clutch it has the input held_point (grasp.py).
+    clutch it has the input held_point (grasp.py): while the hand holds no point of the mechanism,
+    F_drift, F_env and F_T are 0 and the device has its own inertia,
+    u = C_d v - B_d v - K_d (x - x_ref). coupling_energy is that of the stiffnesses of F_drift and
+    F_T, e' K e/2.
 
     Raises ValueError for bias "full" without the impedance part, which carries it.
     """

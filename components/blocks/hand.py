@@ -3,8 +3,7 @@
 Sampled: F(t_k) from the handle's x and v at t_k. An arm or spring may be continuous instead, a
 plant with F(t_{k+1}) at the end of its step. F acts with + on the handle.
 
-Constant or over time: F = F(t) - B v; x is no input, and v only where there is damping. It is 0
-while the hand holds no point of a mechanism (grasp.py).
+Constant or over time: F = F(t) - B v; x is no input, and v only where there is damping.
 
 Arm: a mass that a spring and damper pull to a target path; F acts through the spring and damper of
 the grip, with the handle's x and v held over each step. It starts at the handle's x and v with
