@@ -21,7 +21,7 @@ const titled = (gain) => {
 
 // By the first part of the keys of controls: the group in which they are, in the order of the page.
 const GROUPS = {
-  graphics: "Rate", controller: "Controller", holds: "Holds, between the rates", gains: "Gains",
+  linkage: "Hand", graphics: "Rate", controller: "Controller", holds: "Holds, between the rates", gains: "Gains",
   jitter: "Expert: jitter, delays", delays: "Expert: jitter, delays",
 };
 const LEFT = -1.05; // of a gain's slider: 0, then 0.1 to 10 times the scene's value
@@ -65,12 +65,20 @@ export class Controls {
     this.updates[key] = ({ value }) => { input.checked = value; };
   }
 
-  holds({ key, words, choices }, connection) {
+  linkage(control) {
+    this.select(control);
+  }
+
+  holds(control, connection) {
+    this.select(control).textContent = connection.split(" -> ")[0].split(".").slice(1).join(" ");
+  }
+
+  select({ key, words, choices }) {
     const select = document.createElement("select");
     select.append(...[...choices].sort().map((name) => new Option(name, name)));
-    this.labelled(key, words, select).textContent = connection.split(" -> ")[0].split(".").slice(1).join(" ");
     select.addEventListener("change", () => this.send(set(key, select.value)));
     this.updates[key] = ({ value }) => { select.value = value; };
+    return this.labelled(key, words, select);
   }
 
   gains({ key, start, units }, name) {

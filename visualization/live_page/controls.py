@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hapticlink.components.specs.linkage import NO_POINT
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.real_time_session import LiveRun
-from hapticlink.orchestrator.system.changes import choices_between_rates
+from hapticlink.orchestrator.system.changes import OPERATIONAL_POINT, choices_between_rates
 from hapticlink.visualization.live_and_standalone.offered_controls import (
     CLOCK,
     JITTER,
@@ -42,7 +43,12 @@ class Controls:
 
     def described(self) -> list[dict[str, Any]]:
         """The controls, as JSON has them."""
-        return self._offered.described(self._settings)
+        linkage, controls = self._live.scene.linkage, self._offered.described(self._settings)
+        if linkage and linkage.choices:
+            value = self._settings.get(OPERATIONAL_POINT, linkage.held_name)
+            points = {"key": OPERATIONAL_POINT, "value": value, "words": "Point in the hand"}
+            controls.append(points | {"choices": [NO_POINT, *linkage.choices]})
+        return controls
 
     def apply(self, message: messages.Hand | messages.SetControl) -> None:
         """Change the run. Raises InputFault where the message does not fit this scene; nothing is
@@ -64,6 +70,8 @@ class Controls:
         kind, _, name = key.partition(".")
         if key == RATE:
             self._change_rate()
+        elif key == OPERATIONAL_POINT:
+            self._live.set(key, self._settings[key])
         elif kind == "holds":
             held: Any = (self._settings.get(f"{each}.{name}") for each in ("holds", "delays"))
             self._live.hold(name, *held)

@@ -59,6 +59,34 @@ def test_a_change_that_is_refused_is_not_kept() -> None:
     assert settings == {}
 
 
+POINTS = (
+    "linkage.points.middle={body='link2', at=[0.021, 0.0]}",
+    "linkage.points.other={body='link4', at=[0.02, 0.0]}",
+    "linkage.operational_point=middle",
+)
+
+
+def test_the_hand_takes_another_point_that_the_scene_names() -> None:
+    held: list[float] = []
+
+    def turn(live: hl.RealTime) -> None:
+        controls = Controls(live, {})
+        key = "linkage.operational_point"
+        control = next(c for c in controls.described() if c["key"] == key)
+        assert (control["choices"], control["value"]) == (["none", "middle", "other"], "middle")
+        if (number := live["virtual_mechanism.held_point"].item()) not in held:
+            held.append(number)
+        if live.time < 0.05:
+            with pytest.raises(hl.InputFault, match="no point 'tip'"):
+                controls.apply(SetControl("set", key, "tip"))
+            controls.apply(SetControl("set", key, "other"))
+        if held[-1] == 2.0:
+            live.stop()
+
+    ran("closed-loop-ideal", turn, *POINTS)
+    assert held == [1.0, 0.0, 2.0]
+
+
 def test_a_pull_is_read() -> None:
     assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
     other = '{"type": "hand", "at": null, "user": "left"}'
