@@ -10,13 +10,17 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT,
     HAND,
     MECHANISM,
+    MOTOR_MAP,
+    OBSERVER,
     user_of_block,
 )
 
 BLOCKS = {
     HAND: "hand",
     DEVICE: "device",
+    OBSERVER: "observer",
     CONTROLLER: "controller",
+    MOTOR_MAP: "motors",
     MECHANISM: "mechanism",
     ENVIRONMENT: "graphics copy",
 }
@@ -28,6 +32,7 @@ SIGNALS = {
     "F_env": "contact force",
     "F_constraint": "topology force",
     "Lambda_inv": "mobility",
+    "tau": "motor torques",
     "P_c": "constrained directions",
     "x": "pose",
     "v": "velocity",

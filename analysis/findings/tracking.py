@@ -17,7 +17,7 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
     HANDLE_POSE,
-    MEASURED_HANDLE_POSE,
+    MEASURED_HANDLE_POSES,
     MOTOR_WRENCH,
     PASSIVITY_DAMPING,
     PASSIVITY_ENERGY,
@@ -41,12 +41,11 @@ class Tracking(NamedTuple):
 @dataclass(frozen=True)
 class UserSignals:
     """The signals of a user, whose name is that of the point with the device, empty for the first
-    user: poses of point, handle and encoders, wrenches, and what device and controller tell."""
+    user: poses of point and handle, wrenches, and what device and controller tell."""
 
     name: str
     point: str
     handle: str
-    measured_handle: str
     hand: str
     drift: str
     topology: str
@@ -69,7 +68,6 @@ class UserSignals:
 SIGNALS = (
     POINT_POSE,
     HANDLE_POSE,
-    MEASURED_HANDLE_POSE,
     HAND_WRENCH,
     DRIFT_WRENCH,
     TOPOLOGY_WRENCH,
@@ -161,6 +159,13 @@ def count_constrained(results: Results) -> tuple[Vector, Vector] | None:
         if table := of_block(results, signal):
             return table["time"], table[signal]
     return None
+
+
+def find_measured_handle(results: Results, user: UserSignals) -> str | None:
+    """The signal of the pose of a user's handle as it is measured, by the observer where one is
+    beside the device; None where there is none."""
+    signals = (signal_of_user(signal, user.name) for signal in MEASURED_HANDLE_POSES)
+    return next((signal for signal in signals if of_port(results, signal)), None)
 
 
 def constraint_counts(numbers: Vector) -> dict[float, int]:

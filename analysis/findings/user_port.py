@@ -46,7 +46,7 @@ from hapticlink.orchestrator.base.signal_names import (
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
-    HANDLE_INERTIA,
+    HANDLE_INERTIAS,
     HANDLE_POSE,
     MECHANISM,
     MECHANISM_ENERGY,
@@ -202,7 +202,9 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
     where it is not held, or not by zoh, or the mechanism's own is not put out."""
     held, own = (of_block(results, signal, *PLANE.mobility.shape) for signal in MOBILITIES)
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
-    if not held or own is not device or results.record.holds.get(crossing) != "zoh":
+    inertias = (signal for signal in HANDLE_INERTIAS if signal in device)
+    inertia_of_handle = next(inertias, None)
+    if not held or own is not device or not inertia_of_handle or results.record.holds.get(crossing) != "zoh":
         return None
     times, mobility = held["time"], held[MOBILITIES[0]]
     signals = [s for s in (DRIFT_WRENCH, ENVIRONMENT_WRENCH) if s in device]
@@ -213,5 +215,5 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
         force: Vector = np.einsum("kij,kjl,kl->ki", inertia, change, wrench)
         return force.T
 
-    asked = "time", MOBILITIES[1], HANDLE_INERTIA, HAND_WRENCH, *signals
+    asked = "time", MOBILITIES[1], inertia_of_handle, HAND_WRENCH, *signals
     return np.ascontiguousarray(device.by_row(added, *asked).T)

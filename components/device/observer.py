@@ -1,6 +1,8 @@
-"""Nicosia observer: estimates device velocity and hand force from pose and motor torques.
+"""Nicosia observer: estimates device velocity, acceleration and hand force from the angles of the
+driven joints and the torques of their motors.
 
-The report's section 4.2.1 names it (after Nicosia & Tomei 1990) without equations or gains:
+The report's section 4.2.1 names it (after Nicosia & Tomei 1990) without equations or gains. On the
+pose x that belongs to the measured angles,
 
     x1' = x2 + k_D e,    M x2' = F_m - C x2 + K_p e,    e = x - x1,    K_p = M omega_n^2
 
@@ -11,12 +13,16 @@ For constant M and C = 0 the observed force follows
 
 M and C are constant over a step, so that any rule of `discretisation` applies to the linear system.
 At t = 0 x1 is the measured pose and x2 zero: no velocity, no force.
+
+`ForceObserver` knows a mass, `HandleObserver` any device by its kinematics. The latter is the
+observer within the device's block, and that of the block `observer` beside it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as ca
 
@@ -73,3 +79,79 @@ class ForceObserver:
         x2 itself is biased by k_D K_p^-1 F, with F the hand's wrench, which is no input.
         """
         return state.x2 + self.k_D * (pose - state.x1)
+
+
+Parameters = Mapping[str, ca.SX]
+
+
+class Kinematics(Protocol):
+    """What the observer asks of a device, as functions of its parameters p: `pantograph`. Poses and
+    velocities are (n,), angles and torques of the motors (m,)."""
+
+    def pose_from_angles(self, angles: ca.SX, guess: ca.SX, p: Parameters) -> ca.SX:
+        """The pose whose angles are nearest to those measured."""
+
+    def jacobian(self, pose: ca.SX, p: Parameters) -> ca.SX:
+        """Of the angles with respect to the pose, (m, n)."""
+
+    def dynamics(self, pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
+        """M and C, both (n, n)."""
+
+    def motion(self, pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
+        """M and the vector C v."""
+
+
+class Sample(NamedTuple):
+    """The measured pose (m, m, rad) at a sample, with x1 and x2 of the observer, each (n,)."""
+
+    pose: ca.SX
+    x1: ca.SX
+    x2: ca.SX
+
+    def states(self) -> dict[str, ca.SX]:
+        """By the names of `OBSERVER_STATES`."""
+        return {"x_measured": self.pose, "x_observer": self.x1, "v_observer": self.x2}
+
+
+@dataclass(frozen=True)
+class HandleObserver:
+    """The observer of a device with parameters p, `omega_n` and `k_D` among them, stepped by a rule
+    of `discretisation`."""
+
+    device: Kinematics
+    p: Parameters
+    rule: str
+
+    def start(self, angles: ca.SX, guess: ca.SX) -> Sample:
+        """The sample at rest, without a force, of measured angles (rad) near a guessed pose."""
+        pose = self.device.pose_from_angles(angles, guess, self.p)
+        return Sample(pose, pose, ca.SX.zeros(pose.numel()))
+
+    def advance(self, before: Sample, angles: ca.SX, tau: ca.SX, period: ca.SX) -> Sample:
+        """The sample of measured angles (rad), a `period` (s) after the one before, over which the
+        torques tau (N.m) were held."""
+        pose = self.device.pose_from_angles(angles, before.pose, self.p)
+        F_motor = self.device.jacobian(before.pose, self.p).T @ tau
+        M, C = self.device.dynamics(before.pose, before.x2, self.p)
+        state = State(before.x1, before.x2)
+        return Sample(pose, *self._law.step(state, before.pose, pose, F_motor, M, C, period))
+
+    def observed(self, sample: Sample) -> dict[str, ca.SX]:
+        """By the names of outputs: pose x, velocity v, F_hand_observed, and M and c = C v there."""
+        state = State(sample.x1, sample.x2)
+        v = self._law.velocity(state, sample.pose)
+        M, c = self.device.motion(sample.pose, v, self.p)
+        inertia, _ = self.device.dynamics(sample.pose, sample.x2, self.p)
+        F_hand = self._law.force(state, sample.pose, inertia)
+        return {"x": sample.pose, "v": v, "F_hand_observed": F_hand, "M": M, "c": c}
+
+    def acceleration(self, sample: Sample, tau: ca.SX) -> ca.SX:
+        """a = M^-1 (J_q' tau + F_hand_observed - C v) of (4.5) (m/s2, m/s2, rad/s2), (n,), at the
+        end of a period over which the torques tau (N.m) were held."""
+        seen = self.observed(sample)
+        F_motor = self.device.jacobian(sample.pose, self.p).T @ tau
+        return ca.solve(seen["M"], F_motor + seen["F_hand_observed"] - seen["c"])
+
+    @property
+    def _law(self) -> ForceObserver:
+        return ForceObserver(self.rule, self.p["omega_n"], self.p["k_D"])

@@ -50,6 +50,14 @@ def check_needed_tables(scene: Scene) -> Iterator[Problem]:
         yield ("hand",), "[hand] holds a device or a linkage: add one, or take it out"
     if scene.sensing == "encoders" and not scene.device:
         yield ("sensing",), "'encoders' are the device's: add [device], or take sensing out"
+    for user, device in scene.all_devices.items():
+        if device.observer.beside and scene.sensing == "ideal":
+            table: Path = ("devices", user) if user else ("device",)
+            message = (
+                "true, and with sensing = 'ideal' nothing is observed: take sensing = 'encoders', "
+                "or take it out"
+            )
+            yield (*table, "observer", "beside"), message
     if not scene.graphics:
         if scene.mechanism_at == "graphics":
             yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
