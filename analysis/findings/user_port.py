@@ -23,11 +23,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.port_blocks import by_block, needed_signals
+from hapticlink.analysis.findings.port_blocks import by_block, find_motor_port, needed_signals
 from hapticlink.analysis.findings.tracking import (
     FIRST,
     UserSignals,
     find_users,
+    of_any_shape,
     of_block,
     of_port,
     rows_until,
@@ -178,15 +179,15 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
     """The works (J) of single wrenches on the handles at the last of some times, those of further
     users named by their points, and of contacts on the mechanism."""
     found = {
-        f"{user.name}: {name}" if user.name else name: works.last(signal, user.handle)
+        f"{user.name}: {name}" if user.name else name: works.last(signal, moved)
         for user in find_users(results)
-        for name, signal in {
-            "hand": user.hand,
-            "motors": user.motors,
-            "F_T": user.topology,
-            "F_env": user.environment,
+        for name, (signal, moved) in {
+            "hand": (user.hand, user.handle),
+            "motors": find_motor_port(results, user),
+            "F_T": (user.topology, user.handle),
+            "F_env": (user.environment, user.handle),
         }.items()
-        if of_port(results, signal) and of_port(results, user.handle)
+        if of_any_shape(results, signal) and of_any_shape(results, moved)
     }
     if contact := of_port(results, ENVIRONMENT_WRENCH):
         done = work_of_source(time, contact, ENVIRONMENT_WRENCH, contact, POINT_POSE)
