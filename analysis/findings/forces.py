@@ -7,7 +7,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.tracking import UserSignals, find_measured_handle, find_users, of_block, of_port
+from hapticlink.analysis.findings.tracking import (
+    UserSignals,
+    find_measured_handle,
+    find_users,
+    of_block,
+    of_port,
+)
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.signal_names import (

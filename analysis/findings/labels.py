@@ -60,7 +60,7 @@ def connection(name: str) -> str:
         return name
     of, to = (end.partition(".")[0] for end in (source, target))
     at = f"the {known}" if (known := block(to)) else to
-    if ".F" in target:
+    if ".F" in target or target.endswith(".tau"):
         return f"{signal(source)} on {at}"
     return f"{signal(source)} of the {block(of)} to {at}" if block(of) else f"{source} to {at}"
 

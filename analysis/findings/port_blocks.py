@@ -32,7 +32,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import UserSignals, of_any_shape, of_port, table_of
+from hapticlink.analysis.findings.tracking import UserSignals, have_one_shape, of_port, table_of
 from hapticlink.analysis.findings.work_of_wrenches import Works
 from hapticlink.orchestrator.base.signal_names import (
     MOTOR_ANGLES,
@@ -83,7 +83,7 @@ def by_block(
         return works.of(signal, position)[1] if there else None
 
     def made_by_hold(signal: str, position: str) -> Vector | None:
-        there = of_any_shape(results, signal) and of_any_shape(results, position)
+        there = have_one_shape(results, signal, position)
         return np.subtract(*works.of(signal, position)) if there else None
 
     for user, done in put_in.items():

@@ -114,6 +114,13 @@ def of_any_shape(results: Results, signal: str) -> Table | None:
     return table_of(results, signal)
 
 
+def have_one_shape(results: Results, *signals: str) -> bool:
+    """Whether there are signals of the haptic loop, as efforts and displacements, of one shape."""
+    tables = [of_any_shape(results, signal) for signal in signals]
+    shapes = {table and table.shape(signal) for table, signal in zip(tables, signals, strict=True)}
+    return all(tables) and len(shapes) == 1
+
+
 def has_tracking(results: Results, user: UserSignals = FIRST) -> bool:
     """Whether there are the poses of a user's point and handle."""
     return all(of_port(results, signal) for signal in (user.point, user.handle))

@@ -28,7 +28,7 @@ from hapticlink.analysis.findings.tracking import (
     FIRST,
     UserSignals,
     find_users,
-    of_any_shape,
+    have_one_shape,
     of_block,
     of_port,
     rows_until,
@@ -187,7 +187,7 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
             "F_T": (user.topology, user.handle),
             "F_env": (user.environment, user.handle),
         }.items()
-        if of_any_shape(results, signal) and of_any_shape(results, moved)
+        if have_one_shape(results, signal, moved)
     }
     if contact := of_port(results, ENVIRONMENT_WRENCH):
         done = work_of_source(time, contact, ENVIRONMENT_WRENCH, contact, POINT_POSE)
@@ -203,9 +203,10 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
     where it is not held, or not by zoh, or the mechanism's own is not put out."""
     held, own = (of_block(results, signal, *PLANE.mobility.shape) for signal in MOBILITIES)
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
-    inertias = (signal for signal in HANDLE_INERTIAS if signal in device)
-    inertia_of_handle = next(inertias, None)
-    if not held or own is not device or not inertia_of_handle or results.record.holds.get(crossing) != "zoh":
+    if not held or own is not device or results.record.holds.get(crossing) != "zoh":
+        return None
+    inertia_of_handle = next((signal for signal in HANDLE_INERTIAS if signal in device), None)
+    if inertia_of_handle is None:
         return None
     times, mobility = held["time"], held[MOBILITIES[0]]
     signals = [s for s in (DRIFT_WRENCH, ENVIRONMENT_WRENCH) if s in device]

@@ -28,9 +28,9 @@ class Observer:
     k_D: Annotated[float, Quantity("1/s", gt=0)] = 100.0
     """Output gain."""
     beside: bool = False
-    """true: the observer is an FMU of its own, `observer`, and the device takes torques and puts out
-    base angles, as a device FMU from elsewhere does that is to be observed; the numbers are the
-    same. Needs sensing = "encoders"."""
+    """true: the observer is an FMU of its own beside the device, which takes torques and puts out
+    base angles, as a device from elsewhere does that is to be observed; the numbers are the same.
+    Needs sensing = "encoders"."""
 
 
 @dataclass(frozen=True, kw_only=True)

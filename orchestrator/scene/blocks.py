@@ -125,9 +125,9 @@ def _loop(scene: Scene, skip: bool) -> Iterator[BlockPlan]:
 def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
     for user, hand in scene.all_hands.items():
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", {"hand": hand})
-    beside = {user: {"device": scene.all_devices[user]} for user in observed_beside(scene)}
-    for user, settings in beside.items():
-        yield BlockPlan(block_of_user(OBSERVER, user), OBSERVER, "haptics", settings)
+    beside = {user: scene.all_devices[user] for user in observed_beside(scene)}
+    for user, device in beside.items():
+        yield BlockPlan(block_of_user(OBSERVER, user), OBSERVER, "haptics", {"device": device})
     for user, controller in scene.all_controllers.items():
         settings = {
             "controller": replace(controller, contact=True) if others(scene) else controller,
@@ -135,8 +135,8 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
             "linkage": scene.linkage,
         }
         yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
-    for user, settings in beside.items():
-        yield BlockPlan(block_of_user(MOTOR_MAP, user), MOTOR_MAP, "haptics", settings)
+    for user, device in beside.items():
+        yield BlockPlan(block_of_user(MOTOR_MAP, user), MOTOR_MAP, "haptics", {"device": device})
     for user, device in scene.all_devices.items():
         settings = {"device": device}
         if scene.sensing == "encoders":

@@ -33,6 +33,11 @@ CASES = {
     "encoders": (
         "closed-loop-direct", {**HELD, "graphics.rate": 128, "sensing": "encoders"}, NORM
     ),
+    "observer beside": (
+        "closed-loop-direct",
+        {**HELD, "graphics.rate": 128, "sensing": "encoders", "device.observer.beside": True},
+        NORM,
+    ),
     "graphics copy": ("closed-loop-ideal", {**HELD, "graphics.rate": 128}, NORM),
 }  # fmt: skip
 """Scene, options, and how many outputs of an FMU may have no slope at the equilibrium."""
