@@ -26,7 +26,7 @@ from hapticlink.components import integrators
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.device import pantograph
 from hapticlink.components.device.motors_and_encoders import count
-from hapticlink.components.device.observer import HandleObserver, Sample
+from hapticlink.components.device.observer import HandleObserver, ObservedHandle
 from hapticlink.components.device.variables import (
     ENCODERS,
     F_HAND_OBSERVED,
@@ -148,14 +148,14 @@ def _with_observer(device: Device) -> Component:
     )
     u, p = block.u, block.p
     observer = HandleObserver(pantograph, p, device.observer.rule)
-    now = Sample(*(block.x[state.name] for state in OBSERVER_STATES))
+    now = ObservedHandle.of(block.x)
     tau = pantograph.motor_torques(u["F_motor"], now.pose, p)
     motion = _motion(block, device, tau)
     first = observer.start(_measured(block, p["x_start"])[0], p["x_start"])
     after = observer.advance(now, _measured(block, motion["x_true"])[0], tau, block.h)
-    output = observer.observed(now)
+    output = observer.outputs(now)
     sensing = "encoders and observer"
-    return _component(block, sensing, first.states(), motion | after.states(), output)
+    return _component(block, sensing, first.states, motion | after.states, output)
 
 
 def _without_observer(device: Device) -> Component:

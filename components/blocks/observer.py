@@ -16,7 +16,7 @@ import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.device import pantograph
-from hapticlink.components.device.observer import HandleObserver, Sample
+from hapticlink.components.device.observer import HandleObserver, ObservedHandle
 from hapticlink.components.device.variables import (
     F_HAND_OBSERVED,
     GEOMETRY,
@@ -56,17 +56,17 @@ def observer(device: Device) -> Component:
     )
     x, u, p = block.x, block.u, block.p
     law = HandleObserver(pantograph, p, device.observer.rule)
-    before = Sample(*(x[state.name] for state in OBSERVER_STATES))
+    before = ObservedHandle.of(x)
     now = law.advance(before, u["q"], u["tau"], x["period"])
     first = law.start(u["q"], p["x_start"])
     # The first output advances the start by a period of 0, which finds the pose again from x_start.
-    initial = first._replace(pose=p["x_start"]).states() | {"period": ca.SX(0)}
+    initial = first._replace(pose=p["x_start"]).states | {"period": ca.SX(0)}
     return block.component(
         "observer",
         "Observer of a twin pantograph's handle and of the hand's wrench on it",
         "sampled",
         initial=initial,
-        step=now.states() | {"period": block.h},
-        output=law.observed(now) | {"a": law.acceleration(now, u["tau"])},
+        step=now.states | {"period": block.h},
+        output=law.outputs(now) | {"a": law.acceleration(now, u["tau"])},
         documentation=__doc__ or "",
     )

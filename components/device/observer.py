@@ -101,16 +101,22 @@ class Kinematics(Protocol):
         """M and the vector C v."""
 
 
-class Sample(NamedTuple):
-    """The measured pose (m, m, rad) at a sample, with x1 and x2 of the observer, each (n,)."""
+class ObservedHandle(NamedTuple):
+    """The measured pose (m, m, rad) at a sample, (n,), and the state of the observer there."""
 
     pose: ca.SX
-    x1: ca.SX
-    x2: ca.SX
+    state: State
 
+    @classmethod
+    def of(cls, x: Mapping[str, ca.SX]) -> ObservedHandle:
+        """That of a block with `OBSERVER_STATES`."""
+        return cls(x["x_measured"], State(x["x_observer"], x["v_observer"]))
+
+    @property
     def states(self) -> dict[str, ca.SX]:
         """By the names of `OBSERVER_STATES`."""
-        return {"x_measured": self.pose, "x_observer": self.x1, "v_observer": self.x2}
+        x1, x2 = self.state
+        return {"x_measured": self.pose, "x_observer": x1, "v_observer": x2}
 
 
 @dataclass(frozen=True)
@@ -122,34 +128,34 @@ class HandleObserver:
     p: Parameters
     rule: str
 
-    def start(self, angles: ca.SX, guess: ca.SX) -> Sample:
-        """The sample at rest, without a force, of measured angles (rad) near a guessed pose."""
+    def start(self, angles: ca.SX, guess: ca.SX) -> ObservedHandle:
+        """The handle at rest, without a force, with measured angles (rad) near a guessed pose."""
         pose = self.device.pose_from_angles(angles, guess, self.p)
-        return Sample(pose, pose, ca.SX.zeros(pose.numel()))
+        return ObservedHandle(pose, State(pose, ca.SX.zeros(pose.numel())))
 
-    def advance(self, before: Sample, angles: ca.SX, tau: ca.SX, period: ca.SX) -> Sample:
-        """The sample of measured angles (rad), a `period` (s) after the one before, over which the
-        torques tau (N.m) were held."""
+    def advance(
+        self, before: ObservedHandle, angles: ca.SX, tau: ca.SX, period: ca.SX
+    ) -> ObservedHandle:
+        """The handle with measured angles (rad), a `period` (s) after a sample before it, over
+        which the torques tau (N.m) were held."""
         pose = self.device.pose_from_angles(angles, before.pose, self.p)
         F_motor = self.device.jacobian(before.pose, self.p).T @ tau
-        M, C = self.device.dynamics(before.pose, before.x2, self.p)
-        state = State(before.x1, before.x2)
-        return Sample(pose, *self._law.step(state, before.pose, pose, F_motor, M, C, period))
+        M, C = self.device.dynamics(before.pose, before.state.x2, self.p)
+        step = self._law.step(before.state, before.pose, pose, F_motor, M, C, period)
+        return ObservedHandle(pose, step)
 
-    def observed(self, sample: Sample) -> dict[str, ca.SX]:
-        """By the names of outputs: pose x, velocity v, F_hand_observed, and M and c = C v there."""
-        state = State(sample.x1, sample.x2)
-        v = self._law.velocity(state, sample.pose)
-        M, c = self.device.motion(sample.pose, v, self.p)
-        inertia, _ = self.device.dynamics(sample.pose, sample.x2, self.p)
-        F_hand = self._law.force(state, sample.pose, inertia)
-        return {"x": sample.pose, "v": v, "F_hand_observed": F_hand, "M": M, "c": c}
+    def outputs(self, now: ObservedHandle) -> dict[str, ca.SX]:
+        """By name: pose x, velocity v, F_hand_observed, and M and c = C v there."""
+        v = self._law.velocity(now.state, now.pose)
+        M, c = self.device.motion(now.pose, v, self.p)
+        F_hand = self._law.force(now.state, now.pose, M)
+        return {"x": now.pose, "v": v, "F_hand_observed": F_hand, "M": M, "c": c}
 
-    def acceleration(self, sample: Sample, tau: ca.SX) -> ca.SX:
+    def acceleration(self, now: ObservedHandle, tau: ca.SX) -> ca.SX:
         """a = M^-1 (J_q' tau + F_hand_observed - C v) of (4.5) (m/s2, m/s2, rad/s2), (n,), at the
         end of a period over which the torques tau (N.m) were held."""
-        seen = self.observed(sample)
-        F_motor = self.device.jacobian(sample.pose, self.p).T @ tau
+        seen = self.outputs(now)
+        F_motor = self.device.jacobian(now.pose, self.p).T @ tau
         return ca.solve(seen["M"], F_motor + seen["F_hand_observed"] - seen["c"])
 
     @property
