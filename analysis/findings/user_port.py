@@ -29,6 +29,7 @@ from hapticlink.analysis.findings.tracking import (
     UserSignals,
     find_users,
     have_one_shape,
+    of_any_shape,
     of_block,
     of_port,
     rows_until,
@@ -205,7 +206,8 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
     if not held or own is not device or results.record.holds.get(crossing) != "zoh":
         return None
-    inertia_of_handle = next((signal for signal in HANDLE_INERTIAS if signal in device), None)
+    inertias = (signal for signal in HANDLE_INERTIAS if of_any_shape(results, signal) is device)
+    inertia_of_handle = next(inertias, None)
     if inertia_of_handle is None:
         return None
     times, mobility = held["time"], held[MOBILITIES[0]]
