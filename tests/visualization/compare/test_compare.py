@@ -227,7 +227,7 @@ def test_a_run_json_that_was_changed_is_bad_input(
         (
             "\n0.001953125,",
             "\n0.001953125,7,",
-            "haptics.csv: line 3 has 67 values, not 66: run the",
+            "haptics.csv: line 3 has 64 values, not 63: run the",
         ),
         ("\n0.001953125,", "\nabc,", "haptics.csv: line 3: time = 'abc' is no number: run the"),
         ("\n0.00390625,", "\n0.001,", "line 4: time = 0.001 s is before that of the line above"),
