@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5049,
+    "components": 5198,
     "fmus": 2736,
-    "orchestrator": 12242,
+    "orchestrator": 12279,
     "programs": 1114,
-    "analysis": 6618,
-    "visualization": 3127,
+    "analysis": 6639,
+    "visualization": 3133,
     "api": 402,
     "commands": 1345,
 }
