@@ -31,7 +31,7 @@ Benchmark = Literal[
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores: it
 measures, writes tables and figures into a folder, and returns the page."""
-PAGES = {"stress": "stability/stress.md"}
+PAGES = {"stress": "stability/stress.md", "study": "mismatch/README.md"}
 """Pages in results/ that are not the README.md of a folder named like the benchmark."""
 
 
@@ -67,9 +67,8 @@ def bench(
     results = checkout.folder("bench") / "results"
     if what is None:
         status = checkout.function("bench", "benchmarks.code_version:status")
-        print(
-            *status(results, {each: _page(results, each) for each in get_args(Benchmark)}), sep="\n"
-        )
+        pages = {each: _page(results, each) for each in (*get_args(Benchmark), "study")}
+        print(*status(results, pages), sep="\n")
         return 0
     make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
     page = _page(results, what)
