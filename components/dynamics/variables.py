@@ -10,6 +10,7 @@ from hapticlink.components.linkage.parameters import (
     coordinates,
     mean_link_length,
 )
+from hapticlink.components.parts import Part
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
@@ -106,3 +107,22 @@ def direction_outputs(space: PortSpace, user: str = "") -> list[Variable]:
         Variable(f"{prefix}P_c", *space.projector, description=text, kind="projector"),
         Variable(f"{prefix}n_constraints", description=f"number of constrained directions{at}"),
     ]
+
+
+def operational_point(gives: tuple[str, ...]) -> Part:
+    """The transformation T from joint coordinates to the operational point."""
+    law = r"$x = r_h(q),\ v = J_h \dot{q}$"
+    return Part("operational point (T)", law, "(2.16), fig. 4.4", ("q", "qd"), gives)
+
+
+def mobility_part(gives: tuple[str, ...], reads: tuple[str, ...] = ("q",)) -> Part:
+    """Lambda^-1 at the operational point and at further ones."""
+    law = r"$\Lambda^{-1} = J_h D^{-1} (J_h^T - W^T$" "\n" r"$(W D^{-1} W^T)^{-1} W D^{-1} J_h^T)$"
+    return Part("mobility", law, "(B.13)", reads, gives)
+
+
+def directions_part(reads: tuple[str, ...], gives: tuple[str, ...]) -> Part:
+    """The constrained directions of a mobility."""
+    law = r"$P_c$: projector on null$(S \Lambda^{-1} S)$"
+    gains = ("length_scale", "rank_tolerance", "hysteresis")
+    return Part("constrained directions", law, "in place of (B.14)", (*reads, *gains), gives)
