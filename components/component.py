@@ -21,7 +21,7 @@ from typing import Literal
 
 import casadi as ca
 
-from hapticlink.components.parts import Part, require_complete
+from hapticlink.components.parts import BlockPart, require_complete
 from hapticlink.components.ports import Kind, Power, SpringPorts
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
@@ -180,7 +180,7 @@ class Component:
     """The look-ups of tables that the functions call."""
     state_notes: Mapping[str, str] = field(default_factory=dict)
     """By the name of a state: the cause to report if it is not finite."""
-    parts: tuple[Part, ...] = ()
+    parts: tuple[BlockPart, ...] = ()
     """Those that its schematic shows, in the order of their evaluation; none if it has none."""
 
     @cached_property
@@ -242,7 +242,7 @@ class Block:
         springs: Iterable[SpringPorts] = (),
         shared: bool = False,
         signals: Iterable[TimeSignal] = (),
-        parts: Iterable[Part] = (),
+        parts: Iterable[BlockPart] = (),
     ) -> Component:
         """The component with the given expressions: step and output in this block's symbols,
         initial in u and p only; signals are those over time that they read.

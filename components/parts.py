@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Part:
+class BlockPart:
     """A part of a block: its equation, and the signals that it reads and gives."""
 
     name: str
@@ -26,7 +26,7 @@ class Part:
 
 
 def require_complete(
-    parts: Iterable[Part],
+    parts: Iterable[BlockPart],
     given: Collection[str],
     states: Collection[str],
     outputs: Collection[str],

@@ -27,7 +27,7 @@ import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
-from hapticlink.components.parts import Part
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import SpringPorts
 from hapticlink.components.specs.control import Controller, PassivityLaw, Topology
@@ -149,12 +149,12 @@ def controller(spec: Controller, space: PortSpace, length_scale: float) -> Compo
 
 def _wrenches(
     spec: Controller, space: PortSpace, law: Topology | None, block: Block
-) -> tuple[dict[str, ca.SX], list[Part]]:
+) -> tuple[dict[str, ca.SX], list[BlockPart]]:
     """u of the motors, before the passivity controller, with F_drift and F_T where they are; and
     the parts that make them, of which the last gives F_motor."""
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
-    parts, terms, reads = list[Part](), "", list[str]()
+    parts, terms, reads = list[BlockPart](), "", list[str]()
     force = ca.SX.zeros(space.size)
     apart = ("x_S", "v_S", "x_D", "v_D")
     if spec.teleoperation:
@@ -164,7 +164,7 @@ def _wrenches(
         law_text = r"$F_{drift} = K_{pc} (x_S - x_D)$" "\n" r"$+ B_{pc} (v_S - v_D)$"
         gains = (*apart, "K_pc", "B_pc")
         parts.append(
-            Part("position channels", law_text, "sections 4.2.3, B.6", gains, ("F_drift",))
+            BlockPart("position channels", law_text, "sections 4.2.3, B.6", gains, ("F_drift",))
         )
         terms, reads = " + F_{drift}", ["F_drift"]
     if spec.contact:
@@ -186,7 +186,7 @@ def _wrenches(
             a += u["a_bias"]
             desired, reads = desired + "\n" r"$+ a_{bias}$", [*reads, "a_bias"]
         motor = u["M"] @ a + u["c"] - u["F_hand"]
-        parts.append(Part("desired motion", desired, "(4.3), (4.4)", tuple(reads), ("a",)))
+        parts.append(BlockPart("desired motion", desired, "(4.3), (4.4)", tuple(reads), ("a",)))
         summed, reads = "M_d a + C_d v - F_h", ["M", "a", "c", "F_hand"]
     if law:
         pull = p["k_j"] * space.difference(u["x_S"], u["x_D"])
@@ -195,9 +195,13 @@ def _wrenches(
         output["F_constraint"], motor = F_T, motor + F_T
         pulled = (*apart, "M", "P_c", "k_j", "b_j", "length_scale")
         parts.append(
-            Part("topology controller", topology.LAW, "section 4.2.4", pulled, ("F_constraint",))
+            BlockPart(
+                "topology controller", topology.LAW, "section 4.2.4", pulled, ("F_constraint",)
+            )
         )
         summed, reads = f"{summed} + F_T", [*reads, "F_constraint"]
     name, source = ("impedance law", "(4.6), corrected") if spec.impedance else ("sum", "")
-    parts.append(Part(name, f"$u = {summed}$", source, tuple(dict.fromkeys(reads)), ("F_motor",)))
+    parts.append(
+        BlockPart(name, f"$u = {summed}$", source, tuple(dict.fromkeys(reads)), ("F_motor",))
+    )
     return output | {"F_motor": motor}, parts

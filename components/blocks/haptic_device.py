@@ -21,7 +21,7 @@ from hapticlink.components.component import Block, Component, Variability, Varia
 from hapticlink.components.device import pantograph
 from hapticlink.components.device.motors_and_encoders import quantised
 from hapticlink.components.device.observer import ForceObserver, State
-from hapticlink.components.parts import Part
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.device import Device
@@ -163,18 +163,18 @@ class _Encoders:
         return {"x_measured": pose, "x_observer": after.x1, "v_observer": after.x2}
 
 
-_MATRICES = Part("inertia", r"$M_d(x),\ c = C_d(x, v)\,v$", "(4.5)", ("x", "v"), ("M", "c"))
-_IDEAL = Part(
+_MATRICES = BlockPart("inertia", r"$M_d(x),\ c = C_d(x, v)\,v$", "(4.5)", ("x", "v"), ("M", "c"))
+_IDEAL = BlockPart(
     "ideal sensing", r"$x = x_D,\ v = v_D$", "",
     ("x_true", "v_true", "F_hand"), ("x", "v", "F_hand_observed"),
 )  # fmt: skip
 _SENSED = (
-    Part(
+    BlockPart(
         "encoders", r"$x = \arg\min_x \|\varphi(x)$" "\n" r"$- \Delta\,[\varphi(x_D) / \Delta]\|$",
         "section 4.2.1, fig. 4.2",
         ("x_true", "encoder_resolution"), ("x", "x_measured"),
     ),
-    Part(
+    BlockPart(
         "Nicosia observer",
         r"$\dot{x}_1 = x_2 + k_D e,\ e = x - x_1$" "\n"
         r"$M_d \dot{x}_2 = J_q^T \tau - C_d x_2 + M_d \omega_n^2 e$" "\n"
@@ -185,20 +185,20 @@ _SENSED = (
 )  # fmt: skip
 
 
-def _schematic(block: Block, encoders: bool) -> list[Part]:
+def _schematic(block: Block, encoders: bool) -> list[BlockPart]:
     """The parts, in the order of their evaluation."""
     p = block.p
     tau = r"(\tau + \tau_f)" if "motor_friction" in p else r"\tau"
     friction = tuple(name for name, *_ in _FRICTION if name in p)
     stops = ("reach_limit", "stop_stiffness", "stop_damping")
     return [
-        Part(
+        BlockPart(
             "motors",
             r"$\tau = J_q^{T+} u$, at most" "\n" r"$|\tau_i| \leq \tau_{max}$",
             "section 4.2.1, fig. 4.2",
             ("F_motor", "x", "torque_limit"), ("tau",),
         ),
-        Part(
+        BlockPart(
             "twin pantograph",
             rf"$M_d \dot{{v}} + C_d v = J_q^T {tau}$" "\n" r"$+ F_h + F_{stops}$",
             "(4.5)",

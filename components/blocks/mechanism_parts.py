@@ -12,14 +12,16 @@ from hapticlink.components.dynamics.variables import (
     mobility_part,
     operational_point,
 )
-from hapticlink.components.parts import Part
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 
 _EFFORTS = (".F_hand", ".F_drift", ".effort")
 """How the inputs end by which others than the operational point's hand act on the linkage."""
 
 
-def mechanism_parts(block: Block, linkage: Linkage, mechanism: Mechanism, alpha: str) -> list[Part]:
+def mechanism_parts(
+    block: Block, linkage: Linkage, mechanism: Mechanism, alpha: str
+) -> list[BlockPart]:
     """The parts, in the order of their evaluation. alpha: by which default Baumgarte's alpha comes
     about, in words; "" if the scene gives it."""
     return [*_MechanismParts(block, linkage, mechanism, alpha)]
@@ -62,29 +64,31 @@ class _MechanismParts:
         """The outputs of these names, of the operational point and of further ones."""
         return tuple(o for o in self._outputs if o.rsplit(".", 1)[-1] in names)
 
-    def __iter__(self) -> Iterator[Part]:
+    def __iter__(self) -> Iterator[BlockPart]:
         yield self._terms()
         x = self._block.x
         if kinds := self._forces():
             states = tuple(name for name in ("deflection",) if name in x)
             text = ", ".join(kinds)
-            yield Part("forces of the linkage", text, "g of (2.3)", ("q", "qd"), ("Q", *states))
+            yield BlockPart(
+                "forces of the linkage", text, "g of (2.3)", ("q", "qd"), ("Q", *states)
+            )
         if self._touching:
             yield from self._contacts()
         if self._stabilised:
             law = r"$w_{stab} = w + 2 \alpha \beta \dot{h} + \alpha^2 h$"
             reads = ("w", "h", *(name for name in ("alpha", "beta") if name in self._block.p))
             text = f"{law}\n{self._alpha}" if self._alpha else law
-            yield Part("Baumgarte stabilisation", text, "(3.5), fig. 3.5", reads, ("w_stab",))
+            yield BlockPart("Baumgarte stabilisation", text, "(3.5), fig. 3.5", reads, ("w_stab",))
         yield from self._motion()
         yield operational_point(self._ending("x", "v", "position", "velocity"))
         law = r"$\Lambda^{-1} F_{env} = J_h \ddot{q}$ of the others"
         reads = (*self._pushes, *self._others)
         if "F_env" in self._outputs:
-            yield Part("wrench of others", law, "section 4.2.2", reads, ("F_env",))
+            yield BlockPart("wrench of others", law, "section 4.2.2", reads, ("F_env",))
         if further := tuple(o for o in self._ending("F_env") if o != "F_env"):
             reads = (*reads, "F_hand", "F_drift")
-            yield Part("wrench of others, further points", law, "", reads, further)
+            yield BlockPart("wrench of others, further points", law, "", reads, further)
         if mobilities := self._ending("Lambda_inv"):
             held = tuple(name for name in self._matrices if self._held)
             yield mobility_part(mobilities, held or ("q",))
@@ -94,54 +98,54 @@ class _MechanismParts:
             )
             yield directions_part(mobilities, found)
         if found := self._ending("rank", "condition"):
-            yield Part(
+            yield BlockPart(
                 "diagnostics", r"rank and condition of $W D^{-1} W^T$", "", ("D", "W"), found
             )
 
-    def _terms(self) -> Part:
+    def _terms(self) -> BlockPart:
         """The terms of the equations at the mechanism's own pose."""
         gaps = ("h", "closure_error") if self._linkage.closed else ()
         energy = () if self._touching else ("energy",)
         if self._held:
             law = r"$h(q),\ \dot{h},\ E$" if gaps else r"$E(q, \dot{q})$"
-            return Part("own pose", law, "fig. B.3", ("q", "qd"), (*gaps, *energy))
+            return BlockPart("own pose", law, "fig. B.3", ("q", "qd"), (*gaps, *energy))
         law = r"$D(q),\ C \dot{q},\ J_h$" + (
             "\n" r"$h(q),\ W,\ w = \dot{W} \dot{q}$" if gaps else ""
         )
         source = "(2.3), (3.2), App. A" if gaps else "(2.3)"
-        return Part("linkage", law, source, ("q", "qd"), (*self._matrices, *gaps, *energy))
+        return BlockPart("linkage", law, source, ("q", "qd"), (*self._matrices, *gaps, *energy))
 
-    def _contacts(self) -> Iterator[Part]:
+    def _contacts(self) -> Iterator[BlockPart]:
         x, u = self._block.x, self._block.u
         states = tuple(name for name in ("contact_deflection", NAME) if name in x)
         geometry = tuple(name for name in ("contacts",) if name in u)
         gives = ("Q_c", *self._ending("contact_gap"), *states)
         text = r"$\sum J_i^T F_i$ of" f"\n{' and '.join(self._touching)}"
-        yield Part("contact forces", text, "(B.1)", ("q", "qd", *geometry), gives)
-        yield Part("energy", r"$E = T + V$", "", ("q", "qd", *geometry), ("energy",))
+        yield BlockPart("contact forces", text, "(B.1)", ("q", "qd", *geometry), gives)
+        yield BlockPart("energy", r"$E = T + V$", "", ("q", "qd", *geometry), ("energy",))
 
-    def _motion(self) -> Iterator[Part]:
+    def _motion(self) -> Iterator[BlockPart]:
         """The equations of motion, and their integration."""
         acts = (*self._matrices, *self._pushes, "F_hand", "F_drift", *self._others)
         put_out = self._ending("qdd", "lambda", "a_bias")
         if self._stabilised:
             stable = tuple("w_stab" if name == "w" else name for name in acts)
-            yield Part("equations of motion", *self._law("w_{stab}"), stable, ("a",))
+            yield BlockPart("equations of motion", *self._law("w_{stab}"), stable, ("a",))
             law = r"$\ddot{q},\ \lambda$ of $W \ddot{q} + w = 0$"
-            outputs = Part("put out, unstabilised", law, "(3.1)", acts, put_out)
+            outputs = BlockPart("put out, unstabilised", law, "(3.1)", acts, put_out)
             acceleration = "a"
         else:
-            yield Part("equations of motion", *self._law("w"), acts, put_out)
+            yield BlockPart("equations of motion", *self._law("w"), acts, put_out)
             outputs, acceleration = None, "qdd"
         projected = self._linkage.closed and self._mechanism.stabilization == "projection"
         free = ("q_free", "qd_free") if projected else ("q", "qd")
         counters = self._block.x.keys() & {*self._outputs} - {"q", "qd"}
         steps = f"\n{self._mechanism.substeps} substeps" * (self._mechanism.substeps > 1)
         text, gives = f"{self._mechanism.integrator}{steps}", (*free, *sorted(counters))
-        yield Part("integrator", text, "fig. 3.2", (acceleration, "q", "qd"), gives)
+        yield BlockPart("integrator", text, "fig. 3.2", (acceleration, "q", "qd"), gives)
         if projected:
             law = r"$q - A h,\ \dot{q} - A W \dot{q}$" "\n" r"$A = D^{-1} W^T (W D^{-1} W^T)^{-1}$"
-            yield Part("projection", law, "in place of (3.3)", free, ("q", "qd"))
+            yield BlockPart("projection", law, "in place of (3.3)", free, ("q", "qd"))
         if outputs:
             yield outputs
 

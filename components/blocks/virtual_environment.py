@@ -36,7 +36,7 @@ from hapticlink.components.dynamics.variables import (
 from hapticlink.components.linkage import branch
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import coordinates
-from hapticlink.components.parts import Part
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage
 
@@ -157,7 +157,7 @@ def _outputs(
     ]
 
 
-def _schematic(block: Block, copy: GraphicsCopy) -> list[Part]:
+def _schematic(block: Block, copy: GraphicsCopy) -> list[BlockPart]:
     """The parts, in the order of their evaluation; what is no output of the block has none."""
     outputs = [v.name for v in block.outputs]
     parts = [*follow_mechanism.parts(copy), operational_point(("x", "v"))]
@@ -171,7 +171,7 @@ def _schematic(block: Block, copy: GraphicsCopy) -> list[Part]:
     if "contacts" in outputs:
         kept = tuple(name for name in block.x if name == kept_sides.NAME)
         parts.append(
-            Part(
+            BlockPart(
                 "contact geometry",
                 "gaps, normals, places",
                 "section 4.2.2",
@@ -182,11 +182,13 @@ def _schematic(block: Block, copy: GraphicsCopy) -> list[Part]:
     if matrices := tuple(name for name in ("D", "W", "w", "J_h") if name in outputs):
         text = ", ".join(held_matrices.SYMBOLS[name] for name in matrices)
         parts.append(
-            Part("local model's matrices", f"${text}$", "(B.15), fig. B.3", ("q", "qd"), matrices)
+            BlockPart(
+                "local model's matrices", f"${text}$", "(B.15), fig. B.3", ("q", "qd"), matrices
+            )
         )
     if "branch_ok" in outputs:
         text = r"$\mathrm{sign}\,\det W_d$, $\|q_{ref} - q\|$"
-        parts.append(Part("branch", text, "", ("q", "q_ref"), ("branch_ok", "q_error")))
+        parts.append(BlockPart("branch", text, "", ("q", "q_ref"), ("branch_ok", "q_error")))
     return parts
 
 

@@ -10,7 +10,7 @@ from hapticlink.components.linkage.parameters import (
     coordinates,
     mean_link_length,
 )
-from hapticlink.components.parts import Part
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
@@ -109,20 +109,20 @@ def direction_outputs(space: PortSpace, user: str = "") -> list[Variable]:
     ]
 
 
-def operational_point(gives: tuple[str, ...]) -> Part:
+def operational_point(gives: tuple[str, ...]) -> BlockPart:
     """The transformation T from joint coordinates to the operational point."""
     law = r"$x = r_h(q),\ v = J_h \dot{q}$"
-    return Part("operational point (T)", law, "(2.16), fig. 4.4", ("q", "qd"), gives)
+    return BlockPart("operational point (T)", law, "(2.16), fig. 4.4", ("q", "qd"), gives)
 
 
-def mobility_part(gives: tuple[str, ...], reads: tuple[str, ...] = ("q",)) -> Part:
+def mobility_part(gives: tuple[str, ...], reads: tuple[str, ...] = ("q",)) -> BlockPart:
     """Lambda^-1 at the operational point and at further ones."""
     law = r"$\Lambda^{-1} = J_h D^{-1} (J_h^T - W^T$" "\n" r"$(W D^{-1} W^T)^{-1} W D^{-1} J_h^T)$"
-    return Part("mobility", law, "(B.13)", reads, gives)
+    return BlockPart("mobility", law, "(B.13)", reads, gives)
 
 
-def directions_part(reads: tuple[str, ...], gives: tuple[str, ...]) -> Part:
+def directions_part(reads: tuple[str, ...], gives: tuple[str, ...]) -> BlockPart:
     """The constrained directions of a mobility."""
     law = r"$P_c$: projector on null$(S \Lambda^{-1} S)$"
     gains = ("length_scale", "rank_tolerance", "hysteresis")
-    return Part("constrained directions", law, "in place of (B.14)", (*reads, *gains), gives)
+    return BlockPart("constrained directions", law, "in place of (B.14)", (*reads, *gains), gives)

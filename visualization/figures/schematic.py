@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hapticlink.components.component import Component, Variable
-    from hapticlink.components.parts import Part
+    from hapticlink.components.parts import BlockPart
     from hapticlink.orchestrator.system.system import System
 
 WIDTH = 2.2
@@ -38,7 +38,7 @@ def figures(scene: Scene, system: System) -> dict[str, Figure]:
     """By the name of its file, the inside of each block of the scene that is built from a component
     with parts; and of the blocks of TOGETHER where the scene has them, without parts that give only
     what no block reads."""
-    components = {plan.name: component(plan.block, plan.settings) for plan in blocks(scene).own}
+    components = {plan.name: component(plan.block, plan.settings) for plan in blocks(scene).built}
     drawn = {name: found for name, found in components.items() if found.parts}
     figures = {
         f"inside-{name.replace('_', '-')}": figure({name: found}, system, f"Inside of {name}")
@@ -104,7 +104,7 @@ class _Wires:
         boxes = [Box(p.name, tuple(self._lines(b, p)), groups.index(b)) for b, p in self._parts]
         return Chart(boxes, cells, incoming, dict(self._leaving()))
 
-    def _lines(self, block: str, part: Part) -> Iterator[str]:
+    def _lines(self, block: str, part: BlockPart) -> Iterator[str]:
         """The equation, the gains, and the source."""
         yield from part.equation.split("\n")
         values = {v.name: v for v in self._of[block].parameters}
@@ -123,7 +123,7 @@ class _Wires:
             if lines:
                 yield i, lines
 
-    def _read_outside(self, block: str, part: Part) -> Iterator[str]:
+    def _read_outside(self, block: str, part: BlockPart) -> Iterator[str]:
         for name in part.gives:
             readers = [
                 c.target

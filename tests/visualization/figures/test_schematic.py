@@ -10,7 +10,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.parts import Part
+from hapticlink.components.parts import BlockPart
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system.build_system import build_system
@@ -133,12 +133,17 @@ def test_the_equations_depend_on_every_gain_of_a_part(scene: str) -> None:
 @pytest.mark.parametrize(
     ("parts", "fault"),
     [
-        ((Part("a", "", reads=("z",), gives=("y",)),), "`a` reads ['z']"),
-        ((Part("a", "", gives=("y",)), Part("b", "", gives=("y",))), "['y'] are given twice"),
-        ((Part("a", "", reads=("u",)),), "no part gives ['y']"),
+        ((BlockPart("a", "", reads=("z",), gives=("y",)),), "`a` reads ['z']"),
+        (
+            (BlockPart("a", "", gives=("y",)), BlockPart("b", "", gives=("y",))),
+            "['y'] are given twice",
+        ),
+        ((BlockPart("a", "", reads=("u",)),), "no part gives ['y']"),
     ],
 )
-def test_parts_that_do_not_fit_their_block_are_refused(parts: tuple[Part, ...], fault: str) -> None:
+def test_parts_that_do_not_fit_their_block_are_refused(
+    parts: tuple[BlockPart, ...], fault: str
+) -> None:
     block = Block(inputs=[Variable("u")], outputs=[Variable("y")])
     with pytest.raises(ValueError, match="part") as refused:
         block.component(
