@@ -55,6 +55,9 @@ class Variable:
     """The output of which this output is the time derivative."""
     power: Power | None = None
     """The power port of an input."""
+    on_request: bool = False
+    """Whether a step leaves an output of a plant out while nobody reads it, since it takes many
+    operations and often only a record has it."""
     max: float | None = None
     """The magnitude of an output above which the run has diverged, or of `step_size` the longest
     that the equations suit; None without such a bound."""

@@ -74,20 +74,20 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
     units, m, space = linkage.coordinate_units, sum(rows(linkage)), linkage.space
     changes = tuple(f"{u}/s2" for u in units)
     n, velocity = (len(units),), "velocity of the operational point"
-    bias = "operational acceleration at zero wrench"
+    bias, accelerations = "operational acceleration at zero wrench", "joint accelerations"
     variables = [
         Variable("x", *space.pose, description="pose of the operational point"),
         Variable("v", *space.twist, description=velocity, derivative_of="x"),
         Variable("q", n, units, description="joint coordinates"),
         Variable("qd", n, linkage.rate_units, description="joint rates", derivative_of="q"),
-        Variable("qdd", n, changes, description="joint accelerations", derivative_of="qd"),
-        Variable("a_bias", *space.acceleration, description=bias),
-        Variable("energy", (), "J", description="kinetic and potential energy"),
+        Variable("qdd", n, changes, 0.0, accelerations, derivative_of="qd", on_request=True),
+        Variable("a_bias", *space.acceleration, description=bias, on_request=True),
+        Variable("energy", (), "J", 0.0, "kinetic and potential energy", on_request=True),
     ]
     if m:
         text, gap = "Lagrange multipliers of the loops", "largest gap over the loops"
         link = mean_link_length(linkage)  # a loop that is open by a link's length has diverged
-        variables.append(Variable("lambda", (m,), "N", description=text))
+        variables.append(Variable("lambda", (m,), "N", description=text, on_request=True))
         variables.append(Variable("closure_error", (), "m", description=gap, max=link))
     return variables
 
