@@ -30,6 +30,9 @@ import casadi as ca
 from hapticlink.components.component import Component
 
 _SHARED = {"cse": True}
+RARELY = 4
+"""Steps without a read of the outputs on request after which an FMU leaves these out: so many save
+more than evaluating all outputs costs once."""
 WORTH, LONGEST = 0.05, 30_000
 """Share of the operations of a step that a reduced one leaves out, so that it is worth its size in
 the FMU, and the operations above which it would take too long to compile."""

@@ -17,7 +17,7 @@ z are values for the next step that the outputs have evaluated already (`fmus.on
 no state: where p, x or t are not those that they were evaluated for, they are evaluated again.
 
 Where outputs of a plant are left out while nobody reads them (`Variable.on_request`), `reduced`
-takes the place of `advance`: after RARELY steps without a read of them, or if there were as many
+takes the place of `advance`: after `rarely` steps without a read of them, or if there were as many
 between the last two. When they are read again, y = output(x, u, p, t), with the same bits.
 
 Until the end of initialisation mode a get of either kind returns y = output(x0, u, p, t) with
@@ -45,8 +45,6 @@ MODES = ("instantiated", "in initialisation mode", "initialised", "terminated")
 INSTANTIATED, INITIALIZATION, STEP, TERMINATED = MODES
 NEAR = 1e-3
 """Share of a step by which its begin and end may be off."""
-RARELY = 4
-"""Steps that save more, reduced, than evaluating the outputs costs once."""
 
 
 def _surviving(method: typing.Callable) -> typing.Callable:
@@ -108,6 +106,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         # References of outputs on request; whether the last step left them out; steps since they
         # were read, and between the two reads before.
         self._on_request = frozenset(about.get("on_request", ()))
+        self._rarely = about.get("rarely", math.inf)
         self._left_out, self._unread, self._unread_before = False, 0, 0
         self._stop = math.inf
         self._shared_time = math.nan  # for which z was evaluated; nan: it is out of date
@@ -334,7 +333,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             self._evaluate_y()
         # Until the step is accepted, a plant's outputs are to be evaluated again.
         self._output_due, self._shared_time = not self._sampled, math.nan
-        less = self._unread >= RARELY or self._unread_before >= RARELY
+        less = max(self._unread, self._unread_before) >= self._rarely
         n = self._substeps
         self._substep[0], self._end[0] = step_size / n, start + step_size
         trial[:] = x
@@ -356,7 +355,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             self._outputs[:] = self._new_outputs
         x[:], self._shared[:] = trial, self._next_shared
         time[0] = self._shared_time = start + step_size
-        self._output_due, self._left_out = False, less and bool(self._on_request)
+        self._output_due, self._left_out = False, less
         self._unread += 1
         return True
 

@@ -45,7 +45,6 @@
 
 typedef const fmi2ValueReference *References;
 
-enum { RARELY = 4 }; /* steps that save more, reduced, than evaluating the outputs costs once */
 static const double NEAR = 1e-3; /* share of a step by which its begin and end may be off */
 
 enum { SETTABLE = N_U + N_P, REALS = N_U + N_P + N_Y };

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import casadi as ca
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.fmu_functions import on_request, one_pass
+from hapticlink.fmus.fmu_functions import RARELY, on_request, one_pass
 from hapticlink.fmus.native.split_functions import split_functions
 
 
@@ -36,6 +36,7 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
         "SUBSTEPS": component.substeps,
         "SAMPLED": int(component.timing == "sampled"),
         "REDUCED": int(parts.reduced is not None),
+        "RARELY": RARELY,
         # Working memory that the functions need to call the look-ups of tables.
         **{f"N_{of.upper()}": _room(text, of) for of in ("arg", "res", "iw", "w")},
     }
