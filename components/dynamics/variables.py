@@ -82,7 +82,7 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
         Variable("qd", n, linkage.rate_units, description="joint rates", derivative_of="q"),
         Variable("qdd", n, changes, 0.0, accelerations, derivative_of="qd", on_request=True),
         Variable("a_bias", *space.acceleration, description=bias, on_request=True),
-        Variable("energy", (), "J", 0.0, "kinetic and potential energy", on_request=True),
+        Variable("energy", (), "J", description="kinetic and potential energy"),
     ]
     if m:
         text, gap = "Lagrange multipliers of the loops", "largest gap over the loops"
