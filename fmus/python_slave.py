@@ -243,9 +243,9 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
 
     @_surviving
     def get_real(self, vrs: list) -> list:
-        block, last = self._block(vrs)
+        block, last, on_request = self._block(vrs)
         if last >= self._settable:
-            if self._on_request and not self._on_request.isdisjoint(vrs):
+            if on_request:
                 self._unread_before = self._unread or self._unread_before
                 self._unread = 0
                 self._output_due = self._output_due or self._left_out
@@ -258,7 +258,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
     def set_real(self, vrs: list, values: list) -> None:
         if self._mode == TERMINATED:
             self._require("fmi2SetReal", STEP)
-        block, last = self._block(vrs)
+        block, last, _ = self._block(vrs)
         if last >= self._n_inputs:
             self._refuse_unsettable(vrs)
         if block:
@@ -274,22 +274,24 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             self._shared_time = math.nan
 
     def _block(self, vrs: list) -> tuple:
-        """The value references as a slice, None if they are not consecutive, and the largest one;
-        cached. Raises ValueError for an unknown value reference."""
+        """The value references as a slice, None if they are not consecutive, the largest one, and
+        whether some are of outputs on request; cached. Raises ValueError for an unknown value
+        reference."""
         key = tuple(vrs)
-        run_and_last = self._blocks.get(key)
-        if run_and_last is None:
+        found = self._blocks.get(key)
+        if found is None:
             last = max(key, default=-1)
             # pythonfmu passes those of more than 31 bits as negative numbers.
             if wrong := [vr for vr in key if not 0 <= vr < len(self._values)]:
                 message = f"unknown value reference {wrong[0] % 2**32}"
                 raise ValueError(f"{message}; {len(self._values)} are known")
             run = key == tuple(range(last + 1 - len(key), last + 1))
-            run_and_last = (slice(last + 1 - len(key), last + 1) if run else None, last)
+            block = slice(last + 1 - len(key), last + 1) if run else None
+            found = block, last, not self._on_request.isdisjoint(key)
             if len(self._blocks) >= 1000:
                 self._blocks.clear()
-            self._blocks[key] = run_and_last
-        return run_and_last
+            self._blocks[key] = found
+        return found
 
     def _refuse_unsettable(self, vrs: list) -> None:
         for vr in vrs:
