@@ -21,10 +21,13 @@ Only a passivity controller has memory.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import SpringPorts
 from hapticlink.components.specs.control import Controller, PassivityLaw, Topology
@@ -120,7 +123,7 @@ def controller(spec: Controller, space: PortSpace, length_scale: float) -> Compo
     block = Block(
         inputs=_signals(spec, space, law), parameters=parameters, states=states, outputs=outputs
     )
-    output = _wrenches(spec, space, law, block)
+    output, parts = _wrenches(spec, space, law, block)
     initial: dict[str, ca.SX] = {}
     step: dict[str, ca.SX] = {}
     if guard:
@@ -128,6 +131,9 @@ def controller(spec: Controller, space: PortSpace, length_scale: float) -> Compo
         guarded = passivity.passive(F, u["x_D"], u["M"], block.x, block.p)
         initial, step = guarded.initial, guarded.step
         output |= guarded.output | {"F_motor": guarded.wrench}
+        (*parts, last) = parts
+        reads = ("u", "x_D", "M")
+        parts += [replace(last, gives=("u",)), passivity.part(guard, space, reads, "F_motor")]
     return block.component(
         "controller",
         "Impedance, four-channel teleoperation and topology controller",
@@ -137,36 +143,65 @@ def controller(spec: Controller, space: PortSpace, length_scale: float) -> Compo
         output=output,
         documentation=__doc__ or "",
         springs=[_DRIFT] if spec.teleoperation else [],
+        parts=parts,
     )
 
 
 def _wrenches(
     spec: Controller, space: PortSpace, law: Topology | None, block: Block
-) -> dict[str, ca.SX]:
-    """u of the motors, before the passivity controller, with F_drift and F_T where they are."""
+) -> tuple[dict[str, ca.SX], list[BlockPart]]:
+    """u of the motors, before the passivity controller, with F_drift and F_T where they are; and
+    the parts that make them, of which the last gives F_motor."""
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
+    parts, terms, reads = list[BlockPart](), "", list[str]()
     force = ca.SX.zeros(space.size)
+    apart = ("x_S", "v_S", "x_D", "v_D")
     if spec.teleoperation:
         output["F_drift"] = p["K_pc"] * space.difference(u["x_S"], u["x_D"])
         output["F_drift"] += p["B_pc"] * (u["v_S"] - u["v_D"])
         force += output["F_drift"]
+        law_text = r"$F_{drift} = K_{pc} (x_S - x_D)$" "\n" r"$+ B_{pc} (v_S - v_D)$"
+        gains = (*apart, "K_pc", "B_pc")
+        parts.append(
+            BlockPart("position channels", law_text, "sections 4.2.3, B.6", gains, ("F_drift",))
+        )
+        terms, reads = " + F_{drift}", ["F_drift"]
     if spec.contact:
         force += u["F_env"]
+        terms, reads = terms + " + F_{env}", [*reads, "F_env"]
     if spec.damping is not None:
         force -= p["B_d"] * u["v_D"]
+        terms, reads = terms + " - B_d v_D", [*reads, "v_D", "B_d"]
     if spec.stiffness is not None:
         force -= p["K_d"] * space.difference(u["x_D"], p["x_ref"])
+        terms, reads = terms + " - K_d (x_D - x_{ref})", [*reads, "x_D", "K_d", "x_ref"]
 
-    motor = force
+    motor, summed = force, terms.removeprefix(" + ") or "0"
     if spec.impedance:
         a = u["Lambda_inv"] @ (u["F_hand"] + force)
+        desired = rf"$a = \Lambda^{{-1}} (F_h{terms})$"
+        reads = ["Lambda_inv", "F_hand", *reads]
         if spec.bias == "full":
             a += u["a_bias"]
+            desired, reads = desired + "\n" r"$+ a_{bias}$", [*reads, "a_bias"]
         motor = u["M"] @ a + u["c"] - u["F_hand"]
+        parts.append(BlockPart("desired motion", desired, "(4.3), (4.4)", tuple(reads), ("a",)))
+        summed, reads = "M_d a + C_d v - F_h", ["M", "a", "c", "F_hand"]
     if law:
         pull = p["k_j"] * space.difference(u["x_S"], u["x_D"])
         pull += p["b_j"] * (u["v_S"] - u["v_D"])
         F_T = topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"])
         output["F_constraint"], motor = F_T, motor + F_T
-    return output | {"F_motor": motor}
+        pulled = (*apart, "M", "P_c", "k_j", "b_j", "length_scale")
+        parts.append(
+            BlockPart(
+                "topology controller", topology.LAW, "section 4.2.4", pulled, ("F_constraint",)
+            )
+        )
+        summed, reads = f"{summed} + F_T", [*reads, "F_constraint"]
+    name, source = ("impedance law", "(4.6), corrected") if spec.impedance else ("sum", "")
+    parts.append(
+        BlockPart(name, f"$u = {summed}$", source, tuple(dict.fromkeys(reads)), ("F_motor",))
+    )
+    return output | {"F_motor": motor}, parts

@@ -18,7 +18,7 @@ and tau_applied, the torques of the step that ends, 0 at t = 0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 
@@ -45,6 +45,7 @@ from hapticlink.components.device.variables import (
     observer_gains,
     variables,
 )
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.ports import Power
 from hapticlink.components.specs.device import Device
@@ -110,6 +111,51 @@ def advance_device(block: Block, tau: ca.SX, substeps: int) -> ca.SX:
     return motion
 
 
+_MATRICES = BlockPart("inertia", r"$M_d(x),\ c = C_d(x, v)\,v$", "(4.5)", ("x", "v"), ("M", "c"))
+_IDEAL = BlockPart("ideal sensing", r"$x = x_D,\ v = v_D$", "", ("x_true", "v_true"), ("x", "v"))
+_MOTORS = BlockPart(
+    "motors",
+    r"$\tau = J_q^{T+} u$, at most" "\n" r"$|\tau_i| \leq \tau_{max}$",
+    "section 4.2.1, fig. 4.2",
+    ("F_motor", "x", "torque_limit"), ("tau",),
+)  # fmt: skip
+_COUNTED = BlockPart(
+    "encoders", r"$q = \Delta\,[\varphi(x_D) / \Delta]$", "section 4.2.1, fig. 4.2",
+    ("x_true", "encoder_resolution"), ("q", "counts", "q_true"),
+)  # fmt: skip
+_OBSERVED = (
+    BlockPart(
+        "encoders", r"$x = \arg\min_x \|\varphi(x)$" "\n" r"$- \Delta\,[\varphi(x_D) / \Delta]\|$",
+        "section 4.2.1, fig. 4.2",
+        ("x_true", "encoder_resolution"), ("x", "x_measured"),
+    ),
+    BlockPart(
+        "Nicosia observer",
+        r"$\dot{x}_1 = x_2 + k_D e,\ e = x - x_1$" "\n"
+        r"$M_d \dot{x}_2 = J_q^T \tau - C_d x_2 + M_d \omega_n^2 e$" "\n"
+        r"$v = \dot{x}_1,\ F_h = M_d \omega_n^2 e$",
+        "section 4.2.1",
+        ("x", "tau", "omega_n", "k_D"), ("v", "F_hand_observed", "x_observer", "v_observer"),
+    ),
+)  # fmt: skip
+
+
+def _twin_part(block: Block) -> BlockPart:
+    """The part of the motion."""
+    p = block.p
+    tau = r"(\tau + \tau_f)" if "motor_friction" in p else r"\tau"
+    friction = tuple(name for name, *_ in FRICTION if name in p)
+    stops = ("reach_limit", "stop_stiffness", "stop_damping")
+    applied = ("tau_applied",) if "tau_applied" in block.x else ()
+    return BlockPart(
+        "twin pantograph",
+        rf"$M_d \dot{{v}} + C_d v = J_q^T {tau}$" "\n" r"$+ F_h + F_{stops}$",
+        "(4.5)",
+        ("tau", "F_hand", *friction, *stops),
+        ("x_true", "v_true", "workspace_margin", *applied),
+    )
+
+
 def haptic_device(device: Device, encoders: bool = False) -> Component:
     """The device, sensed by encoders where `encoders` says so, with the observer of these in it or
     beside it."""
@@ -130,7 +176,8 @@ def _ideal(device: Device) -> Component:
     tau = pantograph.motor_torques(block.u["F_motor"], x, block.p)
     inertia, c = pantograph.motion(x, v, block.p)
     output = {"x": x, "v": v, "M": inertia, "c": c}
-    return _component(block, "ideally sensed", {}, _motion(block, device, tau), output)
+    parts = [_MOTORS, _twin_part(block), _IDEAL, _MATRICES]
+    return _component(block, "ideally sensed", {}, _motion(block, device, tau), output, parts)
 
 
 def _with_observer(device: Device) -> Component:
@@ -154,8 +201,8 @@ def _with_observer(device: Device) -> Component:
     first = observer.start(_measured(block, p["x_start"])[0], p["x_start"])
     after = observer.advance(now, _measured(block, motion["x_true"])[0], tau, block.h)
     output = observer.outputs(now)
-    sensing = "encoders and observer"
-    return _component(block, sensing, first.states, motion | after.states, output)
+    sensing, parts = "encoders and observer", [_MOTORS, _twin_part(block), *_OBSERVED, _MATRICES]
+    return _component(block, sensing, first.states, motion | after.states, output, parts)
 
 
 def _without_observer(device: Device) -> Component:
@@ -173,7 +220,7 @@ def _without_observer(device: Device) -> Component:
     output |= {"q_true": pantograph.base_angles(x["x_true"], block.p)}
     initial = {"tau_applied": ca.SX.zeros(tau.numel())}
     step = _motion(block, device, tau) | {"tau_applied": tau}
-    return _component(block, "encoders", initial, step, output)
+    return _component(block, "encoders", initial, step, output, [_twin_part(block), _COUNTED])
 
 
 def _measured(block: Block, pose: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -194,6 +241,7 @@ def _component(
     initial: Mapping[str, ca.SX],
     step: Mapping[str, ca.SX],
     output: Mapping[str, ca.SX],
+    parts: Sequence[BlockPart],
 ) -> Component:
     """The device with what is the same however it is sensed: its start, and its true motion."""
     x, p = block.x, block.p
@@ -208,4 +256,5 @@ def _component(
         step=step,
         output={**output, **true},
         documentation=__doc__ or "",
+        parts=parts,
     )
