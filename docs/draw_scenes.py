@@ -55,7 +55,7 @@ def inside(scene: str, drawing: str, file: str) -> Path:
     read = hl.scene(scene)
     with build_system(read) as system:
         figure = schematic.figures(read, system)[drawing]
-    figure.savefig(FIGURES / file, dpi=100, **SAME)
+    figure.savefig(FIGURES / file, dpi=80, **SAME)
     return FIGURES / file
 
 
