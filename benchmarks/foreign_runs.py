@@ -105,7 +105,7 @@ def compare(
     what Python FMUs import besides. Files are left in `room`."""
     inputs = choose_inputs(path)
     found = _compare(path, rate, duration, inputs, room / "set", libraries)
-    if inputs and (found.hapticlink or found.fmpy):
+    if inputs and (found.hapticlink or found.fmpy) and (room / "set" / "run").exists():
         untouched = _compare(path, rate, duration, {}, room / "untouched", libraries)
         if untouched.outputs:
             return replace(untouched, inputs="untouched")
@@ -165,7 +165,7 @@ def _run_hapticlink(
         lines += [f"start = {{ {start} }}", "[[at]]", f"time = {at!r}", f"set = {{ {then} }}"]
     scene = room / "scene.toml"
     scene.write_text("\n".join(lines) + "\n")
-    command = ["hapticlink", "run", str(scene), "--out", str(room / "run")]
+    command = ["hapticlink", "run", str(scene), "--out", str(room / "run"), "--no-figures"]
     status, text = _call(command, environment)
     if not status:
         return ""
