@@ -141,7 +141,7 @@ def _compare(
         text = " ".join(text.split()) or f"status {status}"
         return Comparison(len(ours["time"]), hapticlink=words, fmpy=text)
     with np.load(room / "fmpy.npz") as theirs:
-        found = _compare_tables(ours, dict(theirs), at, words)
+        found = _compare_tables(ours, dict(theirs), at if inputs else math.inf, words)
     return replace(found, inputs="set" if inputs else "none")
 
 
@@ -205,7 +205,7 @@ def _compare_tables(
     ours: Mapping[str, np.ndarray], theirs: Mapping[str, np.ndarray], at: float, words: str
 ) -> Comparison:
     """At our times. FMPy has a row before and after each event: the last of an instant is what
-    holds from there, but for the instant `at`, where our row stands before the inputs change."""
+    holds from there, but for the instant `at` (s), where our row stands before inputs change."""
     time = ours["time"]
     rows = np.searchsorted(theirs["time"], time + 1e-9, side="right") - 1
     if at in time:
