@@ -110,8 +110,7 @@ def page(rows: list[Row], command: str) -> str:
         *_causes(compared),
         "## Not run",
         "",
-        "In hapticlink's own words. FMPy runs none of these either, but for FMI 1.0 and model "
-        "exchange, for which hapticlink has no master.",
+        "In hapticlink's own words.",
         "",
         *table("FMU | package | made by | FMI | why", "lllrl", map(_not_run_cells, not_run)),
         "",
