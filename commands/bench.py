@@ -28,6 +28,7 @@ Benchmark = Literal[
     "engine",
     "network",
     "advise",
+    "foreign",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores: it
 measures, writes tables and figures into a folder, and returns the page."""
@@ -60,6 +61,7 @@ def bench(
     - engine: MuJoCo in the place of the graphics copy and of the mechanism
     - network: the graphics on another computer: delay, jitter and loss against error and energy
     - advise: what `hapticlink advise` is worth on test scenes
+    - foreign: FMUs of others, which packages of PyPI bring, beside FMPy
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
