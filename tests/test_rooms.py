@@ -34,12 +34,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 5515,
     "fmus": 2783,
-    "orchestrator": 12284,
+    "orchestrator": 12291,
     "programs": 1114,
     "analysis": 6639,
     "visualization": 3263,
     "api": 402,
-    "commands": 1349,
+    "commands": 1350,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
