@@ -1,12 +1,14 @@
 """What leaving out the unneeded saves: each shipped scene as it is, and with nothing skipped.
 
-Three things are skipped, each decided at one place, where `nothing_skipped` switches it off:
+Four things are skipped, the first three each decided at one place, where `nothing_skipped` switches
+it off; the last follows from what is fetched:
 
 blocks   blocks, outputs and pairs of contacts that nothing uses are not built into FMUs
 fetched  outputs that nothing reads and nobody records are not fetched
 set      inputs of the project's FMUs that have not changed are not set again
+request  FMUs leave out costly outputs while nobody reads them (`Variable.on_request`)
 
-Operations are those of the FMUs' graphs times their steps, calls those of FMI functions that the
+Operations are those that the FMUs' steps have executed, calls those of FMI functions that the
 loop has made, values what they set or fetch: all repeat exactly. Run times are those of native FMUs
 in interleaved rounds, in which only the signals are recorded that connections read. "The same"
 compares every number that the scene as it is has in its tables, all outputs recorded, with that of
@@ -15,7 +17,7 @@ the run with nothing skipped.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,8 @@ from benchmarks import code_version
 from benchmarks.page import Progress
 from benchmarks.rows import Rows
 from hapticlink.analysis.findings import block_costs
+from hapticlink.fmus.cost import Cost
+from hapticlink.fmus.fmu_functions import RARELY
 from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import Experiment, simulate
@@ -73,10 +77,14 @@ def run(scene: str, folder: Path, skipping: str, *options: str) -> Experiment:
 
 
 def counts(made: Experiment, skipping: str) -> tuple[int, int, int]:
-    """Operations of the graphs of all steps, FMI calls, and values set or fetched by them."""
+    """Operations executed in all steps, FMI calls, and values set or fetched by them."""
     scene, system, calls = made.scene, made.system, made.outcome.details.calls
     found = block_costs.costs(scene, timeline(scene), skip=skipping == ON)
-    operations = sum(c.cost.step * calls[c.name]["step"] for c in found)
+    fetched = {
+        fmu.name: {entry_of(scalar.name)[0] for scalar in fmu.description.outputs}
+        for fmu in system.fmus
+    }
+    operations = sum(executed(c.cost, calls[c.name]["step"], fetched[c.name]) for c in found)
     moved = 0
     for fmu in system.fmus:
         inputs = sum(len(c.inputs) for c in system.into(fmu.name))
@@ -84,6 +92,12 @@ def counts(made: Experiment, skipping: str) -> tuple[int, int, int]:
         moved += calls[fmu.name].get("set", 0) * inputs
     names = ("set", "step", "get")
     return operations, sum(each.get(n, 0) for each in calls.values() for n in names), moved
+
+
+def executed(cost: Cost, steps: int, fetched: Collection[str]) -> int:
+    """Operations of `steps` steps of an FMU of which these outputs are read after each."""
+    whole = steps if cost.on_request & {*fetched} else min(steps, RARELY)
+    return cost.step * whole + cost.reduced * (steps - whole)
 
 
 def compared(on: Experiment, off: Experiment) -> tuple[int, int, float, str]:

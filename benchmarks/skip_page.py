@@ -52,7 +52,7 @@ def page(out: Path, rows: Rows, same: Rows, command: str) -> str:
         f"Made by `{command}`. Each shipped scene runs with native FMUs as it is, and with nothing "
         "skipped: all blocks, all optional outputs and all pairs of contacts are built into FMUs, "
         "every output is fetched at each communication point, and every input is set whether it "
-        "has changed or not. Operations (of the FMUs' graphs, all steps), FMI calls (set, step, "
+        "has changed or not. Operations (executed in all steps of the FMUs), FMI calls (set, step, "
         "get) and values moved by them repeat exactly; run time is the median of the ratios of "
         "interleaved rounds, with quartiles, recording what connections read. The same: how many "
         "of the numbers that the scene has in its tables, all outputs recorded, are equal to the "

@@ -28,10 +28,11 @@ Benchmark = Literal[
     "engine",
     "network",
     "advise",
+    "foreign",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores: it
 measures, writes tables and figures into a folder, and returns the page."""
-PAGES = {"stress": "stability/stress.md"}
+PAGES = {"stress": "stability/stress.md", "study": "mismatch/README.md"}
 """Pages in results/ that are not the README.md of a folder named like the benchmark."""
 
 
@@ -60,6 +61,7 @@ def bench(
     - engine: MuJoCo in the place of the graphics copy and of the mechanism
     - network: the graphics on another computer: delay, jitter and loss against error and energy
     - advise: what `hapticlink advise` is worth on test scenes
+    - foreign: FMUs of others, which packages of PyPI bring, beside FMPy
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.
@@ -67,9 +69,8 @@ def bench(
     results = checkout.folder("bench") / "results"
     if what is None:
         status = checkout.function("bench", "benchmarks.code_version:status")
-        print(
-            *status(results, {each: _page(results, each) for each in get_args(Benchmark)}), sep="\n"
-        )
+        pages = {each: _page(results, each) for each in (*get_args(Benchmark), "study")}
+        print(*status(results, pages), sep="\n")
         return 0
     make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
     page = _page(results, what)

@@ -19,8 +19,9 @@ Draw = Annotated[
     bool,
     Parameter(
         negative="",
-        help="Draw the blocks and their connections, the mechanism where it starts, and the device "
-        "in its workspace, into OUT (default info/SCENE).",
+        help="Draw the blocks and their connections, the inside of each block with its equations, "
+        "the mechanism where it starts, and the device in its workspace, into OUT (default "
+        "info/SCENE).",
     ),
 ]
 
@@ -122,7 +123,7 @@ def _pose(start: dict[str, float]) -> list[float]:
 def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
     from hapticlink.orchestrator.results import folders
     from hapticlink.visualization import figure_axes
-    from hapticlink.visualization.figures import block_diagram
+    from hapticlink.visualization.figures import block_diagram, schematic
     from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
     figures = {"blocks": block_diagram.figure(system, f"Blocks of: {scene.title}")}
@@ -131,6 +132,7 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
     if scene.device:
         title = f"Device and its workspace: {scene.title}"
         figures["workspace"] = workspace_drawing.draw(scene.device, _pose(start), title)
+    figures |= schematic.figures(scene, system)
     for name in figure_axes.save(figures, folders.ensure(out)):
         say(f"  {out / name}")
 

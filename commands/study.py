@@ -24,5 +24,8 @@ def study(*, out: Out = None, jobs: Jobs = None) -> int:
             out or Path("results/mismatch"), Path("sweeps/mismatch"), processes,
             lambda stage, done, of: tell(done, of),
         )  # fmt: skip
+    if out is None:
+        sign = checkout.function("study", "benchmarks.code_version:sign")
+        sign(checkout.folder("study") / "results", "study", page)
     say(str(page))
     return 0

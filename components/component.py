@@ -21,6 +21,7 @@ from typing import Literal
 
 import casadi as ca
 
+from hapticlink.components.parts import BlockPart, require_complete
 from hapticlink.components.ports import Kind, Power, SpringPorts
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
@@ -54,6 +55,9 @@ class Variable:
     """The output of which this output is the time derivative."""
     power: Power | None = None
     """The power port of an input."""
+    on_request: bool = False
+    """Whether a step leaves an output of a plant out while nobody reads it, since it takes many
+    operations and often only a record has it."""
     max: float | None = None
     """The magnitude of an output above which the run has diverged, or of `step_size` the longest
     that the equations suit; None without such a bound."""
@@ -179,6 +183,8 @@ class Component:
     """The look-ups of tables that the functions call."""
     state_notes: Mapping[str, str] = field(default_factory=dict)
     """By the name of a state: the cause to report if it is not finite."""
+    parts: tuple[BlockPart, ...] = ()
+    """Those that its schematic shows, in the order of their evaluation; none if it has none."""
 
     @cached_property
     def state_texts(self) -> tuple[str, ...]:
@@ -239,6 +245,7 @@ class Block:
         springs: Iterable[SpringPorts] = (),
         shared: bool = False,
         signals: Iterable[TimeSignal] = (),
+        parts: Iterable[BlockPart] = (),
     ) -> Component:
         """The component with the given expressions: step and output in this block's symbols,
         initial in u and p only; signals are those over time that they read.
@@ -246,8 +253,12 @@ class Block:
         memory: states that change only in the last of several substeps.
         shared: common subexpressions of step and initial have been eliminated already; doing so
         again would take most of the time to build a large graph. Raises ValueError where names or
-        shapes do not match the declared variables.
+        shapes do not match the declared variables, and where `parts` are given that do not read and
+        give them.
         """
+        if parts := [*parts]:
+            given = ([v.name for v in of] for of in (self.x.variables, self.outputs))
+            require_complete(parts, {*self.u, *self.p, *self.x}, *given)
         x, u, p, *_ = arguments = [self.x.vector, self.u.vector, self.p.vector, self.t, self.h]
         x1 = pack(self.x.variables, step) if isinstance(step, Mapping) else ca.densify(step)
         is_memory = [v.name in memory for v in self.x.variables for _ in range(v.size)]
@@ -273,4 +284,5 @@ class Block:
             state_notes=state_notes or {},
             springs=tuple(springs),
             look_ups=tuple(look_up for s in signals for look_up in s.look_ups),
+            parts=tuple(parts),
         )

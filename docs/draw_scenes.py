@@ -1,5 +1,5 @@
 """Draws the start of each shipped scene and of the linkages in own-linkage.md and scenes.md to
-docs/pictures/<scene>.png, and block diagrams to docs/figures/:
+docs/pictures/<scene>.png, and block diagrams and schematics to docs/figures/:
 
 python docs/draw_scenes.py
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 import hapticlink as hl
 from hapticlink.analysis.findings.start_values import coordinates, mechanism_outputs
 from hapticlink.orchestrator.system.build_system import build_system
-from hapticlink.visualization.figures import block_diagram
+from hapticlink.visualization.figures import block_diagram, schematic
 from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
 PAGES = [Path(__file__).with_name(name) for name in ("own-linkage.md", "scenes.md")]
@@ -50,6 +50,15 @@ def blocks(scene: str, file: str) -> Path:
     return FIGURES / file
 
 
+def inside(scene: str, drawing: str, file: str) -> Path:
+    """Draws a schematic of a scene to a file of FIGURES, and returns its path."""
+    read = hl.scene(scene)
+    with build_system(read) as system:
+        figure = schematic.figures(read, system)[drawing]
+    figure.savefig(FIGURES / file, dpi=80, **SAME)
+    return FIGURES / file
+
+
 def device(scene: str) -> Path:
     """Draws the device of a scene in its workspace, and returns the picture's path."""
     read = hl.scene(scene)
@@ -76,4 +85,7 @@ if __name__ == "__main__":
     print(device("closed-loop"))
     print(blocks("closed-loop", "blocks.png"))
     print(blocks("virtual-wall", "blocks-of-a-wall.png"))
+    print(inside("closed-loop", "device", "inside-device.png"))
+    print(inside("closed-loop", "inside-virtual-mechanism", "inside-mechanism.png"))
+    print(inside("closed-loop-b1", "simulation", "inside-simulation.png"))
     print(events("scenario"))

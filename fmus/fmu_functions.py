@@ -4,12 +4,15 @@
     y, z         = output(x, u, p, t)
     x_1          = substep(x, u, p, t, h)
     x_1, y, z_1  = advance(x, u, p, t, h, end, z)
+    x_1, y, z_1  = reduced(x, u, p, t, h, end, z)
 
 `advance` is the last substep of a plant and its outputs at the end of the step, or the first
 substep of a sampled block and its outputs at the beginning; common subexpressions of both are
 evaluated once. z, for plants that take one substep, are the values that depend on x, p and t alone
 and that the next step needs: kinematics and factorisations that the outputs have evaluated already.
-`substep` is for the other substeps.
+`substep` is for the other substeps. `reduced` is `advance` with 0 for the outputs of a plant that
+are evaluated on request (`Variable.on_request`), where this leaves out enough: an FMU takes it
+while nobody reads these, and evaluates `output` when somebody does.
 
 Expressions are composed without CasADi's simplifications, which would replace (a + b) - b by a:
 every operation is one of the component's, so that the results are the same, bit for bit.
@@ -27,6 +30,12 @@ import casadi as ca
 from hapticlink.components.component import Component
 
 _SHARED = {"cse": True}
+RARELY = 4
+"""Steps without a read of the outputs on request after which an FMU leaves these out: so many save
+more than evaluating all outputs costs once."""
+WORTH, LONGEST = 0.05, 30_000
+"""Share of the operations of a step that a reduced one leaves out, so that it is worth its size in
+the FMU, and the operations above which it would take too long to compile."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,7 @@ class OnePass:
     output: ca.Function
     substep: ca.Function
     advance: ca.Function
+    reduced: ca.Function | None
     substeps: int
 
     @property
@@ -48,7 +58,8 @@ class OnePass:
     def functions(self) -> tuple[ca.Function, ...]:
         """Those that are called."""
         several = (self.substep,) if self.substeps > 1 else ()
-        return (self.initialize, self.output, *several, self.advance)
+        fewer = (self.reduced,) if self.reduced else ()
+        return (self.initialize, self.output, *several, self.advance, *fewer)
 
 
 def one_pass(component: Component) -> OnePass:
@@ -94,6 +105,7 @@ def _compose(component: Component) -> OnePass:
         ["x1", "y", "z1"],
         _SHARED,
     )
+    reduced = _reduced(component, advance)
     output = ca.Function(
         "output",
         [x, u, p, t],
@@ -104,7 +116,25 @@ def _compose(component: Component) -> OnePass:
     )
     substep = component.substep or component.step
     plain = ca.Function("substep", [x, u, p, t, h], [substep(x, u, p, t, h)])
-    return OnePass(component.initialize, output, plain, advance, component.substeps)
+    return OnePass(component.initialize, output, plain, advance, reduced, component.substeps)
+
+
+def on_request(component: Component) -> list[bool]:
+    """Of each entry of y, whether it is evaluated on request."""
+    return [v.on_request for v in component.outputs for _ in range(v.size)]
+
+
+def _reduced(component: Component, advance: ca.Function) -> ca.Function | None:
+    """`reduced`, None where it would not leave out enough."""
+    left_out, most = on_request(component), advance.n_instructions()
+    if component.timing == "sampled" or not any(left_out) or most > LONGEST:
+        return None
+    arguments = advance.sx_in()
+    x1, y, z1 = advance(*arguments)
+    y = ca.vertcat(*(ca.SX(0) if out else y[i] for i, out in enumerate(left_out)))
+    names = advance.name_in(), advance.name_out()
+    reduced = ca.Function("reduced", arguments, [x1, ca.densify(y), z1], *names, _SHARED)
+    return reduced if reduced.n_instructions() <= (1 - WORTH) * most else None
 
 
 def _without_known(x1: ca.SX, state: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:

@@ -25,7 +25,7 @@ from hapticlink.fmus import model_description
 from hapticlink.fmus.description_common import describe_component
 from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
-from hapticlink.fmus.fmu_functions import one_pass
+from hapticlink.fmus.fmu_functions import RARELY, on_request, one_pass
 from hapticlink.fmus.reference_run import reference_run
 from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.straight_line import program
@@ -69,7 +69,11 @@ def entries(component: Component, **experiment: float) -> dict[str, bytes]:
         "resources/functions.casadi.json": json.dumps(texts).encode(),
         "resources/functions.txt": program(parts.functions, component.look_ups).encode(),
     }
-    about = {"n_shared": parts.n_shared}
+    first = len(component.start_inputs) + len(component.start_parameters)
+    requested = [first + k for k, is_one in enumerate(on_request(component)) if is_one]
+    about: dict[str, object] = {"n_shared": parts.n_shared}
+    if parts.reduced:
+        about |= {"on_request": requested, "rarely": RARELY}
     return pack_entries(component, functions, about, **experiment)
 
 

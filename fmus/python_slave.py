@@ -16,6 +16,10 @@ All reals are in one array [inputs | parameters | outputs], whose indices are th
 z are values for the next step that the outputs have evaluated already (`fmus.one_pass`); they are
 no state: where p, x or t are not those that they were evaluated for, they are evaluated again.
 
+Where outputs of a plant are left out while nobody reads them (`Variable.on_request`), `reduced`
+takes the place of `advance`: after `rarely` steps without a read of them, or if there were as many
+between the last two. When they are read again, y = output(x, u, p, t), with the same bits.
+
 Until the end of initialisation mode a get of either kind returns y = output(x0, u, p, t) with
 x0 = initialize(u, p), from the values set so far.
 
@@ -99,6 +103,11 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         self._whole = 0 if self._sampled else self._substeps - 1  # the substep with the outputs
         # due: to be computed before the next read
         self._mode, self._start_due, self._output_due = INSTANTIATED, True, True
+        # References of outputs on request; whether the last step left them out; steps since they
+        # were read, and between the two reads before.
+        self._on_request = frozenset(about.get("on_request", ()))
+        self._rarely = about.get("rarely", math.inf)
+        self._left_out, self._unread, self._unread_before = False, 0, 0
         self._stop = math.inf
         self._shared_time = math.nan  # for which z was evaluated; nan: it is out of date
         t, h = _doubles([0.0]), _doubles([0.0])
@@ -119,7 +128,12 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         self._evaluate_y = self._bind("output", (x, u, p, t), y, z)
         whole = self._bind("advance", (trial, u, p, t, h, end, z), after, self._new_outputs, next_z)
         part = self._bind("substep", (trial, u, p, t, h), after) if self._substeps > 1 else whole
-        self._evaluate = [whole if k == self._whole else part for k in range(self._substeps)]
+        parts = [part] * self._whole, [part] * (self._substeps - 1 - self._whole)
+        self._evaluate = self._evaluate_less = [*parts[0], whole, *parts[1]]
+        if self._on_request:
+            arguments = (trial, u, p, t, h, end, z)
+            less = self._bind("reduced", arguments, after, self._new_outputs, next_z)
+            self._evaluate_less = [*parts[0], less, *parts[1]]
 
     def _require_own_description(self) -> None:
         """pythonfmu passes on no GUID; importers take the one that stands in the FMU's folder."""
@@ -229,9 +243,14 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
 
     @_surviving
     def get_real(self, vrs: list) -> list:
-        block, last = self._block(vrs)
-        if self._output_due and last >= self._settable:
-            self._refresh()
+        block, last, on_request = self._block(vrs)
+        if last >= self._settable:
+            if on_request:
+                self._unread_before = self._unread or self._unread_before
+                self._unread = 0
+                self._output_due = self._output_due or self._left_out
+            if self._output_due:
+                self._refresh()
         values = self._values
         return values[block].tolist() if block else [values[vr] for vr in vrs]
 
@@ -239,7 +258,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
     def set_real(self, vrs: list, values: list) -> None:
         if self._mode == TERMINATED:
             self._require("fmi2SetReal", STEP)
-        block, last = self._block(vrs)
+        block, last, _ = self._block(vrs)
         if last >= self._n_inputs:
             self._refuse_unsettable(vrs)
         if block:
@@ -255,22 +274,24 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             self._shared_time = math.nan
 
     def _block(self, vrs: list) -> tuple:
-        """The value references as a slice, None if they are not consecutive, and the largest one;
-        cached. Raises ValueError for an unknown value reference."""
+        """The value references as a slice, None if they are not consecutive, the largest one, and
+        whether some are of outputs on request; cached. Raises ValueError for an unknown value
+        reference."""
         key = tuple(vrs)
-        run_and_last = self._blocks.get(key)
-        if run_and_last is None:
+        found = self._blocks.get(key)
+        if found is None:
             last = max(key, default=-1)
             # pythonfmu passes those of more than 31 bits as negative numbers.
             if wrong := [vr for vr in key if not 0 <= vr < len(self._values)]:
                 message = f"unknown value reference {wrong[0] % 2**32}"
                 raise ValueError(f"{message}; {len(self._values)} are known")
             run = key == tuple(range(last + 1 - len(key), last + 1))
-            run_and_last = (slice(last + 1 - len(key), last + 1) if run else None, last)
+            block = slice(last + 1 - len(key), last + 1) if run else None
+            found = block, last, not self._on_request.isdisjoint(key)
             if len(self._blocks) >= 1000:
                 self._blocks.clear()
-            self._blocks[key] = run_and_last
-        return run_and_last
+            self._blocks[key] = found
+        return found
 
     def _refuse_unsettable(self, vrs: list) -> None:
         for vr in vrs:
@@ -289,7 +310,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             self._start_due = False
         if self._output_due:
             self._evaluate_y()
-            self._output_due = False
+            self._output_due = self._left_out = False
             self._shared_time = self._time[0]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -314,10 +335,11 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             self._evaluate_y()
         # Until the step is accepted, a plant's outputs are to be evaluated again.
         self._output_due, self._shared_time = not self._sampled, math.nan
+        less = max(self._unread, self._unread_before) >= self._rarely
         n = self._substeps
         self._substep[0], self._end[0] = step_size / n, start + step_size
         trial[:] = x
-        for k, evaluate in enumerate(self._evaluate):
+        for k, evaluate in enumerate(self._evaluate_less if less else self._evaluate):
             time[0] = start + k * step_size / n
             evaluate()
             trial[:] = after
@@ -335,7 +357,8 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
             self._outputs[:] = self._new_outputs
         x[:], self._shared[:] = trial, self._next_shared
         time[0] = self._shared_time = start + step_size
-        self._output_due = False
+        self._output_due, self._left_out = False, less
+        self._unread += 1
         return True
 
     def _require_step(self, start: float, step_size: float) -> None:
@@ -370,6 +393,9 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
 
     def _get_fmu_state(self) -> bytes:
         # A plant's outputs follow from the rest, also where an importer has changed the bytes.
+        if self._left_out:
+            self._output_due = True
+            self._refresh()
         output_due = self._output_due or not self._sampled
         flags = bytes((MODES.index(self._mode), self._start_due, output_due))
         parts = (self._time, self._values, self._state)
@@ -385,7 +411,7 @@ class HapticlinkSlave(Fmi2Slave, metaclass=Short):
         if flags[0] >= len(MODES):
             raise ValueError("this FMU state is damaged")
         self._mode, self._start_due, self._output_due = MODES[flags[0]], *map(bool, flags[1:])
-        self._shared_time = math.nan
+        self._shared_time, self._left_out = math.nan, False
         for part in parts:
             end = offset + 8 * len(part)
             part[:] = array.array("d", state[offset:end])

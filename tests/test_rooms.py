@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5049,
-    "fmus": 2736,
-    "orchestrator": 12242,
+    "components": 5515,
+    "fmus": 2783,
+    "orchestrator": 12291,
     "programs": 1114,
-    "analysis": 6618,
-    "visualization": 3127,
+    "analysis": 6639,
+    "visualization": 3263,
     "api": 402,
-    "commands": 1345,
+    "commands": 1350,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -7,7 +7,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.tracking import UserSignals, find_users, of_block, of_port
+from hapticlink.analysis.findings.tracking import (
+    UserSignals,
+    find_measured_handle,
+    find_users,
+    of_block,
+    of_port,
+)
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.signal_names import (
@@ -62,13 +68,13 @@ def torques(
     # casadi, which the terminal's lines, of the same module, can do without
     from hapticlink.components.device.motors_and_encoders import motor_torques
 
-    table = of_port(results, user.motors)
-    if device is None or table is None or of_port(results, user.measured_handle) is not table:
+    table, handle = of_port(results, user.motors), find_measured_handle(results, user)
+    if device is None or table is None or handle is None or of_port(results, handle) is not table:
         return None
     if not len(table["time"]):
         return None
     return table["time"], table.by_row(
-        lambda F, x: of_motors(motor_torques(device, F, x)), user.motors, user.measured_handle
+        lambda F, x: of_motors(motor_torques(device, F, x)), user.motors, handle
     )
 
 

@@ -10,13 +10,17 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT,
     HAND,
     MECHANISM,
+    MOTOR_MAP,
+    OBSERVER,
     user_of_block,
 )
 
 BLOCKS = {
     HAND: "hand",
     DEVICE: "device",
+    OBSERVER: "observer",
     CONTROLLER: "controller",
+    MOTOR_MAP: "motors",
     MECHANISM: "mechanism",
     ENVIRONMENT: "graphics copy",
 }
@@ -28,6 +32,7 @@ SIGNALS = {
     "F_env": "contact force",
     "F_constraint": "topology force",
     "Lambda_inv": "mobility",
+    "tau": "motor torques",
     "P_c": "constrained directions",
     "x": "pose",
     "v": "velocity",
@@ -55,7 +60,7 @@ def connection(name: str) -> str:
         return name
     of, to = (end.partition(".")[0] for end in (source, target))
     at = f"the {known}" if (known := block(to)) else to
-    if ".F" in target:
+    if ".F" in target or target.endswith(".tau"):
         return f"{signal(source)} on {at}"
     return f"{signal(source)} of the {block(of)} to {at}" if block(of) else f"{source} to {at}"
 

@@ -10,10 +10,16 @@ from typing import Any
 
 from hapticlink.analysis.findings.episodes import Episode
 from hapticlink.analysis.findings.measures import Measures
-from hapticlink.analysis.findings.tracking import UserSignals, of_block, of_port
+from hapticlink.analysis.findings.tracking import (
+    UserSignals,
+    find_measured_handle,
+    of_block,
+    of_port,
+)
 from hapticlink.components.specs.control import PassivityLaw
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
+    PASS_ON,
     block_of_user,
     user_of_block,
 )
@@ -68,7 +74,7 @@ def _outside(results: Results) -> Iterator[str]:
     put_in = sum(
         max(energy.ideal, 0.0)
         for name, energy in record.meters.items()
-        if user_of_block(_fmus(name)[0], CONTROLLER) is None
+        if all(user_of_block(_fmus(name)[0], block) is None for block in PASS_ON)
     )
     matters = MATTERS * put_in + LEAST_J
     shared = {*map(_fmus, (name for name, J in record.overdrawn.items() if J > 0.0))}
@@ -136,9 +142,9 @@ def _counts(results: Results) -> Iterator[str]:
     record = results.record
     laws, devices = _laws(record.scene), all_devices(results)
     for user, law in laws.items():
-        handle = user.measured_handle
-        table, device = of_port(results, handle), devices.get(user.name)
-        if table is None or device is None or not len(table["time"]):
+        handle, device = find_measured_handle(results, user), devices.get(user.name)
+        table = of_port(results, handle) if handle else None
+        if handle is None or table is None or device is None or not len(table["time"]):
             continue
         damped = of_block(results, user.passivity_damping)
         if damped and not damped[user.passivity_damping].any():

@@ -7,7 +7,8 @@ they are held and `ideal` those of their sources, linear in the displacement bet
     drift        ideal(F_drift on D) + ideal(-F_drift on S)
     topology     ideal(F_T on D)
     environment  ideal(F_env on D) - ideal(F_env on S)
-    hold of C    held - ideal, of each connection C that works on the handle or the mechanism
+    hold of C    held - ideal, of each connection C that works on the handle or the mechanism, or on
+                 the motors where these take torques (the observer is beside the device)
     shaping      F_hand on S - F_hand on D + ideal(F_env on S) - ideal(F_drift + F_T + F_env on D)
                  - the holds in it
     mechanism    E - E(0) - held works on S
@@ -33,11 +34,17 @@ import numpy as np
 
 from hapticlink.analysis.findings.tracking import (
     UserSignals,
+    have_one_shape,
     of_port,
     path_of_point,
     table_of,
 )
 from hapticlink.analysis.findings.work_of_wrenches import Works
+from hapticlink.orchestrator.base.signal_names import (
+    MOTOR_ANGLES,
+    MOTOR_TORQUES,
+    signal_of_user,
+)
 from hapticlink.orchestrator.results.read_results import Results, Vector
 
 
@@ -46,11 +53,21 @@ def _wrenches(user: UserSignals) -> dict[str, str]:
     return {"drift": user.drift, "topology": user.topology, "environment": user.environment}
 
 
+def find_motor_port(results: Results, user: UserSignals) -> tuple[str, str]:
+    """By what the motors of a user's device work, and over what: torques over angles of a device
+    that takes torques, else the motors' wrench over the pose of the handle."""
+    torques, angles = (signal_of_user(s, user.name) for s in (MOTOR_TORQUES, MOTOR_ANGLES))
+    device = angles.partition(".")[0]
+    taken = f"{torques} -> {device}.tau" in results.record.meters
+    return (torques, angles) if taken else (user.motors, user.handle)
+
+
 def needed_signals(results: Results, users: Iterable[UserSignals]) -> set[str]:
     """The signals from which the blocks of these users are found, as far as a run has them."""
     signals: set[str] = set()
     for user in users:
-        own = path_of_point(results, user), user.handle, user.motors, *_wrenches(user).values()
+        own = path_of_point(results, user), user.handle, *_wrenches(user).values()
+        signals |= {*find_motor_port(results, user)}
         signals |= {*own, *(source for source, _ in _sources(results, user))}
     return signals
 
@@ -72,7 +89,7 @@ def by_block(
         return works.of(signal, position)[1] if there else None
 
     def made_by_hold(signal: str, position: str) -> Vector | None:
-        there = of_port(results, signal) and of_port(results, position)
+        there = have_one_shape(results, signal, position)
         return np.subtract(*works.of(signal, position)) if there else None
 
     for user, done in put_in.items():
@@ -82,9 +99,10 @@ def by_block(
             if (energy := ideal(signal, user.handle)) is not None:
                 shaping -= energy
                 add(name, energy)
-        if (energy := made_by_hold(user.motors, user.handle)) is not None:
+        motors = find_motor_port(results, user)
+        if (energy := made_by_hold(*motors)) is not None:
             shaping -= energy
-            add(f"hold of {user.motors}", energy)
+            add(f"hold of {motors[0]}", energy)
         if (energy := ideal(user.environment, point)) is not None:
             shaping += energy
             add("environment", np.negative(energy, out=energy))

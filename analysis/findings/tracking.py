@@ -18,7 +18,7 @@ from hapticlink.orchestrator.base.signal_names import (
     HAND_WRENCH,
     HANDLE_POSE,
     HELD_POINT,
-    MEASURED_HANDLE_POSE,
+    MEASURED_HANDLE_POSES,
     MOTOR_WRENCH,
     PASSIVITY_DAMPING,
     PASSIVITY_ENERGY,
@@ -43,12 +43,11 @@ class Tracking(NamedTuple):
 @dataclass(frozen=True)
 class UserSignals:
     """The signals of a user, whose name is that of the point with the device, empty for the first
-    user: poses of point, handle and encoders, wrenches, and what device and controller tell."""
+    user: poses of point and handle, wrenches, and what device and controller tell."""
 
     name: str
     point: str
     handle: str
-    measured_handle: str
     hand: str
     drift: str
     topology: str
@@ -71,7 +70,6 @@ class UserSignals:
 SIGNALS = (
     POINT_POSE,
     HANDLE_POSE,
-    MEASURED_HANDLE_POSE,
     HAND_WRENCH,
     DRIFT_WRENCH,
     TOPOLOGY_WRENCH,
@@ -116,6 +114,13 @@ def of_any_shape(results: Results, signal: str) -> Table | None:
     if fmu is None or not (name == fmu.block or name.startswith(f"{fmu.block}_")):
         return None
     return table_of(results, signal)
+
+
+def have_one_shape(results: Results, *signals: str) -> bool:
+    """Whether there are signals of the haptic loop, as efforts and displacements, of one shape."""
+    tables = [of_any_shape(results, signal) for signal in signals]
+    shapes = {table and table.shape(signal) for table, signal in zip(tables, signals, strict=True)}
+    return all(tables) and len(shapes) == 1
 
 
 def has_tracking(results: Results, user: UserSignals = FIRST) -> bool:
@@ -173,6 +178,13 @@ def count_constrained(results: Results) -> tuple[Vector, Vector] | None:
         if table := of_block(results, signal):
             return table["time"], table[signal]
     return None
+
+
+def find_measured_handle(results: Results, user: UserSignals) -> str | None:
+    """The signal of the pose of a user's handle as it is measured, by the observer where one is
+    beside the device; None where there is none."""
+    signals = (signal_of_user(signal, user.name) for signal in MEASURED_HANDLE_POSES)
+    return next((signal for signal in signals if of_port(results, signal)), None)
 
 
 def constraint_counts(numbers: Vector) -> dict[float, int]:

@@ -23,11 +23,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.port_blocks import by_block, needed_signals
+from hapticlink.analysis.findings.port_blocks import by_block, find_motor_port, needed_signals
 from hapticlink.analysis.findings.tracking import (
     FIRST,
     UserSignals,
     find_users,
+    have_one_shape,
+    of_any_shape,
     of_block,
     of_port,
     path_of_point,
@@ -47,7 +49,7 @@ from hapticlink.orchestrator.base.signal_names import (
     DRIFT_WRENCH,
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
-    HANDLE_INERTIA,
+    HANDLE_INERTIAS,
     HANDLE_POSE,
     MECHANISM,
     MECHANISM_ENERGY,
@@ -178,15 +180,15 @@ def _works(results: Results, works: Works, device: Table, time: Vector) -> dict[
     """The works (J) of single wrenches on the handles at the last of some times, those of further
     users named by their points, and of contacts on the mechanism."""
     found = {
-        f"{user.name}: {name}" if user.name else name: works.last(signal, user.handle)
+        f"{user.name}: {name}" if user.name else name: works.last(signal, moved)
         for user in find_users(results)
-        for name, signal in {
-            "hand": user.hand,
-            "motors": user.motors,
-            "F_T": user.topology,
-            "F_env": user.environment,
+        for name, (signal, moved) in {
+            "hand": (user.hand, user.handle),
+            "motors": find_motor_port(results, user),
+            "F_T": (user.topology, user.handle),
+            "F_env": (user.environment, user.handle),
         }.items()
-        if of_port(results, signal) and of_port(results, user.handle)
+        if have_one_shape(results, signal, moved)
     }
     if contact := of_port(results, ENVIRONMENT_WRENCH):
         path = path_of_point(results, FIRST)
@@ -205,6 +207,10 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
     if not held or own is not device or results.record.holds.get(crossing) != "zoh":
         return None
+    inertias = (signal for signal in HANDLE_INERTIAS if of_any_shape(results, signal) is device)
+    inertia_of_handle = next(inertias, None)
+    if inertia_of_handle is None:
+        return None
     times, mobility = held["time"], held[MOBILITIES[0]]
     signals = [s for s in (DRIFT_WRENCH, ENVIRONMENT_WRENCH) if s in device]
 
@@ -214,5 +220,5 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
         force: Vector = np.einsum("kij,kjl,kl->ki", inertia, change, wrench)
         return force.T
 
-    asked = "time", MOBILITIES[1], HANDLE_INERTIA, HAND_WRENCH, *signals
+    asked = "time", MOBILITIES[1], inertia_of_handle, HAND_WRENCH, *signals
     return np.ascontiguousarray(device.by_row(added, *asked).T)

@@ -160,7 +160,7 @@ class Works:
 
         def force_at(rows: NDArray[np.intp]) -> Vector:
             if not len(rows):
-                return np.zeros((0, 3))
+                return np.zeros((0, *table.shape(signal)))
             first = int(rows.min())
             part = table.part(slice(first, int(rows.max()) + 1))
             return sign * part[signal][rows - first]

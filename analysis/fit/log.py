@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import (
     HAND_WRENCH,
-    MEASURED_HANDLE_POSE,
+    MEASURED_HANDLE_POSES,
     MOTOR_WRENCH,
 )
 from hapticlink.orchestrator.results.read_results import Table, read_table
@@ -62,16 +62,15 @@ def read_log(path: Path | str) -> Log:
     run = path.parent / "run.json"
     of_run = path.name == "haptics.csv" and run.is_file()
     table = _hdf5(path) if path.suffix in (".h5", ".hdf5") else read_table(path)
-    names = {
-        name: name in table for name in ("time", MEASURED_HANDLE_POSE, MOTOR_WRENCH, HAND_WRENCH)
-    }
-    if not (names["time"] and names[MEASURED_HANDLE_POSE]):
+    pose = next((name for name in MEASURED_HANDLE_POSES if name in table), None)
+    if not ("time" in table and pose):
         raise InputFault(
-            f"{path}: a log needs the columns time (s) and {MEASURED_HANDLE_POSE}[1] to [3] "
+            f"{path}: a log needs the columns time (s) and {MEASURED_HANDLE_POSES[-1]}[1] to [3] "
             f"(m, m, rad), and {MOTOR_WRENCH}[1] to [3] or {HAND_WRENCH}[1] to [3] (N, N, N.m); "
             f"it has {', '.join(table.columns)}"
         )
-    signals = {name: table[name] for name, there in names.items() if there}
+    names = ("time", pose, MOTOR_WRENCH, HAND_WRENCH)
+    signals = {name: table[name] for name in names if name in table}
     for name, values in signals.items():
         wanted = () if name == "time" else PLANE.pose.shape
         if values.shape[1:] != wanted:
@@ -94,7 +93,7 @@ def read_log(path: Path | str) -> Log:
         )
     return Log(
         period=period,
-        pose=signals[MEASURED_HANDLE_POSE],
+        pose=signals[pose],
         motors=signals.get(MOTOR_WRENCH),
         hand=signals.get(HAND_WRENCH),
         held=of_run,

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from hapticlink.analysis.stability.state_vector import StateEntry
-from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, MECHANISM
+from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, MECHANISM, MOTOR_MAP
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold, array
@@ -81,8 +81,11 @@ def describe_switches(system: System) -> list[str]:
     lines = []
     for fmu in system.fmus:
         block, description = system.block(fmu.name), fmu.description
-        if block == DEVICE:
-            lines.append(f"{fmu.name}: saturation of the motors, and the stops")
+        stops = ["the stops"] if block == DEVICE else []
+        if block in (DEVICE, MOTOR_MAP) and description.port("torque_limit", "parameter"):
+            stops.insert(0, "saturation of the motors")
+        if stops:
+            lines.append(f"{fmu.name}: {', and '.join(stops)}")
         if block == "virtual_wall":
             lines.append(f"{fmu.name}: contact, if the wall is unilateral")
         if description.port("contact_gap", "output"):

@@ -251,7 +251,7 @@ def costs(
     read = open_scene.load(scene, options)
     pose = _visit_poses(read, 1)[0]
     rate = float(exact(read.haptics.rate))
-    late = {"motors": ("controller.F_motor",), "handle": ("haptic_device.x", "haptic_device.v")}
+    late = {"motors": ("controller.F_motor",), "handle": ("controller.x_D", "controller.v_D")}
     late["mechanism"] = ("virtual_mechanism.x", "virtual_mechanism.v")
     changes: dict[str, dict[str, object]] = {"as it is": {}}
     for name, factor in (("half", 0.5), ("twice", 2.0)):

@@ -83,6 +83,18 @@ def _haptic_device(device: Device, encoders: bool = False) -> Component:
     return haptic_device(device, encoders)
 
 
+def _observer(device: Device) -> Component:
+    from hapticlink.components.blocks.observer import observer
+
+    return observer(device)
+
+
+def _motor_map(device: Device) -> Component:
+    from hapticlink.components.blocks.motor_map import motor_map
+
+    return motor_map(device)
+
+
 def _controller(
     controller: Controller, linkage: Linkage, directions: Directions, clutch: bool = False
 ) -> Component:
@@ -147,6 +159,8 @@ BLOCKS: Registry[Callable[..., Component]] = Registry(
         "virtual_mechanism": _virtual_mechanism,
         "virtual_environment": _virtual_environment,
         "haptic_device": _haptic_device,
+        "observer": _observer,
+        "motor_map": _motor_map,
         "controller": _controller,
         "hand": _hand,
         "discrete_equivalent": _discrete_equivalent,

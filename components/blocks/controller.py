@@ -21,11 +21,14 @@ Only a passivity controller has memory.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
 from hapticlink.components.dynamics import grasp
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import SpringPorts
 from hapticlink.components.specs.control import Controller, PassivityLaw, Topology
@@ -138,7 +141,7 @@ def controller(
         states=states,
         outputs=outputs,
     )
-    output = _wrenches(spec, space, law, block)
+    output, parts = _wrenches(spec, space, law, block)
     initial: dict[str, ca.SX] = {}
     step: dict[str, ca.SX] = {}
     if guard:
@@ -146,6 +149,9 @@ def controller(
         guarded = passivity.passive(F, u["x_D"], u["M"], block.x, block.p)
         initial, step = guarded.initial, guarded.step
         output |= guarded.output | {"F_motor": guarded.wrench}
+        (*parts, last) = parts
+        reads = ("u", "x_D", "M")
+        parts += [replace(last, gives=("u",)), passivity.part(guard, space, reads, "F_motor")]
     return block.component(
         "controller",
         "Impedance, four-channel teleoperation and topology controller",
@@ -155,16 +161,22 @@ def controller(
         output=output,
         documentation=__doc__ or "",
         springs=[_DRIFT] if spec.teleoperation else [],
+        parts=parts,
     )
 
 
 def _wrenches(
     spec: Controller, space: PortSpace, law: Topology | None, block: Block
-) -> dict[str, ca.SX]:
-    """u of the motors, before the passivity controller, with F_drift and F_T where they are."""
+) -> tuple[dict[str, ca.SX], list[BlockPart]]:
+    """u of the motors, before the passivity controller, with F_drift and F_T where they are; and
+    the parts that make them, of which the last gives F_motor."""
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
+    parts, terms, reads = list[BlockPart](), "", list[str]()
     force, coupling_energy = ca.SX.zeros(space.size), ca.SX(0)
+    apart = ("x_S", "v_S", "x_D", "v_D")
+
+    clutch = (grasp.HELD,) if grasp.HELD in u else ()
 
     def held(wrench: ca.SX, otherwise: ca.SX | float = 0.0) -> ca.SX:
         """A wrench of the mechanism, and what stands in its place while no point is held."""
@@ -177,19 +189,33 @@ def _wrenches(
         output["F_drift"] += p["B_pc"] * (u["v_S"] - u["v_D"])
         output["F_drift"] = held(output["F_drift"])
         force += output["F_drift"]
+        law_text = r"$F_{drift} = K_{pc} (x_S - x_D)$" "\n" r"$+ B_{pc} (v_S - v_D)$"
+        gains = (*apart, "K_pc", "B_pc", *clutch)
+        parts.append(
+            BlockPart("position channels", law_text, "sections 4.2.3, B.6", gains, ("F_drift",))
+        )
+        terms, reads = " + F_{drift}", ["F_drift"]
     if spec.contact:
         force += held(u["F_env"])
+        terms, reads = terms + " + F_{env}", [*reads, "F_env", *clutch]
     if spec.damping is not None:
         force -= p["B_d"] * u["v_D"]
+        terms, reads = terms + " - B_d v_D", [*reads, "v_D", "B_d"]
     if spec.stiffness is not None:
         force -= p["K_d"] * space.difference(u["x_D"], p["x_ref"])
+        terms, reads = terms + " - K_d (x_D - x_{ref})", [*reads, "x_D", "K_d", "x_ref"]
 
-    motor = force
+    motor, summed = force, terms.removeprefix(" + ") or "0"
     if spec.impedance:
         a = u["Lambda_inv"] @ (u["F_hand"] + force)
+        desired = rf"$a = \Lambda^{{-1}} (F_h{terms})$"
+        reads = ["Lambda_inv", "F_hand", *reads]
         if spec.bias == "full":
             a += u["a_bias"]
+            desired, reads = desired + "\n" r"$+ a_{bias}$", [*reads, "a_bias"]
         motor = held(u["M"] @ a + u["c"] - u["F_hand"], u["c"] + force)
+        parts.append(BlockPart("desired motion", desired, "(4.3), (4.4)", tuple(reads), ("a",)))
+        summed, reads = "M_d a + C_d v - F_h", ["M", "a", "c", "F_hand", *clutch]
     if law:
 
         def constrain(pull: ca.SX) -> ca.SX:
@@ -199,6 +225,21 @@ def _wrenches(
         F_T = held(constrain(p["k_j"] * e + p["b_j"] * (u["v_S"] - u["v_D"])))
         coupling_energy += ca.dot(e, constrain(p["k_j"] * e)) / 2
         output["F_constraint"], motor = F_T, motor + F_T
-    if grasp.HELD in u:
+        pulled = (*apart, "M", "P_c", "k_j", "b_j", "length_scale", *clutch)
+        parts.append(
+            BlockPart(
+                "topology controller", topology.LAW, "section 4.2.4", pulled, ("F_constraint",)
+            )
+        )
+        summed, reads = f"{summed} + F_T", [*reads, "F_constraint"]
+    name, source = ("impedance law", "(4.6), corrected") if spec.impedance else ("sum", "")
+    parts.append(
+        BlockPart(name, f"$u = {summed}$", source, tuple(dict.fromkeys(reads)), ("F_motor",))
+    )
+    if clutch:
         output["coupling_energy"] = held(coupling_energy)
-    return output | {"F_motor": motor}
+        known = ("x_S", "x_D", "K_pc", "k_j", "M", "P_c", "length_scale", grasp.HELD)
+        springs = tuple(name for name in known if name in u or name in p)
+        law_text = r"$E = (e \cdot K_{pc} e + e \cdot F_T(k_j e)) / 2$"
+        parts.append(BlockPart("coupling's springs", law_text, "", springs, ("coupling_energy",)))
+    return output | {"F_motor": motor}, parts

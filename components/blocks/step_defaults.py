@@ -53,6 +53,13 @@ class StepDefaults:
             text = "step size of the graphics copy"
             self.parameters.append(Variable(FRAME_SIZE, (), "s", frame_s or 0.0, text, "fixed"))
 
+    @property
+    def alpha_text(self) -> str:
+        """By which default alpha comes about, for the schematic; "" where there is none."""
+        period = "frame" if self._held else "step"
+        text = rf"$\alpha$ = {self.baumgarte.alpha_T:g} / {period}"
+        return text if self._alpha else ""
+
     def define(self, p: Signals) -> None:
         """Gives each default its name among the parameters p."""
         if STEP_SIZE in p:

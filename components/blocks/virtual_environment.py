@@ -24,8 +24,11 @@ from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import (
     direction_outputs,
     direction_parameters,
+    directions_part,
     length_parameter,
     mobility_output,
+    mobility_part,
+    operational_point,
     parameters,
     start_parameters,
     states,
@@ -33,6 +36,7 @@ from hapticlink.components.dynamics.variables import (
 from hapticlink.components.linkage import branch
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import coordinates
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage
 
@@ -112,6 +116,7 @@ def virtual_environment(
         substeps=1 if copy.sync == "exact" else copy.substeps,
         memory=counts,
         documentation=__doc__ or "",
+        parts=_schematic(block, copy),
     )
     require_assembled(component, model)
     require_inertia(component, model)
@@ -159,6 +164,41 @@ def _outputs(
         *(held_matrices.ports(linkage) if local_model else []),
         *grasp.outputs_of_copy(linkage),
     ]
+
+
+def _schematic(block: Block, copy: GraphicsCopy) -> list[BlockPart]:
+    """The parts, in the order of their evaluation; what is no output of the block has none."""
+    outputs = [v.name for v in block.outputs]
+    parts = [*follow_mechanism.parts(copy), operational_point(("x", "v"))]
+    mobilities = tuple(name for name in outputs if name.endswith("Lambda_inv"))
+    if mobilities:
+        parts.append(mobility_part(mobilities))
+    directions = tuple(name for name in outputs if name.endswith(("P_c", "n_constraints")))
+    if directions:
+        counted = tuple(name for name in block.x if name.endswith("n_constrained"))
+        parts.append(directions_part(mobilities or ("q",), (*directions, *counted)))
+    if "contacts" in outputs:
+        kept = tuple(name for name in block.x if name == kept_sides.NAME)
+        parts.append(
+            BlockPart(
+                "contact geometry",
+                "gaps, normals, places",
+                "section 4.2.2",
+                ("q",),
+                ("contacts", *kept),
+            )
+        )
+    if matrices := tuple(name for name in ("D", "W", "w", "J_h") if name in outputs):
+        text = ", ".join(held_matrices.SYMBOLS[name] for name in matrices)
+        parts.append(
+            BlockPart(
+                "local model's matrices", f"${text}$", "(B.15), fig. B.3", ("q", "qd"), matrices
+            )
+        )
+    if "branch_ok" in outputs:
+        text = r"$\mathrm{sign}\,\det W_d$, $\|q_{ref} - q\|$"
+        parts.append(BlockPart("branch", text, "", ("q", "q_ref"), ("branch_ok", "q_error")))
+    return parts
 
 
 def _branch(block: Block, model: LinkageModel) -> dict[str, ca.SX]:

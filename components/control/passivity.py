@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Signals, Variable
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.specs.control import PassivityLaw
 
@@ -60,6 +61,17 @@ OUTPUTS = (
     Variable("passivity_energy_left", (), "J", description="E, what the motors may still give"),
     Variable("passivity_damping", (), "1/s", description="beta/T of the passivity controller"),
 )
+
+
+def part(
+    spec: PassivityLaw, space: PortSpace, reads: tuple[str, str, str], gives: str
+) -> BlockPart:
+    """The part that reads rendered wrench, pose and inertia, and gives F, by their names."""
+    given = tuple(v.name for v in (*states(spec, space), *OUTPUTS))
+    gains = tuple(v.name for v in parameters(spec))
+    law = r"$F = u - \frac{\beta}{T} M \frac{\Delta x}{T}$"
+    source = "Hannaford, Ryu 2002"
+    return BlockPart("passivity controller", law, source, (*reads, *gains), (gives, *given))
 
 
 @dataclass(frozen=True)

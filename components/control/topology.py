@@ -11,6 +11,9 @@ import casadi as ca
 from hapticlink.components.dynamics.constrained_directions import scaling
 from hapticlink.components.port_space import PortSpace
 
+LAW = r"$F_T = S (P_c M_s^{-1} P_c)^+ S$" "\n" r"$(k_j e + b_j \dot{e}),\ e = x_S - x_D$"
+"""Of the schematic."""
+
 
 def constraint_wrench(
     space: PortSpace, pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX

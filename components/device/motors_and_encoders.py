@@ -20,10 +20,20 @@ Field = NDArray[np.float64]
 def quantised(value: ca.SX, quantum: ca.SX, share: float = 0.0) -> ca.SX:
     """quantum floor(value/quantum + share): rounded down by default, to the nearest count by a
     share of 0.5; the value itself where the quantum is 0."""
+    return _quantised(value, quantum, share)[0]
+
+
+def count(angles: ca.SX, resolution: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Angles (rad) by encoders, counts to the nearest one times resolution, and these counts; where
+    the resolution is 0, the angles themselves, and counts of one radian."""
+    return _quantised(angles, resolution, 0.5)
+
+
+def _quantised(value: ca.SX, quantum: ca.SX, share: float) -> tuple[ca.SX, ca.SX]:
     coarse = quantum > 0.0
     counts = value / ca.if_else(coarse, quantum, 1.0)
-    counts = counts + share if share else counts
-    return ca.if_else(coarse, quantum * ca.floor(counts), value)
+    counts = ca.floor(counts + share if share else counts)
+    return ca.if_else(coarse, quantum * counts, value), counts
 
 
 def numbers(device: Device) -> dict[str, Any]:

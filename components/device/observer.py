@@ -1,6 +1,8 @@
-"""Nicosia observer: estimates device velocity and hand force from pose and motor torques.
+"""Nicosia observer: estimates device velocity, acceleration and hand force from the angles of the
+driven joints and the torques of their motors.
 
-The report's section 4.2.1 names it (after Nicosia & Tomei 1990) without equations or gains:
+The report's section 4.2.1 names it (after Nicosia & Tomei 1990) without equations or gains. On the
+pose x that belongs to the measured angles,
 
     x1' = x2 + k_D e,    M x2' = F_m - C x2 + K_p e,    e = x - x1,    K_p = M omega_n^2
 
@@ -11,12 +13,16 @@ For constant M and C = 0 the observed force follows
 
 M and C are constant over a step, so that any rule of `discretisation` applies to the linear system.
 At t = 0 x1 is the measured pose and x2 zero: no velocity, no force.
+
+`ForceObserver` knows a mass, `HandleObserver` any device by its kinematics. The latter is the
+observer within the device's block, and that of the block `observer` beside it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import casadi as ca
 
@@ -73,3 +79,85 @@ class ForceObserver:
         x2 itself is biased by k_D K_p^-1 F, with F the hand's wrench, which is no input.
         """
         return state.x2 + self.k_D * (pose - state.x1)
+
+
+Parameters = Mapping[str, ca.SX]
+
+
+class Kinematics(Protocol):
+    """What the observer asks of a device, as functions of its parameters p: `pantograph`. Poses and
+    velocities are (n,), angles and torques of the motors (m,)."""
+
+    def pose_from_angles(self, angles: ca.SX, guess: ca.SX, p: Parameters) -> ca.SX:
+        """The pose whose angles are nearest to those measured."""
+
+    def jacobian(self, pose: ca.SX, p: Parameters) -> ca.SX:
+        """Of the angles with respect to the pose, (m, n)."""
+
+    def dynamics(self, pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
+        """M and C, both (n, n)."""
+
+    def motion(self, pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
+        """M and the vector C v."""
+
+
+class ObservedHandle(NamedTuple):
+    """The measured pose (m, m, rad) at a sample, (n,), and the state of the observer there."""
+
+    pose: ca.SX
+    state: State
+
+    @classmethod
+    def of(cls, x: Mapping[str, ca.SX]) -> ObservedHandle:
+        """That of a block with `OBSERVER_STATES`."""
+        return cls(x["x_measured"], State(x["x_observer"], x["v_observer"]))
+
+    @property
+    def states(self) -> dict[str, ca.SX]:
+        """By the names of `OBSERVER_STATES`."""
+        x1, x2 = self.state
+        return {"x_measured": self.pose, "x_observer": x1, "v_observer": x2}
+
+
+@dataclass(frozen=True)
+class HandleObserver:
+    """The observer of a device with parameters p, `omega_n` and `k_D` among them, stepped by a rule
+    of `discretisation`."""
+
+    device: Kinematics
+    p: Parameters
+    rule: str
+
+    def start(self, angles: ca.SX, guess: ca.SX) -> ObservedHandle:
+        """The handle at rest, without a force, with measured angles (rad) near a guessed pose."""
+        pose = self.device.pose_from_angles(angles, guess, self.p)
+        return ObservedHandle(pose, State(pose, ca.SX.zeros(pose.numel())))
+
+    def advance(
+        self, before: ObservedHandle, angles: ca.SX, tau: ca.SX, period: ca.SX
+    ) -> ObservedHandle:
+        """The handle with measured angles (rad), a `period` (s) after a sample before it, over
+        which the torques tau (N.m) were held."""
+        pose = self.device.pose_from_angles(angles, before.pose, self.p)
+        F_motor = self.device.jacobian(before.pose, self.p).T @ tau
+        M, C = self.device.dynamics(before.pose, before.state.x2, self.p)
+        step = self._law.step(before.state, before.pose, pose, F_motor, M, C, period)
+        return ObservedHandle(pose, step)
+
+    def outputs(self, now: ObservedHandle) -> dict[str, ca.SX]:
+        """By name: pose x, velocity v, F_hand_observed, and M and c = C v there."""
+        v = self._law.velocity(now.state, now.pose)
+        M, c = self.device.motion(now.pose, v, self.p)
+        F_hand = self._law.force(now.state, now.pose, M)
+        return {"x": now.pose, "v": v, "F_hand_observed": F_hand, "M": M, "c": c}
+
+    def acceleration(self, now: ObservedHandle, tau: ca.SX) -> ca.SX:
+        """a = M^-1 (J_q' tau + F_hand_observed - C v) of (4.5) (m/s2, m/s2, rad/s2), (n,), at the
+        end of a period over which the torques tau (N.m) were held."""
+        seen = self.outputs(now)
+        F_motor = self.device.jacobian(now.pose, self.p).T @ tau
+        return ca.solve(seen["M"], F_motor + seen["F_hand_observed"] - seen["c"])
+
+    @property
+    def _law(self) -> ForceObserver:
+        return ForceObserver(self.rule, self.p["omega_n"], self.p["k_D"])

@@ -18,6 +18,8 @@ from typing import NamedTuple
 import casadi as ca
 
 Parameters = Mapping[str, ca.SX]
+MOTORS = 4
+"""Arms, each with a motor and an encoder at its base joint."""
 
 
 class Arm(NamedTuple):
@@ -66,32 +68,39 @@ def base_angles(pose: ca.SX, p: Parameters) -> ca.SX:
     return ca.vertcat(*(arm.proximal for arm in arms(pose, p)))
 
 
-def _rates(arm: Arm, p: Parameters) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Jacobians with respect to the pose, (1, 3), (2, 3) and (1, 3): of the proximal angle, of the
-    distal link's centre of mass, and of the distal angle.
+def _across(r: ca.SX) -> ca.SX:
+    return ca.vertcat(-r[1], r[0])
+
+
+def _angle_rates(arm: Arm, p: Parameters) -> tuple[ca.SX, ca.SX]:
+    """Jacobians of the proximal and the distal angle with respect to the pose, both (1, 3).
 
     With unit vectors u along and n across the links and e the crank end, the derivative of
     base + l1 u1 + l2 u2 = e(pose), projected on u2 and u1, gives
 
         proximal' = u2 . e' / (l1 u2 . n1),   distal' = -u1 . e' / (l2 u2 . n1)
     """
-
-    def across(r: ca.SX) -> ca.SX:
-        return ca.vertcat(-r[1], r[0])
-
     u1, u2 = arm.proximal_direction, ca.vertcat(ca.cos(arm.distal), ca.sin(arm.distal))
-    n1, n2 = across(u1), across(u2)
-    end = ca.horzcat(ca.SX.eye(2), across(arm.offset))
-    s = ca.dot(u2, n1)
+    end = ca.horzcat(ca.SX.eye(2), _across(arm.offset))
+    s = ca.dot(u2, _across(u1))
     proximal = u2.T @ end / (p["proximal_length"] * s)
     distal = -(u1.T @ end) / (p["distal_length"] * s)
+    return proximal, distal
+
+
+def _rates(arm: Arm, p: Parameters) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Jacobians with respect to the pose, (1, 3), (2, 3) and (1, 3): of the proximal angle, of the
+    distal link's centre of mass, and of the distal angle."""
+    proximal, distal = _angle_rates(arm, p)
+    n1 = _across(arm.proximal_direction)
+    n2 = _across(ca.vertcat(ca.cos(arm.distal), ca.sin(arm.distal)))
     centre = p["proximal_length"] * n1 @ proximal + p["distal_center"] * n2 @ distal
     return proximal, centre, distal
 
 
 def jacobian(pose: ca.SX, p: Parameters) -> ca.SX:
     """J_q = dq/dpose, shape (4, 3): qdot = J_q v, and torques tau give the wrench J_q' tau."""
-    return ca.vertcat(*(_rates(arm, p)[0] for arm in arms(pose, p)))
+    return ca.vertcat(*(_angle_rates(arm, p)[0] for arm in arms(pose, p)))
 
 
 def _all_jacobians(pose: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:

@@ -37,8 +37,8 @@ def outputs() -> list[Variable]:
     rank = "number of closures that are independent at this pose"
     condition = "condition of W D^-1 W' without its zero eigenvalues"
     return [
-        Variable("rank", description=rank),
-        Variable("condition", description=condition, max=ANY),
+        Variable("rank", description=rank, on_request=True),
+        Variable("condition", description=condition, max=ANY, on_request=True),
     ]
 
 

@@ -17,6 +17,8 @@ joint        The same with every coordinate pulled, by an acceleration K_g (q_re
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 
 from hapticlink.components.component import Block, Variable
@@ -26,6 +28,7 @@ from hapticlink.components.dynamics.projection import MU, projection
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import coordinates
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 
 
@@ -55,6 +58,35 @@ def gains(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:
     return [
         Variable("K_g", *space.stiffness, copy.stiffness, "stiffness of the graphics controller"),
         Variable("B_g", *space.damping, copy.damping, "damping of the graphics controller"),
+    ]
+
+
+_COPY = BlockPart(
+    "copy of the linkage",
+    r"$D \ddot{q} + C \dot{q} = J_h^T F_g + W^T \lambda$" "\n" r"$W \dot{q} = 0,\ h(q) = 0$",
+    "4.2.2; linearly implicit", ("F_g",), ("q", "qd"),
+)  # fmt: skip
+
+
+def parts(copy: GraphicsCopy) -> list[BlockPart]:
+    """The parts that give the copy's q and qd."""
+    if copy.sync == "exact":
+        law = r"$q = q_{ref} - W^+ h,\ h(q) = 0$" "\n" r"$\dot{q}$: so that $W \dot{q} = 0$"
+        return [
+            BlockPart(
+                "projection", law, "in place of section 4.2.2", ("q_ref", "qd_ref"), ("q", "qd")
+            )
+        ]
+    if copy.sync == "joint":
+        law = r"$Q_g = D (K_g (q_{ref} - q)$" "\n" r"$+ B_g (\dot{q}_{ref} - \dot{q}))$"
+        reads = ("q_ref", "qd_ref", "q", "qd", "K_g", "B_g")
+        pulled = replace(_COPY, equation=_COPY.equation.replace("J_h^T F_g", "Q_g"), reads=("Q_g",))
+        return [BlockPart("graphics controller (C)", law, "section 4.2.2", reads, ("Q_g",)), pulled]
+    law = r"$F_g = K_g (x_{ref} - x)$" "\n" r"$+ B_g (v_{ref} - v)$"
+    reads = ("x_ref", "v_ref", "x", "v", "K_g", "B_g")
+    return [
+        BlockPart("graphics controller (C)", law, "section 4.2.2, fig. 4.4", reads, ("F_g",)),
+        _COPY,
     ]
 
 

@@ -26,6 +26,9 @@ from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Linkage
 
+SYMBOLS = {"D": r"\widehat{D}", "W": r"\widehat{W}", "w": r"\widehat{w}", "J_h": r"\widehat{J}_h"}
+"""Of the schematic, for values held from the last frame."""
+
 
 def ports(linkage: Linkage) -> list[Variable]:
     """The inputs D (n x n), W (m x n), w (m) and J_h (k x n); their start values are those of the

@@ -10,6 +10,7 @@ from hapticlink.components.linkage.parameters import (
     coordinates,
     mean_link_length,
 )
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
@@ -73,20 +74,20 @@ def motion_outputs(linkage: Linkage) -> list[Variable]:
     units, m, space = linkage.coordinate_units, sum(rows(linkage)), linkage.space
     changes = tuple(f"{u}/s2" for u in units)
     n, velocity = (len(units),), "velocity of the operational point"
-    bias = "operational acceleration at zero wrench"
+    bias, accelerations = "operational acceleration at zero wrench", "joint accelerations"
     variables = [
         Variable("x", *space.pose, description="pose of the operational point"),
         Variable("v", *space.twist, description=velocity, derivative_of="x"),
         Variable("q", n, units, description="joint coordinates"),
         Variable("qd", n, linkage.rate_units, description="joint rates", derivative_of="q"),
-        Variable("qdd", n, changes, description="joint accelerations", derivative_of="qd"),
-        Variable("a_bias", *space.acceleration, description=bias),
+        Variable("qdd", n, changes, 0.0, accelerations, derivative_of="qd", on_request=True),
+        Variable("a_bias", *space.acceleration, description=bias, on_request=True),
         Variable("energy", (), "J", description="kinetic and potential energy"),
     ]
     if m:
         text, gap = "Lagrange multipliers of the loops", "largest gap over the loops"
         link = mean_link_length(linkage)  # a loop that is open by a link's length has diverged
-        variables.append(Variable("lambda", (m,), "N", description=text))
+        variables.append(Variable("lambda", (m,), "N", description=text, on_request=True))
         variables.append(Variable("closure_error", (), "m", description=gap, max=link))
     return variables
 
@@ -106,3 +107,22 @@ def direction_outputs(space: PortSpace, user: str = "") -> list[Variable]:
         Variable(f"{prefix}P_c", *space.projector, description=text, kind="projector"),
         Variable(f"{prefix}n_constraints", description=f"number of constrained directions{at}"),
     ]
+
+
+def operational_point(gives: tuple[str, ...]) -> BlockPart:
+    """The transformation T from joint coordinates to the operational point."""
+    law = r"$x = r_h(q),\ v = J_h \dot{q}$"
+    return BlockPart("operational point (T)", law, "(2.16), fig. 4.4", ("q", "qd"), gives)
+
+
+def mobility_part(gives: tuple[str, ...], reads: tuple[str, ...] = ("q",)) -> BlockPart:
+    """Lambda^-1 at the operational point and at further ones."""
+    law = r"$\Lambda^{-1} = J_h D^{-1} (J_h^T - W^T$" "\n" r"$(W D^{-1} W^T)^{-1} W D^{-1} J_h^T)$"
+    return BlockPart("mobility", law, "(B.13)", reads, gives)
+
+
+def directions_part(reads: tuple[str, ...], gives: tuple[str, ...]) -> BlockPart:
+    """The constrained directions of a mobility."""
+    law = r"$P_c$: projector on null$(S \Lambda^{-1} S)$"
+    gains = ("length_scale", "rank_tolerance", "hysteresis")
+    return BlockPart("constrained directions", law, "in place of (B.14)", (*reads, *gains), gives)

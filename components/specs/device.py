@@ -27,6 +27,10 @@ class Observer:
     """Bandwidth."""
     k_D: Annotated[float, Quantity("1/s", gt=0)] = 100.0
     """Output gain."""
+    beside: bool = False
+    """true: the observer is an FMU of its own beside the device, which takes torques and puts out
+    base angles, as a device from elsewhere does that is to be observed; the numbers are the same.
+    Needs sensing = "encoders"."""
 
 
 @dataclass(frozen=True, kw_only=True)

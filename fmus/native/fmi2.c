@@ -2,7 +2,7 @@
    functions. component.h, generated, holds both the sizes and the functions:
 
        x0 = initialize(u, p),   y, z = output(x, u, p, t),   x' = substep(x, u, p, t, h),
-       x', y, z' = advance(x, u, p, t, h, end, z)
+       x', y, z' = advance(x, u, p, t, h, end, z),   x', y, z' = reduced(x, u, p, t, h, end, z)
 
    All reals stand in one array [inputs | parameters | outputs]; a place is a value reference.
 
@@ -14,6 +14,10 @@
 
    z are values for the next step that the outputs have evaluated already (one_pass.py); they are no
    state: where p, x or t are not those that they were evaluated for, they are evaluated again.
+
+   reduced, where there is one, leaves out the outputs on request of a plant. It takes the place of
+   advance where these have not been read for RARELY steps, or had not been between the last two
+   reads; when they are read again, y = output(x, u, p, t), with the same bits.
 
    Up to the end of initialisation mode both kinds answer a get with y = output(x0, u, p, t) of the
    values set so far. The Python FMU (python_slave.py) does the same operations in the same order.
@@ -32,6 +36,9 @@
 
 #include "component.h"
 
+#if !REDUCED
+#define reduced advance /* never called */
+#endif
 #if SUBSTEPS == 1
 #define substep advance /* never called */
 #endif
@@ -57,6 +64,8 @@ typedef struct {
     double shared[N_Z + 1], next[N_Z + 1]; /* z, and the one after a step */
     double stop;                           /* INFINITY where none is defined */
     double shared_time;                    /* for which z was evaluated; NAN: it is out of date */
+    int left_out;                          /* whether the last step left out outputs */
+    long long unread, unread_before; /* steps since outputs on request were read, and before that */
     char name[];
 } Model;
 
@@ -121,6 +130,7 @@ static void evaluate_output(Model *m, double time) {
     Room room;
     output(arguments, results, room.iw, room.w, 0);
     m->shared_time = time;
+    m->left_out = 0;
 }
 
 /* Bring x0 and y up to date with what was set. */
@@ -132,10 +142,21 @@ static void refresh(Model *m) {
         initialize(arguments, results, room.iw, room.w, 0);
         m->now.start_due = 0;
     }
-    if (m->now.output_due) {
+    if (m->now.output_due || m->left_out) {
         evaluate_output(m, m->now.time);
         m->now.output_due = 0;
     }
+}
+
+/* Bring what is read at an output's value reference up to date. */
+static void refresh_output(Model *m, fmi2ValueReference vr) {
+    if (REDUCED && !on_request[vr - SETTABLE]) {
+        if (m->now.start_due || m->now.output_due) refresh(m);
+        return;
+    }
+    if (m->unread) m->unread_before = m->unread;
+    m->unread = 0;
+    refresh(m);
 }
 
 static void restart(Model *m) {
@@ -145,6 +166,8 @@ static void restart(Model *m) {
     m->now.mode = INSTANTIATED;
     m->now.start_due = m->now.output_due = 1;
     m->shared_time = NAN;
+    m->left_out = 0;
+    m->unread = m->unread_before = 0;
     m->stop = INFINITY;
 }
 
@@ -209,7 +232,7 @@ fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[
     if (is_null(m, __func__, n, vr, value)) return fmi2Error;
     for (size_t i = 0; i < n; i++) {
         if (is_unknown(m, vr[i], REALS)) return fmi2Error;
-        if (vr[i] >= SETTABLE) refresh(m);
+        if (vr[i] >= SETTABLE) refresh_output(m, vr[i]);
         value[i] = m->now.reals[vr[i]];
     }
     return fmi2OK;
@@ -273,9 +296,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     m->now.output_due = !SAMPLED;
     m->shared_time = NAN;
     memcpy(m->trial, m->now.x, sizeof m->trial);
+    const int less = REDUCED && (m->unread >= RARELY || m->unread_before >= RARELY);
     for (int k = 0; k < SUBSTEPS; k++) {
         time = start + k * size / SUBSTEPS;
-        (k == WITH_OUTPUTS ? advance : substep)(arguments, results, room.iw, room.w, 0);
+        (k != WITH_OUTPUTS ? substep : less ? reduced : advance)(arguments, results, room.iw, room.w, 0);
         memcpy(m->trial, m->after, sizeof m->trial);
     }
     int i = first_not_finite(m->trial, N_X);
@@ -296,6 +320,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     memcpy(m->shared, m->next, sizeof m->shared);
     m->now.time = m->shared_time = end;
     m->now.output_due = 0;
+    m->left_out = less;
+    m->unread++;
     return fmi2OK;
 }
 
@@ -306,6 +332,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     if (is_null(m, __func__, 1, state, state)) return fmi2Error;
     if (!*state) *state = malloc(sizeof(State));
     if (!*state) return fail(m, fmi2Error, "no memory for an FMU state");
+    if (m->left_out) refresh(m);
     memcpy(*state, &m->now, sizeof(State));
     /* A plant's outputs follow from the rest, also where an importer has changed the bytes. */
     if (!SAMPLED) ((State *)*state)->output_due = 1;
@@ -317,6 +344,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     if (!is_ours(m, state)) return fmi2Error;
     memcpy(&m->now, state, sizeof(State));
     m->shared_time = NAN;
+    m->left_out = 0;
     return fmi2OK;
 }
 

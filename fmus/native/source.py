@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import casadi as ca
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.fmu_functions import one_pass
+from hapticlink.fmus.fmu_functions import RARELY, on_request, one_pass
 from hapticlink.fmus.native.split_functions import split_functions
 
 
@@ -35,6 +35,8 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
         "N_Z": parts.n_shared,
         "SUBSTEPS": component.substeps,
         "SAMPLED": int(component.timing == "sampled"),
+        "REDUCED": int(parts.reduced is not None),
+        "RARELY": RARELY,
         # Working memory that the functions need to call the look-ups of tables.
         **{f"N_{of.upper()}": _room(text, of) for of in ("arg", "res", "iw", "w")},
     }
@@ -45,6 +47,7 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
             table("char *const state_names", map(json.dumps, component.state_texts)),
             table("double starts", map(number, starts)),
             table("char is_fixed", (str(int(flag)) for flag in fixed)),
+            table("char on_request", (str(int(flag)) for flag in on_request(component))),
             text,
         ]
     )

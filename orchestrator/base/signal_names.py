@@ -13,18 +13,26 @@ from typing import TypeVar
 
 HAND = "hand"
 DEVICE = "haptic_device"
+OBSERVER = "observer"
+"""Of a device whose observer is beside it."""
 CONTROLLER = "controller"
+MOTOR_MAP = "motor_map"
+"""That makes torques of the controller's wrench, for the same device."""
 MECHANISM = "virtual_mechanism"
 ENVIRONMENT = "virtual_environment"
 SHARED = (MECHANISM, ENVIRONMENT)
 """The blocks that all users share."""
+PASS_ON = (CONTROLLER, MOTOR_MAP)
+"""The blocks whose wrenches and torques pass on what hands and mechanism put in."""
 
 HAND_WRENCH = f"{HAND}.F"
 
 HANDLE_POSE = f"{DEVICE}.x_true"
 HANDLE_VELOCITY = f"{DEVICE}.v_true"
-MEASURED_HANDLE_POSE = f"{DEVICE}.x"
-HANDLE_INERTIA = f"{DEVICE}.M"
+MEASURED_HANDLE_POSES = (f"{OBSERVER}.x", f"{DEVICE}.x")
+"""The measured pose, computed by either block."""
+HANDLE_INERTIAS = (f"{OBSERVER}.M", f"{DEVICE}.M")
+"""The device's inertia at the handle, computed by either block."""
 WORKSPACE_MARGIN = f"{DEVICE}.workspace_margin"
 """Negative (m) where the device is outside its workspace."""
 
@@ -33,6 +41,9 @@ TOPOLOGY_WRENCH = f"{CONTROLLER}.F_constraint"
 COUPLING_ENERGY = f"{CONTROLLER}.coupling_energy"
 """Stored in F_drift and F_T, where the operational point changes."""
 MOTOR_WRENCH = f"{CONTROLLER}.F_motor"
+MOTOR_TORQUES = f"{MOTOR_MAP}.tau"
+MOTOR_ANGLES = f"{DEVICE}.q_true"
+"""Both where the observer is beside the device; the torques work over the angles."""
 PASSIVITY_DAMPING = f"{CONTROLLER}.passivity_damping"
 PASSIVITY_ENERGY = f"{CONTROLLER}.passivity_energy_left"
 

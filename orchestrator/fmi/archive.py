@@ -36,10 +36,8 @@ def open_archive(
             archive.filename = str(path)
             entries = archive.infolist()
             for entry in entries:
-                if fault := _outside(entry):
-                    raise InputFault(
-                        f"{path}: entry {entry.filename!r} {fault}; take no {kind} from there"
-                    )
+                if fault := _outside(entry, kind):
+                    raise InputFault(f"{path}: entry {entry.orig_filename!r} {fault}")
             if fault := _too_large(entries):
                 raise InputFault(
                     f"{path}: {fault} are unpacked; take out what no run needs: sources, "
@@ -54,15 +52,18 @@ def open_archive(
         raise InputFault(f"{path}: damaged, not a readable zip archive ({error})") from error
 
 
-def _outside(entry: zipfile.ZipInfo) -> str:
-    """The reason to refuse an entry, "" if there is none."""
+def _outside(entry: zipfile.ZipInfo, kind: str) -> str:
+    """The reason to refuse an entry of a `kind` ("FMU"), with the remedy; "" if there is none."""
     name = entry.orig_filename
-    if "\\" in name or ":" in name or "\0" in name:
-        return "is not a path with forward slashes"
-    if name.startswith("/") or ".." in PurePosixPath(name).parts:
-        return "points outside the archive"
+    nowhere = f"take no {kind} from there"
+    if name.startswith("/") or ".." in PurePosixPath(name.replace("\\", "/")).parts:
+        return f"points outside the archive; {nowhere}"
+    if ":" in name or "\0" in name:
+        return f"is not a path with forward slashes; {nowhere}"
+    if "\\" in name:  # some tools write it on Windows
+        return f"has a backslash, where a zip archive has forward slashes; pack the {kind} again"
     if stat.S_ISLNK(entry.external_attr >> 16):
-        return "is a symbolic link"
+        return f"is a symbolic link; {nowhere}"
     return ""
 
 

@@ -73,7 +73,9 @@ class InProcess(Instance):
         except Exception as error:  # FMPy raises bare Exception
             reason = str(error)
             if reason.startswith("Failed to instantiate"):
-                reason = "its instantiation failed; its guid may not be that of its binary"
+                reason = "its instantiation failed"
+                if not self._logged():  # which says why
+                    reason += "; its guid may not be that of its binary"
             raise self._fault(f"could not be loaded: {reason}", 0.0) from error
         outputs = self.description.outputs
         self.gets = self.gets_between_rows = self._transfers("Get", outputs, self.outputs)

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.run.energy.meter import metered
 from hapticlink.orchestrator.run.hold_parts import describe_holds, describe_spring
 from hapticlink.orchestrator.run.initialize import START_POSE_OUTPUTS
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.run.step_check import StepCheck
+from hapticlink.orchestrator.run.step_check import StepCheck, find_first_derivatives
 from hapticlink.orchestrator.system.system import Fmu, System
 
 
@@ -74,5 +74,5 @@ def _of_itself(fmu: Fmu) -> Iterator[str]:
         if scalar.bound or scalar.port in judged:
             yield scalar.name
     if StepCheck.possible(description):
-        for pair in description.derivatives.items():
+        for pair in find_first_derivatives(description):
             yield from pair

@@ -2,7 +2,8 @@
 
 Each output is computed after those that it depends on, by what the FMUs declare. Only outputs that
 depend on each other, algebraic loops, are solved, by the Newton's method of iterated coupling, from
-the start values of the inputs on the loop: FMUs are evaluated nowhere else but at its points.
+the start values of the inputs on the loop: FMUs are evaluated nowhere else but at its points,
+unless an output is not finite there.
 """
 
 from __future__ import annotations
@@ -194,6 +195,13 @@ class StartValues:
                 return np.full(len(point), np.nan)
             return values[continuous] - point
 
+        # Start values may be outside of what an FMU is defined for, on a loop that there is by
+        # declaration alone: what the others give is passed on until all is finite.
+        for _ in loop:
+            if refused or np.isfinite(residual(point)).all():
+                break
+            given_back = values[continuous]
+            point = np.where(np.isfinite(given_back), given_back, point)
         solver = self._solver(loop, continuous)
         changes = [np.inf]
         for turn in range(MOST):

@@ -39,7 +39,7 @@ class StepCheck:
     def __init__(self, library: ctypes.CDLL, instance: Instance) -> None:
         self._library, self._instance = library, instance
         names = [s.name for s in instance.description.outputs]
-        pairs = _first_derivatives(instance.description)
+        pairs = find_first_derivatives(instance.description)
         ports = [_port(rate) for _, rate in pairs]
         self._names = sorted(set(ports))
         rows = ((names.index(b), names.index(r), self._names.index(_port(r))) for b, r in pairs)
@@ -65,7 +65,7 @@ class StepCheck:
             and description.timing == "continuous"
             and description.restores_state
             and description.varies_step
-            and bool(_first_derivatives(description))
+            and bool(find_first_derivatives(description))
         )
 
     def take_rows(self) -> None:
@@ -127,7 +127,7 @@ class StepCheck:
         )
 
 
-def _first_derivatives(description: Description) -> list[tuple[str, str]]:
+def find_first_derivatives(description: Description) -> list[tuple[str, str]]:
     """Outputs with their derivatives, the first in time: derivatives of these are no states."""
     rates = set(description.derivatives.values())
     return [(y, dy) for y, dy in description.derivatives.items() if y not in rates]

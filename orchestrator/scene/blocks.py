@@ -15,6 +15,8 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT,
     HAND,
     MECHANISM,
+    MOTOR_MAP,
+    OBSERVER,
     block_of_user,
 )
 from hapticlink.orchestrator.scene.rates import AnyRate
@@ -127,6 +129,9 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
         if clutch and not user:
             settings["clutch"] = True
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
+    beside = {user: scene.all_devices[user] for user in observed_beside(scene)}
+    for user, device in beside.items():
+        yield BlockPlan(block_of_user(OBSERVER, user), OBSERVER, "haptics", {"device": device})
     for user, controller in scene.all_controllers.items():
         settings = {
             "controller": replace(controller, contact=True) if others(scene) else controller,
@@ -136,6 +141,8 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
         if clutch and not user:
             settings["clutch"] = True
         yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
+    for user, device in beside.items():
+        yield BlockPlan(block_of_user(MOTOR_MAP, user), MOTOR_MAP, "haptics", {"device": device})
     for user, device in scene.all_devices.items():
         settings = {"device": device}
         if scene.sensing == "encoders":
@@ -186,6 +193,12 @@ def impedance(scene: Scene) -> bool:
 
 def topology(scene: Scene) -> bool:
     return any(controller.topology is not False for controller in scene.all_controllers.values())
+
+
+def observed_beside(scene: Scene) -> list[str]:
+    """The users whose device has its observer beside it."""
+    sensed = scene.all_devices if scene.sensing == "encoders" else {}
+    return [user for user, device in sensed.items() if device.observer.beside]
 
 
 def others(scene: Scene) -> bool:

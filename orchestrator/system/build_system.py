@@ -61,7 +61,7 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
     """The system of `scene`; `files` are the FMU files of its blocks, by name.
 
     Raises SceneFault with every finding: FMUs that cannot be read or used, connections and holds
-    that do not fit, and names in the scene that its FMUs do not have.
+    that do not fit, and, if all FMUs can be read, names in the scene that they do not have.
     """
     problems: list[Problem] = []
     replaced, rows = replacements.find_replaced_blocks(planned.replaced), haptic_loop.rows(scene)
@@ -75,6 +75,8 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
     fmus = tuple(with_texts(u, connections) for u in fmus)
+    if len(tables) < len(scene.fmu):  # what names an FMU that cannot be read may be right
+        raise _faults(scene, problems)
     energy = find_energy_ports(scene, fmus, connections)
     assigned, refused = assign(fmus, connections, time, scene, energy)
     condition = parse_condition(scene.ends_when) if scene.ends_when else None
@@ -98,7 +100,7 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
     changes = timed_events.changes(scene, system, problems)
     written = choose_outputs(scene.record, system, problems)
     if problems:
-        raise SceneFault(scene.title, [scene.place(*problem) for problem in problems])
+        raise _faults(scene, problems)
     mapped = {table.name: names for table, *_, names in tables}
     return replace(
         system,
@@ -106,6 +108,10 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
         replacements=replacements.replacements(replaced, rows, system, mapped),
         changes=changes,
     )
+
+
+def _faults(scene: Scene, problems: Iterable[Problem]) -> SceneFault:
+    return SceneFault(scene.title, [scene.place(*problem) for problem in problems])
 
 
 def _read_again(scene: Scene, ours: Iterable[Fmu]) -> Iterator[str]:

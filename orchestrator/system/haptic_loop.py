@@ -10,20 +10,23 @@ with the operational point.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from hapticlink.orchestrator.base.signal_names import (
+    DEVICE,
     ENVIRONMENT,
     HAND_WRENCH,
     HANDLE_POSE,
     HANDLE_VELOCITY,
     MECHANISM,
+    OBSERVER,
     POINT_POSE,
     POINT_VELOCITY,
     SHARED,
     signal_of_user,
 )
 from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.scene.blocks import observed_beside
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
 
@@ -31,12 +34,18 @@ Row = tuple[str, str]
 
 _LOOP: tuple[Row, ...] = (
     ("virtual_mechanism.x", "haptic_device.x_start"),
+    ("virtual_mechanism.x", "observer.x_start"),
     ("virtual_mechanism.x", "controller.x_ref"),
     ("hand.F", "haptic_device.F_hand"),
     ("haptic_device.x", "controller.x_D"),
     ("haptic_device.v", "controller.v_D"),
     ("haptic_device.M", "controller.M"),
     ("haptic_device.c", "controller.c"),
+    ("haptic_device.q", "observer.q"),
+    ("haptic_device.tau_applied", "observer.tau"),
+    ("observer.x", "motor_map.x"),
+    ("controller.F_motor", "motor_map.F_motor"),
+    ("motor_map.tau", "haptic_device.tau"),
     ("virtual_mechanism.x", "controller.x_S"),
     ("virtual_mechanism.v", "controller.v_S"),
     ("virtual_mechanism.a_bias", "controller.a_bias"),
@@ -59,6 +68,10 @@ _LOOP: tuple[Row, ...] = (
     ("controller.F_drift", "virtual_mechanism.F_drift"),
 )
 """The connections of every scene, as those of the first user."""
+_OBSERVED = {
+    f"{DEVICE}.{port}": f"{OBSERVER}.{port}" for port in ("x", "v", "M", "c", "F_hand_observed")
+}
+"""What comes from the observer where that is beside the device."""
 
 
 def rows(scene: Scene) -> tuple[Wire, ...]:
@@ -83,8 +96,18 @@ def _rows(scene: Scene) -> tuple[Row, ...]:
     further: list[Row] = []
     for user in {**scene.hands, **scene.devices}:
         rows = (*(own if user in scene.devices else ()), *_scene_rows(scene, user))
-        further += [(signal_of_user(a, user), signal_of_user(b, user)) for a, b in rows]
-    return (*_LOOP, *further, *_scene_rows(scene, ""))
+        measured = _from_observer(scene, user, rows)
+        further += [(signal_of_user(a, user), signal_of_user(b, user)) for a, b in measured]
+    tables = _LOOP, _scene_rows(scene, "")
+    first, last = (_from_observer(scene, "", rows) for rows in tables)
+    return (*first, *further, *last)
+
+
+def _from_observer(scene: Scene, user: str, rows: Iterable[Row]) -> list[Row]:
+    """Connections of a user, as those of the first one, from the observer where one is beside the
+    device."""
+    beside = user in observed_beside(scene)
+    return [(_OBSERVED.get(a, a) if beside else a, b) for a, b in rows]
 
 
 def _scene_rows(scene: Scene, user: str) -> tuple[Row, ...]:

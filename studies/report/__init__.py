@@ -8,11 +8,19 @@ from pathlib import Path
 
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.results import folders
-from studies.report import chapter1, chapter3, chapter4, chapter6, graphics_copy, section_b6
+from studies.report import (
+    chapter1,
+    chapter3,
+    chapter4,
+    chapter6,
+    cost_of_sensing,
+    graphics_copy,
+    section_b6,
+)
 from studies.report.report_page import Entry, Runs, write
 from studies.report.statements import every_statement, table
 
-CHAPTERS = (chapter1, chapter3, chapter4, chapter6, graphics_copy, section_b6)
+CHAPTERS = (chapter1, chapter3, chapter4, chapter6, cost_of_sensing, graphics_copy, section_b6)
 
 
 def reproduce(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Path:

@@ -24,6 +24,7 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
         {"sensing": "encoders", "controller.bias": "full", "controller.passivity": True},
     ),
     ("closed-loop-ideal", {"mechanism.directions": True, "mechanism.diagnostics": True}),
+    ("closed-loop", {"device.observer.beside": True}),
     ("closed-loop-ideal", {"mechanism.integrator": "passive-midpoint"}),
     ("closed-loop-ideal", {"graphics.sync": "operational", "hand.damping": (1.0, 1.0, 0.1)}),
     ("enclosure", {"controller.contact": True}),
@@ -42,6 +43,8 @@ SCENES: list[tuple[str, Mapping[str, Any]]] = [
 ]
 """Scenes that have every port among them; n = 4 joint coordinates and one loop, m = 2, in each."""
 SIZES = {4: "n", 2: "m", 12: "k"}
+OF_DEVICE = ("haptic_device", "observer", "motor_map")
+"""Blocks whose sizes are those of the device: four motors."""
 Row = tuple[str, str, str, str]
 """Block, "input" or "output", port with its sizes, and units."""
 
@@ -52,11 +55,12 @@ def declared() -> Iterator[Row]:
         for block in blocks(scene).built:
             made = MADE(block.block, block.settings)
             for side, variables in (("input", made.inputs), ("output", made.outputs)):
-                yield from ((block.block, side, port(v), units(v)) for v in variables)
+                yield from ((block.block, side, port(v, block.block), units(v)) for v in variables)
 
 
-def port(variable: Variable) -> str:
-    sizes = ",".join(SIZES.get(size, str(size)) for size in variable.shape)
+def port(variable: Variable, block: str) -> str:
+    known = {} if block in OF_DEVICE else SIZES
+    sizes = ",".join(known.get(size, str(size)) for size in variable.shape)
     name = re.sub(r"^shoulder1\.(?!at)", "JOINT.", re.sub(r"^left\.", "POINT.", variable.name))
     return name + f"[{sizes}]" * bool(sizes)
 

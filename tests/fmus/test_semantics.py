@@ -12,10 +12,14 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from hapticlink.components.component import Block, Variable
+from hapticlink.components.specs.linkage import Mechanism
+from hapticlink.fmus import fmu_functions
+from hapticlink.fmus.blocks import component
 from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.check import FmuSession, check_fmu, session
 from tests.fmus import sample_components
 from tests.fmus.named_fmu import Named
+from tests.mechanisms import five_bar
 
 BUILD = {"python": build, "native": build_native, "native3": partial(build_native, fmi=3)}
 DISCARD, ERROR, FATAL = 2, 3, 4
@@ -60,6 +64,69 @@ def test_continuous_block_follows_the_discrete_closed_form(opened):
         expected = math.cos(k * theta) + b * math.sin(k * theta)
         assert fmu.get("x[1]")[0] == pytest.approx(expected, abs=1e-12)
     assert fmu.get("time")[0] == pytest.approx(199 * h)
+
+
+def test_outputs_on_request_are_left_out_while_nobody_reads_them(tmp_path, packaging, monkeypatch):
+    """A reduced step that is marked by its x shows when it was taken: after four steps without a
+    read, and at once where there were as many between the last two reads."""
+    whole = fmu_functions._reduced
+
+    def marked(*given):
+        reduced = whole(*given)
+        arguments = reduced.sx_in()
+        x1, y, z = reduced(*arguments)
+        y[0] += 1000.0
+        names = reduced.name_in(), reduced.name_out()
+        return ca.Function("reduced", arguments, [x1, y, z], *names)
+
+    monkeypatch.setattr(fmu_functions, "_reduced", marked)
+    block = Block(
+        inputs=[Variable("u", start=1.0)],
+        states=[Variable("x")],
+        outputs=[Variable("x"), Variable("wave", on_request=True)],
+    )
+    x = block.x["x"]
+    plant = block.component(
+        "plant",
+        "",
+        "continuous",
+        initial={"x": ca.SX(0)},
+        step={"x": x + block.h * block.u["u"]},
+        output={"x": x, "wave": ca.sin(ca.cos(x))},
+    )
+    taken = []
+    with session(BUILD[packaging](plant, tmp_path)) as at:
+        fmu = Named(at).start()
+        for k in range(14):
+            fmu.step(k / 8, 1 / 8)
+            taken.append(fmu.get("x")[0] > 500.0)
+            if k in (7, 8, 9, 10):
+                x, wave = (k + 1) / 8, math.sin(math.cos((k + 1) / 8))
+                assert fmu.get("wave", "x") == pytest.approx([wave, x], abs=1e-15)
+    assert [k for k, reduced in enumerate(taken) if reduced] == [4, 5, 6, 7, 8]
+
+
+@pytest.mark.parametrize("every", [1, 3, 5])
+def test_which_outputs_are_read_when_changes_no_bit(tmp_path, packaging, every):
+    """Neither after a step, nor after inputs were set, nor in a restored state."""
+    block = component(
+        "virtual_mechanism", {"linkage": five_bar(), "mechanism": Mechanism(integrator="heun")}
+    )
+    outputs = [name for v in block.outputs for name in v.names]
+    path = BUILD[packaging](block, tmp_path)
+    with session(path) as one, session(path) as other:
+        always, rarely = Named(one).start(), Named(other).start()
+        for k in range(24):
+            for fmu in (always, rarely):
+                fmu.set(**{"F_hand[1]": 0.1 * k})
+                fmu.step(k / 512, 1 / 512)
+            expected = always.get(*outputs)
+            names = outputs if k % every == every - 1 else ["x[1]", "qd[2]", "closure_error"]
+            assert rarely.get(*names) == [expected[outputs.index(name)] for name in names]
+        saved = rarely.slave.getFMUState()
+        assert rarely.slave.serializeFMUstate(saved) == always.slave.serializeFMUState(
+            always.slave.getFMUState()
+        )
 
 
 def test_substeps_divide_the_step(tmp_path, packaging, opened):

@@ -56,6 +56,7 @@ CASES = {
     "a derivative": (
         "closed-loop-ideal", f'{HALF}; {SLOW}; holds={{"virtual_mechanism.x"="foh-derivative"}}',
     ),
+    "observer beside": ("closed-loop", f"{HALF}; device.observer.beside=true"),
     "mean": ("two-users", "duration=0.2; downsampling=mean"),
 }  # fmt: skip
 """Scenes, and their options, each after "; "."""

@@ -8,6 +8,7 @@ const NAMES = {
   "controller.k_j": "Topology controller: stiffness", "controller.b_j": "Topology controller: damping",
   "controller.K_d": "Desired stiffness", "controller.B_d": "Desired damping",
   "virtual_mechanism.k_contact": "Contact: stiffness", "virtual_mechanism.b_contact": "Contact: damping",
+  "virtual_mechanism.beta": "Loop closure: damping of Baumgarte",
   "virtual_mechanism.hysteresis": "Constrained directions: hysteresis", "virtual_environment.hysteresis": "Constrained directions: hysteresis",
 };
 // Rates (Hz) with a short common period with the haptic rate, for which stability is computed fast.

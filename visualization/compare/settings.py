@@ -8,8 +8,10 @@ from typing import Any
 from hapticlink.orchestrator.results.read_results import Results
 
 UNSET = "-"
-ABOUT = ("title", "description")
+ABOUT = ("title", "description", "format", "experiment")
 """Keys that change nothing in a run."""
+RENAMED = "`closed-loop` of a scene without a format is `closed-loop-ideal` of format 2"
+"""What the names of shipped scenes were when scenes had no format."""
 
 
 def differing(runs: Sequence[Results]) -> dict[str, tuple[str, ...]]:
@@ -28,11 +30,17 @@ def differing(runs: Sequence[Results]) -> dict[str, tuple[str, ...]]:
 
 
 def other_scenes(runs: Sequence[Results]) -> str:
-    """A sentence where the runs are of scenes with other titles or mechanisms; "" where not."""
+    """A sentence where the runs are of scenes with other titles, mechanisms or formats; ""
+    where not."""
     titles = dict.fromkeys(run.record.scene["title"] for run in runs)
+    told = []
     if not one_mechanism(runs):
-        return f"different mechanisms: {'; '.join(titles)}"
-    return f"different scenes: {'; '.join(titles)}" if len(titles) > 1 else ""
+        told.append(f"different mechanisms: {'; '.join(titles)}")
+    elif len(titles) > 1:
+        told.append(f"different scenes: {'; '.join(titles)}")
+    if len({run.record.scene.get("format") for run in runs}) > 1:
+        told.append(f"different formats of scenes: {RENAMED}")
+    return "; ".join(told)
 
 
 def one_mechanism(runs: Sequence[Results]) -> bool:

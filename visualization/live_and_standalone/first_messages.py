@@ -10,7 +10,7 @@ import numpy as np
 from hapticlink.analysis.findings import labels
 from hapticlink.analysis.findings.user_port import NOTICEABLE_J
 from hapticlink.components.dynamics.assembly import start_coordinates
-from hapticlink.orchestrator.base.signal_names import CONTROLLER, DEVICE, HAND
+from hapticlink.orchestrator.base.signal_names import DEVICE, HAND, PASS_ON
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import Connection, System
 from hapticlink.visualization.live_and_standalone.offered_controls import users
@@ -69,7 +69,7 @@ def describe_power(system: System, connections: Iterable[str]) -> list[dict[str,
             "name": c.name,
             "words": labels.connection(c.name),
             "hand": hand(c),
-            "counts": system.block(c.source) != CONTROLLER,
+            "counts": system.block(c.source) not in PASS_ON,
         }
         for c in on
     ]

@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.signal_names import (
     HAND_WRENCH,
     HANDLE_POSE,
     JOINT_COORDINATES,
-    MEASURED_HANDLE_POSE,
+    MEASURED_HANDLE_POSES,
     MOTOR_WRENCH,
     MULTIPLIERS,
     POINT_POSE,
@@ -46,7 +46,7 @@ OF_USER = {
     "P_c": PROJECTORS,
     "margin": (WORKSPACE_MARGIN,),
     "F_motor": (MOTOR_WRENCH,),
-    "measured": (MEASURED_HANDLE_POSE,),
+    "measured": MEASURED_HANDLE_POSES,
 }
 """The same of each user; what further ones have is in `others` of a frame, by their points."""
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hapticlink.orchestrator.base.errors import Diverged
-from hapticlink.orchestrator.base.signal_names import CONTROLLER, MECHANISM
+from hapticlink.orchestrator.base.signal_names import MECHANISM, PASS_ON
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.system.system import System
@@ -71,5 +71,5 @@ def sum_energies(system: System, booked: Mapping[str, Energy]) -> tuple[float, f
     """The energies (J) that sampling and holding have generated, and that hands and mechanism have
     put in. What a controller passes on was not put in by it."""
     source = {name: system.block(system.connection[name].source) for name in booked}
-    put_in = sum(max(e.ideal, 0.0) for n, e in booked.items() if source[n] != CONTROLLER)
+    put_in = sum(max(e.ideal, 0.0) for n, e in booked.items() if source[n] not in PASS_ON)
     return sum(e.generated for e in booked.values()), put_in

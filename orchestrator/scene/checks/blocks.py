@@ -50,6 +50,8 @@ def check_needed_tables(scene: Scene) -> Iterator[Problem]:
         yield ("hand",), "[hand] holds a device or a linkage: add one, or take it out"
     if scene.sensing == "encoders" and not scene.device:
         yield ("sensing",), "'encoders' are the device's: add [device], or take sensing out"
+    if scene.sensing == "ideal":
+        yield from _observers(scene)
     if not scene.graphics:
         if scene.mechanism_at == "graphics":
             yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
@@ -60,3 +62,15 @@ def check_needed_tables(scene: Scene) -> Iterator[Problem]:
                 "the controller needs Lambda_inv and P_c: add [graphics], or take "
                 "directions_from = 'mechanism'",
             )
+
+
+def _observers(scene: Scene) -> Iterator[Problem]:
+    """A problem for each observer that is asked for beside a device whose sensing is ideal."""
+    for user, device in scene.all_devices.items():
+        if device.observer.beside:
+            table: Path = ("devices", user) if user else ("device",)
+            message = (
+                "true, and with sensing = 'ideal' nothing is observed: take sensing = 'encoders', "
+                "or take it out"
+            )
+            yield (*table, "observer", "beside"), message

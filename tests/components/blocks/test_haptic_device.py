@@ -8,7 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.haptic_device import haptic_device
+from hapticlink.components.blocks.motor_map import motor_map
+from hapticlink.components.blocks.observer import observer
 from hapticlink.components.device import pantograph
+from hapticlink.components.device.motors_and_encoders import numbers
 from hapticlink.components.specs.device import Device, Observer
 from hapticlink.components.specs.quantities import Quantity
 from tests.blocks import Running, advance
@@ -17,6 +20,8 @@ T = 1 / 512
 START = (-0.02, 0.01, 3.6)
 IDEAL = haptic_device(Device())
 ENCODERS = haptic_device(Device(), encoders=True)
+BESIDE = Device(observer=Observer(beside=True))
+ALONE = haptic_device(BESIDE, encoders=True)
 
 
 def at_start(component, **inputs):
@@ -30,10 +35,10 @@ def base_jacobian(pose):
 
 
 def test_starts_at_rest_at_x_start():
-    for component in (IDEAL, ENCODERS):
+    for component in (IDEAL, ENCODERS, ALONE):
         y = at_start(component).y
         np.testing.assert_array_equal(y["x_true"], START)
-        for name in ("v", "v_true", "F_hand_observed", "c"):
+        for name in {"v", "v_true", "F_hand_observed", "c", "tau_applied"} & {*y}:
             np.testing.assert_array_equal(y[name], 0)
 
 
@@ -44,7 +49,24 @@ def test_ideal_sensing_has_no_encoder_and_no_observer():
     y = advance(at_start(IDEAL, F_hand=(0.3, -0.2, 0.001), F_motor=(0.1, 0.1, 0)), 50 * T, 512).y
     np.testing.assert_array_equal(y["x"], y["x_true"])
     np.testing.assert_array_equal(y["v"], y["v_true"])
-    np.testing.assert_array_equal(y["F_hand_observed"], (0.3, -0.2, 0.001))
+    assert "F_hand_observed" not in y
+
+
+def test_a_device_without_observer_puts_out_what_encoders_count_and_motors_have_given():
+    torques = (0.01, -0.02, 0.03, 0.005)
+    device = at_start(ALONE, tau=torques)
+    before = device.y["tau_applied"]
+    for _ in range(64):
+        device.step(T)
+    y, resolution = device.y, Device().encoder_resolution
+    np.testing.assert_array_equal(before, 0)
+    np.testing.assert_array_equal(y["tau_applied"], torques)
+    np.testing.assert_array_equal(y["counts"], np.rint(y["counts"]))
+    np.testing.assert_array_equal(y["q"], resolution * y["counts"])
+    assert 0 < np.abs(y["q"] - y["q_true"]).max() <= resolution / 2
+    at = ca.SX.sym("pose", 3)
+    angles = ca.Function("q", [at], [pantograph.base_angles(at, numbers(Device()))])
+    np.testing.assert_allclose(y["q_true"], np.array(angles(y["x_true"])).ravel(), rtol=1e-15)
 
 
 def test_acceleration_from_rest_is_force_over_inertia():
@@ -177,3 +199,6 @@ def test_a_parameter_has_the_unit_that_the_scene_s_key_declares():
     units = {p.name: p.unit for p in component.parameters if p.name != "x_start"}
     assert len(keys) == 26
     assert units == {name: unit for name, unit in keys.items() if name != "substeps"}  # structure
+    for block in (observer(BESIDE), motor_map(BESIDE), ALONE):
+        own = {p.name: p.unit for p in block.parameters if p.name != "x_start"}
+        assert own.items() <= units.items()

@@ -6,7 +6,7 @@ import pytest
 
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import messages
-from tests.little_fmus import python_fmu
+from tests.little_fmus import edited_entries, python_fmu
 from tests.orchestrator.foreign_scenes import fmu_table, scene
 
 
@@ -43,6 +43,17 @@ def test_an_exception_of_a_python_fmu_has_its_file_and_line(tmp_path, isolate, c
     fault = str(simulate(str(path), tmp_path / "out").outcome.fault)
     where = f"{module.name}, line {line}, in do_step: {text[line - 1].strip()}"
     assert f"slow says: {where}: {error}\n" in fault
+
+
+def test_an_fmu_that_says_why_it_cannot_be_instantiated_is_not_asked_for_its_guid(tmp_path):
+    path = python_fmu(tmp_path, "Locked")
+    (module,) = tmp_path.glob("m*.py")
+    text = module.read_text().replace("super()", "raise ValueError('no key'); super()", 1)
+    edited_entries(path, lambda held: held | {f"resources/{module.name}": text.encode()})
+    made = simulate(str(scene(tmp_path, fmu_table("fmu", "Locked"))), tmp_path / "out")
+    fault = str(made.outcome.fault)
+    assert "could not be loaded: its instantiation failed at t = 0 s" in fault
+    assert "no key" in fault
 
 
 def test_instances_that_share_a_class_each_have_their_own_exceptions(tmp_path):

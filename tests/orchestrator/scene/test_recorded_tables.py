@@ -47,13 +47,14 @@ def test_rows_are_held_in_si_units_from_the_first_time_on(tmp_path, columns):
 
 def test_the_hand_of_a_run_is_played_again_to_the_bit(tmp_path):
     arm = {"type": "arm", "target": [[0, 0.0445, 0.0148, -0.788], [0.5, 0.05, 0.03, -0.788]]}
-    first = hl.run("closed-loop", {"duration": 0.5, "hand": arm}, out=tmp_path / "first")
+    options = {"duration": 0.5, "hand": arm}
+    first = hl.run("closed-loop", options, out=tmp_path / "first", figures=False)
     (tmp_path / "scene.toml").write_text(
         HAND.format('{ path = "first/haptics.csv", columns = ["time", "hand.F"] }').replace(
             "closed-loop-ideal", "closed-loop"
         )
     )
-    again = hl.run(tmp_path / "scene.toml", out=tmp_path / "again")
+    again = hl.run(tmp_path / "scene.toml", out=tmp_path / "again", figures=False)
     for name in ("hand.F", "haptic_device.x_true", "virtual_mechanism.q"):
         assert np.array_equal(first[name], again[name]), name
 

@@ -268,3 +268,17 @@ def test_rates_and_times_out_of_any_range(key, value):
 def test_a_key_that_is_gone_says_what_to_do() -> None:
     with pytest.raises(InputFault, match="are left out, to the same result: take it out"):
         open_scene.load("obstacles", ["contacts.broad_phase=false"])
+
+
+@pytest.mark.parametrize(
+    "asked",
+    ["at=[{time=0.1, set={'drill.u'=1.0}}]", "substeps={drill=2}", "get_after_set=['drill']",
+     "record.signals=['drill.y']", "stop_when='drill.y > 1.0'"],
+)  # fmt: skip
+def test_what_names_an_fmu_that_cannot_be_read_is_not_denied_besides(tmp_path, asked):
+    (tmp_path / "drill.fmu").write_text("no zip")
+    drill = f"fmu.+={{name='drill', path='{tmp_path}/drill.fmu'}}"
+    assert asked.partition("=")[0] in refused("closed-loop-ideal", asked)
+    said = refused("closed-loop-ideal", drill, asked)
+    assert "not a readable zip archive" in said
+    assert " faults" not in said

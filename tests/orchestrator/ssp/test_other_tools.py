@@ -16,7 +16,7 @@ STEPS = 128
 OPTIONS = {"coupling": "jacobi", "duration": STEPS / 512}
 SCENES = ("closed-loop-ideal", "closed-loop-direct", "two-users", "two-hands", "enclosure")
 SAMPLED = ("controller", "hand")
-AT_ONCE = ("qdd", "lambda", "F_env", "F_hand_observed")
+AT_ONCE = ("qdd", "lambda", "F_env")
 """Outputs that depend on inputs at once: hapticlink reads them before it sets these, Ecos after."""
 
 

