@@ -12,7 +12,7 @@ from hapticlink.analysis.findings.tracking import of_any_shape, of_block
 from hapticlink.components.specs.linkage import NO_POINT
 from hapticlink.orchestrator.base.signal_names import (
     COUPLING_ENERGY,
-    HANDLE_INERTIA,
+    HANDLE_INERTIAS,
     HANDLE_VELOCITY,
     HELD_POINT,
 )
@@ -42,7 +42,9 @@ def changes_of_point(results: Results) -> list[ChangeOfPoint]:
     changes = []
     for row in np.flatnonzero(np.diff(held)).tolist():
         coupling = _last(results, time[row], COUPLING_ENERGY)
-        v, M = (_last(results, time[row], s) for s in (HANDLE_VELOCITY, HANDLE_INERTIA))
+        v = _last(results, time[row], HANDLE_VELOCITY)
+        inertias = (_last(results, time[row], signal) for signal in HANDLE_INERTIAS)
+        M = next((found for found in inertias if found is not None), None)
         handle = None if v is None or M is None else float(v @ M @ v) / 2
         before, after = (names[k] for k in held[row : row + 2].tolist())
         stored = None if coupling is None else float(coupling)

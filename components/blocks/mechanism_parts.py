@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from hapticlink.components.component import Block
 from hapticlink.components.contact.kept_sides import NAME
+from hapticlink.components.dynamics import grasp
 from hapticlink.components.dynamics.local_model import SYMBOLS
 from hapticlink.components.dynamics.variables import (
     directions_part,
@@ -82,6 +83,8 @@ class _MechanismParts:
             yield BlockPart("Baumgarte stabilisation", text, "(3.5), fig. 3.5", reads, ("w_stab",))
         yield from self._motion()
         yield operational_point(self._ending("x", "v", "position", "velocity"))
+        if grasp.POINT in self._block.p:
+            yield grasp.part(self._block)
         law = r"$\Lambda^{-1} F_{env} = J_h \ddot{q}$ of the others"
         reads = (*self._pushes, *self._others)
         if "F_env" in self._outputs:

@@ -170,6 +170,12 @@ def _schematic(block: Block, copy: GraphicsCopy) -> list[BlockPart]:
     """The parts, in the order of their evaluation; what is no output of the block has none."""
     outputs = [v.name for v in block.outputs]
     parts = [*follow_mechanism.parts(copy), operational_point(("x", "v"))]
+    if grasp.READY in block.x:
+        parts.append(
+            BlockPart(
+                "point in the hand", "the one that is asked for", "", (grasp.ASKED,), (grasp.READY,)
+            )
+        )
     mobilities = tuple(name for name in outputs if name.endswith("Lambda_inv"))
     if mobilities:
         parts.append(mobility_part(mobilities))

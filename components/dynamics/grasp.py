@@ -25,6 +25,7 @@ import casadi as ca
 from hapticlink.components.component import Block, Variable
 from hapticlink.components.dynamics.constrained_directions import Points
 from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.parts import BlockPart
 from hapticlink.components.specs.linkage import Linkage
 
 POINT = "point"
@@ -150,3 +151,12 @@ def points_of_copy(block: Block) -> Points:
 def same(first: ca.SX, second: ca.SX) -> ca.SX:
     """Whether two numbers of points are the same."""
     return ca.fabs(first - second) < 0.5
+
+
+def part(block: Block) -> BlockPart:
+    """The part of a mechanism by which the hand lets go of a point and holds another."""
+    reads = (POINT, *(name for name in (READY, HANDLE) if name in block.u), "q")
+    names = [v.name for v in block.outputs]
+    given = (_BEGIN, ASKED, PATH)
+    gives = tuple(name for name in given if name in block.x or name in names)
+    return BlockPart("point in the hand", r"$x = x_{point}(q) + x_{offset}$", "", reads, gives)
