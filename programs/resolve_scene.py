@@ -263,6 +263,9 @@ def _as_before_the_start(simulation: Simulation, outside: str | None, changing: 
     for instance in simulation.instances.values():
         ctypes.memset(ctypes.addressof(instance.place), 0, ctypes.sizeof(instance.place))
         instance.place.waiting = math.inf  # no setting waits for a step
+    for hold in simulation.holds.values():
+        if hold.link:  # whose first sample is known at once, and takes no number from its generator
+            hold.link.started = hold.link.newest = hold.link.n = 0
     for check in simulation.step_checks.values():
         check.estimates = check.estimates[:STEP_CHECKS]
         check.times, check.weights = check.times[:STEP_CHECKS], check.weights[:STEP_CHECKS]

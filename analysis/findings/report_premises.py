@@ -13,16 +13,19 @@ from typing import Any, NamedTuple
 
 
 class Premise(NamedTuple):
-    """A setting of a scene, its value in the report, and what another value means, by value."""
+    """What a setting of a scene decides, the setting, its value in the report, and what another
+    value means, by value."""
 
+    of: str
     key: str
     value: object
     instead: Mapping[object, str]
 
 
 CHAPTER_6 = (
-    Premise("sensing", "encoders", {"ideal": "no encoders and no observer"}),
+    Premise("sensing", "sensing", "encoders", {"ideal": "no encoders and no observer"}),
     Premise(
+        "graphics copy",
         "graphics.sync",
         "operational",
         {
@@ -31,20 +34,34 @@ CHAPTER_6 = (
             "joint": "the graphics copy is pulled at every joint (graphics.sync)",
         },
     ),
-    Premise("directions_from", "graphics", {"mechanism": "no matrices from the graphics block"}),
     Premise(
+        "matrices",
+        "directions_from",
+        "graphics",
+        {"mechanism": "no matrices from the graphics block"},
+    ),
+    Premise(
+        "stabilisation",
         "mechanism.stabilization",
         "baumgarte",
         {"projection": "loops closed by projection", "none": "loops left to open"},
     ),
-    Premise("controller.bias", "none", {"full": "Coriolis and centripetal terms compensated"}),
+    Premise(
+        "velocity terms",
+        "controller.bias",
+        "none",
+        {"full": "Coriolis and centripetal terms compensated"},
+    ),
 )
 OF_THE_REPORT: dict[str, tuple[Premise, ...]] = {
-    "chapter 6": (*CHAPTER_6, Premise("local_model", False, {True: "the local model (B.17)"})),
+    "chapter 6": (
+        *CHAPTER_6,
+        Premise("local model", "local_model", False, {True: "the local model (B.17)"}),
+    ),
     "section B.6": (
         *CHAPTER_6,
-        Premise("local_model", True, {False: "no local model (B.17)"}),
-        Premise("mechanism.integrator", "semi-implicit-euler", {}),
+        Premise("local model", "local_model", True, {False: "no local model (B.17)"}),
+        Premise("integrator", "mechanism.integrator", "semi-implicit-euler", {}),
     ),
 }
 """By the `experiment` of a scene."""
@@ -66,4 +83,5 @@ def describe_experiment(scene: Mapping[str, Any]) -> Iterator[str]:
     if scene.get("experiment"):
         differences = "; ".join(find_differences(scene))
         but = f", but for: {differences}" if differences else ""
-        yield f"premises as in the report's {scene['experiment']}{but}"
+        of = ", ".join(premise.of for premise in OF_THE_REPORT[scene["experiment"]])
+        yield f"as in the report's {scene['experiment']} are {of}{but}; nothing else is compared"

@@ -173,7 +173,7 @@ class StartValues:
 
         Newton's method is for those of floating point at both ends of their connections. Others are
         passed around the loop, more often than there are evaluations on it only while their changes
-        become smaller. Raises FmuFault where there is no agreement.
+        do not become larger. Raises FmuFault where there is no agreement.
         """
         values, places = self._signals.values, self.find_sources(loop)
         rounded = {p for c in self._connections(loop) for p in self._rounded(c)}
@@ -216,7 +216,7 @@ class StartValues:
             if not change.any():
                 break
             changes.append(float(change.max()))
-            if (turn >= len(loop) and not changes[-1] < changes[-2]) or turn + 1 == MOST:
+            if (turn >= len(loop) and changes[-1] > changes[-2]) or turn + 1 == MOST:
                 worst = int(np.argmax(change))
                 raise self._unconverged(discrete[worst], float(given[worst]), loop)
             given = values[discrete]

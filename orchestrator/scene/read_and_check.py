@@ -16,6 +16,7 @@ from hapticlink.orchestrator.scene import checks, families, overrides, registry_
 from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
 from hapticlink.orchestrator.scene.rates import find_traces, read_frame_times
 from hapticlink.orchestrator.scene.recorded_tables import (
+    COLUMNS,
     find_recorded_tables,
     read_recorded_table,
 )
@@ -66,7 +67,8 @@ def from_source(source: Source) -> Scene:
             recorded["rate"] = read_frame_times(FilePath(file))
     for path, holder, key in [*find_recorded_tables(data)]:
         with collect_problem(wrong, (*path, key)):
-            holder[key] = read_recorded_table(holder.pop(key))
+            columns = COLUMNS[key] if path[0] in ("hand", "hands") else ()
+            holder[key] = read_recorded_table(holder.pop(key), columns)
     for fmu in tables_of(data, "fmu"):
         for key in ("start", "derivatives"):
             if isinstance(fmu.get(key), dict):

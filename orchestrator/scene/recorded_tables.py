@@ -15,7 +15,8 @@ import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from itertools import count, takewhile
+from decimal import Decimal
+from itertools import count, takewhile, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,15 @@ from hapticlink.orchestrator.base.errors import unknown
 LARGEST = 2**26
 """Bytes: 10 min at 1 kHz, of four columns."""
 UNITS = {
-    **{"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
-    **{"rad": 1.0, "deg": math.pi / 180, "N": 1.0, "mN": 1e-3, "kN": 1e3, "N.m": 1.0},
-    **{"mN.m": 1e-3, "N.mm": 1e-3, "N.cm": 1e-2},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
+    "rad": {"rad": 1.0, "deg": math.pi / 180},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "N.m": {"N.m": 1.0, "mN.m": 1e-3, "N.mm": 1e-3, "N.cm": 1e-2},
 }
-"""Factors to SI."""
+"""By the SI unit of a dimension, the factors of others to it."""
+COLUMNS = {"table": ("s", "N", "N", "N.m"), "target": ("s", "m", "m", "rad")}
+"""The SI units of the columns of a hand's tables; those of a drive are the joint's."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,9 +73,10 @@ def find_recorded_tables(
                 yield path, holder, key
 
 
-def read_recorded_table(given: Mapping[str, Any]) -> list[list[float]]:
-    """The rows (time, values) in SI units. Raises ValueError for unknown keys, columns and units,
-    and for what is no number, with its line; InputFault for a file that cannot be read."""
+def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -> list[list[float]]:
+    """The rows (time, values) in SI units, `columns` where they are known. Raises ValueError for
+    unknown keys, columns and units, for a unit of another dimension, and for what is no number,
+    with its line; InputFault for a file that cannot be read."""
     if odd := given.keys() - _KEYS:
         raise ValueError(unknown("key of a recorded table", min(odd), _KEYS))
     path = Path(str(given["path"]))
@@ -79,7 +85,7 @@ def read_recorded_table(given: Mapping[str, Any]) -> list[list[float]]:
     names = [name.strip() for name in lines[0]] if lines else []
     headed = any(_number(name) is None for name in names)
     places = [*_places(given, names if headed else [str(i + 1) for i in range(len(names))])]
-    factors = _factors(given.get("units"), len(places))
+    factors = _factors(given.get("units"), len(places), columns)
     rows = [
         [_entry(path, number, fields, place) * f for place, f in zip(places, factors, strict=True)]
         for number, fields in enumerate(lines[headed:], 1 + headed)
@@ -87,8 +93,12 @@ def read_recorded_table(given: Mapping[str, Any]) -> list[list[float]]:
     ]
     if not rows:
         raise ValueError(f"{path}: it has no rows")
-    begin = rows[0][0]
-    return [[row[0] - begin, *row[1:]] for row in rows]
+    # Decimals subtract and scale exactly: 9 ms are the number that 0.009 is.
+    texts = [fields[places[0]] for fields in lines[headed:] if any(f.strip() for f in fields)]
+    scale = Decimal(repr(factors[0]))
+    begin = Decimal(texts[0].strip())
+    times = (float((Decimal(text.strip()) - begin) * scale) for text in texts)
+    return [[time, *row[1:]] for time, row in zip(times, rows, strict=True)]
 
 
 def _places(given: Mapping[str, Any], names: Sequence[str]) -> Iterator[int]:
@@ -101,15 +111,18 @@ def _places(given: Mapping[str, Any], names: Sequence[str]) -> Iterator[int]:
         yield from map(names.index, found)
 
 
-def _factors(units: Any, size: int) -> list[float]:
+def _factors(units: Any, size: int, columns: Sequence[str]) -> list[float]:
     if not units:
         return [1.0] * size
-    for unit in units:
-        if unit not in UNITS:
-            raise ValueError(unknown("unit", unit, UNITS))
     if len(units) != size:
         raise ValueError(f"{len(units)} units for {size} columns: give one for each")
-    return [UNITS[unit] for unit in units]
+    every = {unit: factor for of in UNITS.values() for unit, factor in of.items()}
+    for unit, si in zip_longest(units, (*columns, *("s",) * (not columns))):
+        if unit is not None and unit not in every:
+            raise ValueError(unknown("unit", unit, every))
+        if unit is not None and si is not None and unit not in UNITS[si]:
+            raise ValueError(f"{unit} where a column is in {si}: {', '.join(UNITS[si])}")
+    return [every[unit] for unit in units]
 
 
 def _entry(path: Path, number: int, fields: Sequence[str], place: int) -> float:

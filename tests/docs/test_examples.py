@@ -47,6 +47,8 @@ NOT_RUN = {
     "--vary haptics.rate=512,1024 --vary 'holds.\"wall.F\"=zoh,foh' "
     "--vary 'delays.\"wall.F\"=0,0.001953125' --check 180 --seed 1 --out results/stability/wall":
         "700 points; tests/analysis/maps/test_maps.py",
+    "hapticlink tune closed-loop-ideal --set sensing=encoders":
+        "takes minutes; tests/analysis/tune/test_tune.py",
     "hapticlink tune closed-loop --set sensing=encoders":
         "takes minutes; tests/analysis/tune/test_tune.py",
     "hapticlink tune enclosure --set sensing=encoders --margin 2 --out tuned/enclosure":

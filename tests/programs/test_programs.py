@@ -38,6 +38,11 @@ SLOW = "mechanism_at=graphics; graphics.rate=100"
 CASES = {
     "zoh": ("closed-loop-ideal", HALF),
     "foh with delays, jitter and loss": ("closed-loop-ideal", "; ".join(DELAYED)),
+    "jitter and loss": (
+        "closed-loop-ideal",
+        f"{HALF}; graphics.rate=30; delays={{\"virtual_environment.Lambda_inv\"="
+        "{min=0.0,max=0.03,loss=0.4,seed=4}}",
+    ),
     "smooth, jacobi": ("closed-loop-ideal", f"{HALF}; hold=smooth; coupling=jacobi"),
     "drawn rate": ("closed-loop-ideal", f"{HALF}; graphics.rate={{min=20,max=90,seed=5}}"),
     "listed frames, a phase": (

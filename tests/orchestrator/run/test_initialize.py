@@ -132,6 +132,12 @@ def test_whole_numbers_are_passed_around_a_loop(tmp_path):
     assert (found["a.y"][0], found["b.n"][0]) == (0.5, 1.0)
 
 
+@pytest.mark.parametrize(("a", "n"), [("(u // 2) + 5", 9.0), ("min(u + 1, 30)", 30.0)])
+def test_whole_numbers_go_around_as_long_as_changes_do_not_grow(tmp_path, a, n):
+    found = ran(tmp_path, loop(tmp_path, a, "u", "n")).haptics
+    assert found["b.n"][0] == n
+
+
 def test_whole_numbers_without_a_solution_are_told(tmp_path):
     """n = round(4 - 3 (2 n + 1)) = 1 - 6 n for no whole n."""
     told = fault(tmp_path, loop(tmp_path, "2 * u + 1", "4 - 3 * u", "n", most=1000.0))

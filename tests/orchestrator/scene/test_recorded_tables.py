@@ -75,6 +75,13 @@ def test_a_drive_follows_a_log(tmp_path):
         ('{ path = "log.csv", columns = ["t", "F"] }', LOG, "column of"),
         ('{ path = "log.csv", units = ["ms", "N"] }', LOG, "2 units for 4 columns"),
         ('{ path = "log.csv", units = ["ms", "N", "lbf", "N.m"] }', LOG, "lbf"),
+        ('{ path = "log.csv", units = ["m", "N", "N", "N.m"] }', LOG, "m where a column is in s"),
+        (
+            '{ path = "log.csv", units = ["s", "deg", "N", "N.m"] }',
+            LOG,
+            "deg where a column is in N",
+        ),
+        ('{ path = "log.csv", units = ["s", "N", "N", "N"] }', LOG, "N where a column is in N.m"),
         ('{ path = "log.csv" }', "t,Fx,Fy,Tz\n0,1,2\n", "line 2, column 4: '' is no number"),
         ('{ path = "log.csv" }', "t,Fx,Fy,Tz\n", "it has no rows"),
         ('{ path = "none.csv" }', LOG, "not a regular file"),
@@ -88,3 +95,13 @@ def test_what_no_log_can_be_is_refused_where_it_stands(tmp_path, table, log, sai
         hand(tmp_path, table, log)
     assert said in str(fault.value)
     assert "hand.table" in str(fault.value)
+
+
+@pytest.mark.parametrize(("unit", "first"), [("ms", 0), ("ms", 5000), ("us", 1_700_000_000_123)])
+def test_a_row_acts_at_its_own_time(tmp_path, unit, first):
+    """Of a log with a row each 125 ms, which are 64 ticks."""
+    step = {"ms": 125, "us": 125_000}[unit]
+    log = "".join(f"{first + step * k},{k},0,0\n" for k in range(4))
+    found = hand(tmp_path, f'{{ path = "log.csv", units = ["{unit}", "N", "N", "N.m"] }}', log)
+    force, t = found["hand.F"][:, 0], found.haptics["time"]
+    np.testing.assert_array_equal(force, np.minimum(np.floor(t / 0.125), 3))
