@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5515,
-    "fmus": 2783,
-    "orchestrator": 12301,
+    "components": 5736,
+    "fmus": 2785,
+    "orchestrator": 12350,
     "programs": 1117,
-    "analysis": 6656,
-    "visualization": 3263,
+    "analysis": 6711,
+    "visualization": 3270,
     "api": 402,
     "commands": 1350,
 }
