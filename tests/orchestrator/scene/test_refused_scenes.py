@@ -122,7 +122,7 @@ REFUSED = {
         ("get_after_set=['hand']", "is no plant of this scene"),
         ('kinds."virtual_mechanism.x"=projector', "x has 3 entries, and a projector"),
         ("kinds.virtual_mechanism.x=rotation",
-         "'rotation' should be 'projector', 'semidefinite', 'angle', 'table' or 'none'"),
+         "'rotation' should be 'projector', 'semidefinite', 'angle', 'table', 'count' or 'none'"),
         ('record.signals=["virtual_mechanism.xx"]', "did you mean 'virtual_mechanism.x'?"),
         ("duration=1e5; graphics.rate={ min = 20, max = 60 }", "graphics.rate: up to 5688888 p"),
         (ITERATED, "steps are repeated"),

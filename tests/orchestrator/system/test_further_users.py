@@ -19,7 +19,7 @@ def test_every_user_has_the_same_connections():
     first = {r for r in rows if "left" not in r[0] + r[1]}
     own = {r for r in first if any(end.split(".")[0] in BLOCKS for end in r)}
     assert {tuple(map(of_left, r)) for r in own} == rows - first
-    assert len(own) == 25
+    assert len(own) == 28
 
 
 def test_a_user_without_a_controller_of_its_own_has_the_scenes():
