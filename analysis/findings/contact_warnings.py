@@ -108,8 +108,8 @@ def _deep(table: Table, linkage: Linkage, contacts: Contacts) -> Iterator[str]:
         yield (
             f"warning: at {times[depth.argmax()]:.4g} s {pair.body} is {short(worst * 1e3)} mm "
             f"deep in {pair.obstacle}, past the middle of the thinner one "
-            f"({short(most[pair] * 1e3)} mm), where their geometry no longer says to which side it "
-            "is pushed out: take a larger contacts.stiffness, or a start at which they are apart"
+            f"({short(most[pair] * 1e3)} mm): rigid bodies are not so deep in each other; take a "
+            "larger contacts.stiffness, or a start at which they are apart"
         )
 
 

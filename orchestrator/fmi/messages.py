@@ -22,8 +22,9 @@ from hapticlink.orchestrator.fmi.status import STATUS
 MAX_MESSAGES, MAX_LENGTH = 5, 2000
 """Messages of an instance that are kept for a fault, and characters of one."""
 MAX_WRITTEN = 1000
-"""Messages of an instance that are written to the file."""
-LEFT_OUT = "further messages are left out"
+"""Messages of an instance that are written to the file: so many that are mere information, and so
+many others. How many more there were of each status is written last."""
+LEFT_OUT = "left out"
 
 _messages: dict[int, deque[str]] = {}
 _files: dict[int, LogFile] = {}
@@ -36,17 +37,26 @@ class LogFile:
     close."""
 
     def __init__(self, path: str, name: str, time: Callable[[], float]) -> None:
-        self._path, self._name, self._time, self._written = path, name, time, 0
+        self._path, self._name, self._time = path, name, time
+        self._written, self._left_out = Counter[bool](), Counter[str]()
 
     def write(self, status: str, category: str, text: str) -> None:
-        """Append a message, the last one with a note that it is the last."""
-        if self._written >= MAX_WRITTEN:
+        """Append a message, or count it where there are many."""
+        informs = status == STATUS[0]
+        if self._written[informs] >= MAX_WRITTEN:
+            self._left_out[status] += 1
             return
-        self._written += 1
-        fields = [f"{self._time():.9g}", self._name, status, category, text]
-        line = "\t".join(" ".join(field.split()) for field in fields)
-        if self._written == MAX_WRITTEN:
-            line += f"\n{self._time():.9g}\t{self._name}\t\t\t{LEFT_OUT}"
+        self._written[informs] += 1
+        self._append(status, category, text)
+
+    def close(self) -> None:
+        """Append how many messages were left out."""
+        for status, number in self._left_out.items():
+            self._append(status, LEFT_OUT, str(number))
+
+    def _append(self, *fields: str) -> None:
+        each = (f"{self._time():.9g}", self._name, *fields)
+        line = "\t".join(" ".join(field.split()) for field in each)
         content = f"{line}\n".encode(errors="replace")  # a line is one write
         # A message is no reason to end a run.
         with suppress(OSError), open(self._path, "ab", buffering=0) as file:
@@ -75,7 +85,7 @@ def keep_message(key: int, status: int, message: bytes, category: bytes = b"") -
         own.append(text)
     if file := _files.get(key):
         named = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        file.write(named, (category or b"").decode("utf-8", "replace"), text)
+        file.write(named, (category or b"")[:200].decode("utf-8", "replace"), text)
 
 
 def newest_messages(key: int) -> list[str]:
@@ -84,26 +94,27 @@ def newest_messages(key: int) -> list[str]:
 
 def close_log(key: int) -> None:
     _messages.pop(key, None)
-    _files.pop(key, None)
+    if file := _files.pop(key, None):
+        file.close()
 
 
 def count_messages(path: Path) -> dict[str, dict[str, int]]:
     """The number of messages in a log, by instance and status."""
     found: dict[str, Counter[str]] = {}
-    for name, status in _read_statuses(path):
-        found.setdefault(name, Counter())[status] += 1
+    for name, status, number in _read_counts(path):
+        found.setdefault(name, Counter())[status] += number
     return {name: dict(counts) for name, counts in found.items()}
 
 
-def _read_statuses(path: Path) -> Iterator[tuple[str, str]]:
+def _read_counts(path: Path) -> Iterator[tuple[str, str, int]]:
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return
     for line in lines:
         fields = line.split("\t")
-        if len(fields) == 5 and fields[2]:
-            yield fields[1], fields[2]
+        if len(fields) == 5:
+            yield fields[1], fields[2], int(fields[4]) if fields[3] == LEFT_OUT else 1
 
 
 def callbacks(key: int) -> fmi2.fmi2CallbackFunctions:

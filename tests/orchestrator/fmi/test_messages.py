@@ -97,15 +97,17 @@ def test_what_fmus_log_in_a_run_that_succeeds_is_in_a_file(tmp_path, isolate):
     assert not [*(tmp_path / "out").glob("*log*")]
 
 
-def test_a_log_ends_with_a_note_that_more_was_said(tmp_path, monkeypatch):
+def test_a_log_ends_with_how_many_more_there_were(tmp_path, monkeypatch):
     monkeypatch.setattr(messages, "MAX_WRITTEN", 3)
     key = messages.open_log()
     messages.write_to(key, str(tmp_path / "log"), "one", lambda: 0.25)
     for i in range(5):
+        messages.keep_message(key, 0, b"note %d" % i, b"logAll")
+    for i in range(4):  # none of which the notes leave out
         messages.keep_message(key, 1, b"%d" % i, b"logAll")
     messages.close_log(key)
-    said = (tmp_path / "log").read_text()
-    assert said == "".join(f"0.25\tone\twarning\tlogAll\t{i}\n" for i in range(3)) + (
-        "0.25\tone\t\t\tfurther messages are left out\n"
-    )
-    assert messages.count_messages(tmp_path / "log") == {"one": {"warning": 3}}
+    said = (tmp_path / "log").read_text().splitlines()
+    assert said[:3] == [f"0.25\tone\tok\tlogAll\tnote {i}" for i in range(3)]
+    assert said[3:6] == [f"0.25\tone\twarning\tlogAll\t{i}" for i in range(3)]
+    assert said[6:] == ["0.25\tone\tok\tleft out\t2", "0.25\tone\twarning\tleft out\t1"]
+    assert messages.count_messages(tmp_path / "log") == {"one": {"ok": 5, "warning": 4}}
