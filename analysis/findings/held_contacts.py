@@ -26,7 +26,7 @@ from hapticlink.orchestrator.results.recorded_scene import scene_part
 from hapticlink.orchestrator.results.run_record import HeldContacts
 
 SHARE = 0.1
-"""Of what the deepest contact stored, which new frames may give."""
+"""Of what the deepest contact had stored by then, which new frames may give."""
 NOTICEABLE_J = 1e-4
 """Energy (J) of 0.1 kg at 45 mm/s."""
 AT_A_TICK = 1e-9  # s
@@ -60,17 +60,28 @@ def held_contacts(results: Results) -> HeldContacts | None:
     states = steps[JOINT_COORDINATES][ticks].T, steps[JOINT_RATES][ticks].T
     energy, wrench = change(*states, rows[:count].T, rows[1 : count + 1].T)
     gains, jumps = np.array(energy).ravel(), np.linalg.norm(np.array(wrench)[:2], axis=0)
-    deepest = max(0.0, -float(steps[CONTACT_GAP].min()))
-    worst, jumped = int(gains.argmax()), int(jumps.argmax())
+    deepest = np.maximum.accumulate(np.maximum(0.0, -steps[CONTACT_GAP]))[ticks[:count]]
+    stored = 0.5 * contacts.stiffness * deepest**2
+    worst, jumped = int((gains - SHARE * stored).argmax()), int(jumps.argmax())
     return HeldContacts(
         given=float(gains[gains > 0].sum()),
         taken=-float(gains[gains < 0].sum()),
         largest_gain=max(0.0, float(gains[worst])),
         time_of_gain=float(times[worst]),
-        stored=0.5 * contacts.stiffness * deepest**2,
+        stored=float(stored[worst]),
         largest_jump=float(jumps[jumped]),
         time_of_jump=float(times[jumped]),
     )
+
+
+def why_unchecked(results: Results) -> Iterator[str]:
+    """A line where contacts are held, and `held_contacts` does not know all that they act with."""
+    held = results.record.scene["contacts"]["detection"] == "graphics"
+    if held and len(results.haptics["time"]):
+        yield (
+            "what new frames of contacts gave the mechanism is not checked: that needs two frames, "
+            "and contacts, q, qd and contact_gap in every row, without latency or change"
+        )
 
 
 def describe_held(held: HeldContacts) -> Iterator[str]:
@@ -88,7 +99,8 @@ def warn_of_held(held: HeldContacts) -> Iterator[str]:
     if held.largest_gain > max(SHARE * held.stored, NOTICEABLE_J):
         yield (
             f"warning: the new frame of contacts at {held.time_of_gain:.4g} s gave the mechanism "
-            f"{short(1e3 * held.largest_gain)} mJ, where the deepest contact stored "
-            f"{short(1e3 * held.stored)} mJ: what it touches was met late, or the geometry turned "
-            "while it was held; take contacts.detection = 'haptics', or a higher graphics.rate"
+            f"{short(1e3 * held.largest_gain)} mJ, where the deepest contact had stored "
+            f"{short(1e3 * held.stored)} mJ by then: what it touches was met late, or the geometry "
+            "turned while it was held; take contacts.detection = 'haptics', or a higher "
+            "graphics.rate"
         )

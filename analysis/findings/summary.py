@@ -291,6 +291,8 @@ def _contacts(results: Results, measures: Measures) -> Iterator[str]:
         yield from contact_warnings.warn_of_contacts(results)
         if held := measures.held_contacts:
             yield from held_contacts.warn_of_held(held)
+        else:
+            yield from held_contacts.why_unchecked(results)
 
 
 def _real_time(report: Mapping[str, Any]) -> Iterator[str]:

@@ -259,8 +259,9 @@ class PortEnergy(BlockEnergy):
 @dataclass(frozen=True)
 class HeldContacts:
     """What new frames of held contacts did to the mechanism (`analysis/findings/held_contacts.py`):
-    energy (J) that they gave and took in all, the largest gain at one frame and when (s), and the
-    largest jump (N) of F_env and when; with the energy (J) of the deepest contact."""
+    energy (J) that they gave and took in all, the gain at the frame that is most beyond what the
+    deepest contact had stored by then (J), and when (s), and the largest jump (N) of F_env and
+    when."""
 
     given: float
     taken: float

@@ -178,6 +178,16 @@ def test_a_contact_that_was_met_late_is_told_with_the_energy_that_its_frame_gave
     assert len(jumps) == 1
 
 
+def test_what_is_not_checked_of_held_contacts_is_said(tmp_path: Path) -> None:
+    pushed_against_a_wall(tmp_path, 20.0, 30)
+    said = "what new frames of contacts gave the mechanism is not checked"
+    for options in ({"record.every": 2}, {"delays.virtual_environment.contacts": 0.001}):
+        made = hl.run(tmp_path / "pushed.toml", options)
+        assert "held_contacts" not in made.run
+        assert any(said in line for line in made.run["warnings"])
+    assert not any(said in line for line in hl.run(tmp_path / "pushed.toml").run["warnings"])
+
+
 @pytest.mark.parametrize(
     ("force", "contacts"), [(5.0, {}), (20.0, {"detection": "haptics"})], ids=["graphics", "own"]
 )
