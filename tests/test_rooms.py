@@ -36,7 +36,7 @@ CODE_LINES = {
     "fmus": 2785,
     "orchestrator": 12357,
     "programs": 1117,
-    "analysis": 6721,
+    "analysis": 6722,
     "visualization": 3270,
     "api": 402,
     "commands": 1350,
