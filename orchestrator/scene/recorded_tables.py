@@ -75,8 +75,8 @@ def find_recorded_tables(
 
 def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -> list[list[float]]:
     """The rows (time, values) in SI units, `columns` where they are known. Raises ValueError for
-    unknown keys, columns and units, for a unit of another dimension, and for what is no number,
-    with its line; InputFault for a file that cannot be read."""
+    unknown keys, columns and units, for a unit of another dimension, and for what is no finite
+    number, with its line; InputFault for a file that cannot be read."""
     if odd := given.keys() - _KEYS:
         raise ValueError(unknown("key of a recorded table", min(odd), _KEYS))
     path = Path(str(given["path"]))
@@ -87,18 +87,20 @@ def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -
     places = [*_places(given, names if headed else [str(i + 1) for i in range(len(names))])]
     factors = _factors(given.get("units"), len(places), columns)
     rows = [
-        [_entry(path, number, fields, place) * f for place, f in zip(places, factors, strict=True)]
+        (number, fields)
         for number, fields in enumerate(lines[headed:], 1 + headed)
         if any(field.strip() for field in fields)
     ]
     if not rows:
         raise ValueError(f"{path}: it has no rows")
+    each = [[_entry(path, *row, place) for place in places] for row in rows]
     # Decimals subtract and scale exactly: 9 ms are the number that 0.009 is.
-    texts = [fields[places[0]] for fields in lines[headed:] if any(f.strip() for f in fields)]
-    scale = Decimal(repr(factors[0]))
-    begin = Decimal(texts[0].strip())
-    times = (float((Decimal(text.strip()) - begin) * scale) for text in texts)
-    return [[time, *row[1:]] for time, row in zip(times, rows, strict=True)]
+    times, scale = [Decimal(fields[places[0]].strip()) for _, fields in rows], repr(factors[0])
+    seconds = (float((time - times[0]) * Decimal(scale)) for time in times)
+    return [
+        [time, *(value * f for value, f in zip(values[1:], factors[1:], strict=True))]
+        for time, values in zip(seconds, each, strict=True)
+    ]
 
 
 def _places(given: Mapping[str, Any], names: Sequence[str]) -> Iterator[int]:
@@ -129,6 +131,10 @@ def _entry(path: Path, number: int, fields: Sequence[str], place: int) -> float:
     field = fields[place] if place < len(fields) else ""
     if (value := _number(field)) is None:
         raise ValueError(f"{path}: line {number}, column {place + 1}: {field[:100]!r} is no number")
+    if not math.isfinite(value):
+        raise ValueError(
+            f"{path}: line {number}, column {place + 1}: {field[:100]!r} is no finite number"
+        )
     return value
 
 

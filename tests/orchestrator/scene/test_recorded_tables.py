@@ -88,6 +88,8 @@ def test_a_drive_follows_a_log(tmp_path):
         ('{ path = "log.csv", columns = ["t", "Fx", "Fy"] }', LOG, "hand"),
         ('{ path = "log.csv" }', "t,Fx,Fy,Tz\n1,0,0,0\n1,1,0,0\n", "does not come after"),
         ('{ path = "log.csv" }', "t,Fx,Fy,Tz\n1,0,0,0\n2,nan,0,0\n", "finite"),
+        ('{ path = "log.csv" }', "t,Fx,Fy,Tz\n1,0,0,0\n1e9999999,0,0,0\n", "line 3, column 1"),
+        ('{ path = "log.csv" }', "t,Fx,Fy,Tz\ninf,0,0,0\ninf,0,0,0\n", "line 2, column 1"),
     ],
 )
 def test_what_no_log_can_be_is_refused_where_it_stands(tmp_path, table, log, said):
