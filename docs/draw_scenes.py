@@ -83,7 +83,7 @@ if __name__ == "__main__":
         for scene in (*hl.shipped(), *examples(Path(folder))):
             print(draw(scene))
     print(device("closed-loop"))
-    print(blocks("closed-loop", "blocks.png"))
+    print(blocks("closed-loop-ideal", "blocks.png"))
     print(blocks("virtual-wall", "blocks-of-a-wall.png"))
     print(inside("closed-loop", "device", "inside-device.png"))
     print(inside("closed-loop", "inside-virtual-mechanism", "inside-mechanism.png"))

@@ -91,8 +91,8 @@ def _find_idle_holds(scene: Scene, system: System) -> Iterator[str]:
         "hold": (scene.hold, "zoh", "a slower rate to a faster"),
         "downsampling": (scene.downsampling, "latest", "a faster rate to a slower"),
     }
+    asked = {c.hold for c in system.connections} | {r.hold for r in system.refused}
     for key, (hold, plain, way) in ways.items():
-        asked = {c.hold for c in system.connections} | {r.hold for r in system.refused}
         if hold == plain or hold in asked:
             continue
         apart = (longest(c.source) - longest(c.target) for c in system.connections if c.hold)

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component
-from hapticlink.components.ports import BASES
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.scalar_variables import ScalarVariable, scalar_variables
-from hapticlink.fmus.units import base_unit
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import Unit
 from hapticlink.orchestrator.fmi.variables import Scalar
@@ -159,11 +158,10 @@ def _unit(description: Description, scalar: Scalar) -> tuple[str, Unit | None]:
     unit = description.unit(scalar)
     if unit is None or description.block is not None:
         return scalar.unit or ("" if description.block is None else "1"), None
-    try:
-        powers = tuple(base_unit(unit.name).get(base, 0) for base in BASES)
-    except FmuError:
-        powers = None
-    return unit.name, None if unit == Unit(unit.name, powers) and powers else unit
+    with suppress(FmuError):
+        if unit == Unit.named(unit.name):
+            return unit.name, None
+    return unit.name, unit
 
 
 def _energies(resolved: Resolved) -> Iterator[Port]:

@@ -1,6 +1,5 @@
 """What contacts that are held between two frames of the graphics do to the mechanism: at each new
-frame their geometry jumps, and with it their energy and F_env; and what they do not
-see until it is deep inside."""
+frame their geometry jumps, and with it their energy and F_env."""
 
 from __future__ import annotations
 

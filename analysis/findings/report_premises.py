@@ -71,11 +71,16 @@ def find_differences(scene: Mapping[str, Any]) -> Iterator[str]:
     """In what a run of a scene (its tables, with all defaults) differs from the experiment of the
     report that it is; nothing for one that is none."""
     for premise in OF_THE_REPORT.get(scene.get("experiment", ""), ()):
-        value: Any = scene
-        for name in premise.key.split("."):
-            value = (value or {}).get(name)
-        if value != premise.value:
+        if (value := setting(scene, premise.key)) != premise.value:
             yield premise.instead.get(value, f"{premise.key} = {value}")
+
+
+def setting(scene: Mapping[str, Any], key: str) -> Any:
+    """The value of a dotted key, None in a table that the scene does not have."""
+    value: Any = scene
+    for name in key.split("."):
+        value = (value or {}).get(name)
+    return value
 
 
 def describe_experiment(scene: Mapping[str, Any]) -> Iterator[str]:

@@ -64,9 +64,9 @@ def _signals(
         ),
         ("P_c", *space.projector, 0.0, "projector on the constrained directions", bool(law)),
         ("a_bias", *space.acceleration, 0.0, bias, spec.bias == "full"),
-        (grasp.HELD, (), "1", 1.0, "point that the hand holds, 0 for none", clutch),
     )
-    return [Variable(*declared) for *declared, needed in rows if needed]
+    signals = [Variable(*declared) for *declared, needed in rows if needed]
+    return [*signals, grasp.CLUTCH] if clutch else signals
 
 
 def _gains(
@@ -175,19 +175,14 @@ def _wrenches(
     parts, terms, reads = list[BlockPart](), "", list[str]()
     force, coupling_energy = ca.SX.zeros(space.size), ca.SX(0)
     apart = ("x_S", "v_S", "x_D", "v_D")
-
     clutch = (grasp.HELD,) if grasp.HELD in u else ()
-
-    def held(wrench: ca.SX, otherwise: ca.SX | float = 0.0) -> ca.SX:
-        """A wrench of the mechanism, and what stands in its place while no point is held."""
-        return ca.if_else(u[grasp.HELD] > 0.5, wrench, otherwise) if grasp.HELD in u else wrench
-
+    e, rate = ca.SX(0), ca.SX(0)
+    if spec.teleoperation or law:
+        e, rate = space.difference(u["x_S"], u["x_D"]), u["v_S"] - u["v_D"]
     if spec.teleoperation:
-        e = space.difference(u["x_S"], u["x_D"])
-        output["F_drift"] = p["K_pc"] * e
-        coupling_energy += ca.dot(e, output["F_drift"]) / 2
-        output["F_drift"] += p["B_pc"] * (u["v_S"] - u["v_D"])
-        output["F_drift"] = held(output["F_drift"])
+        spring = p["K_pc"] * e
+        coupling_energy += ca.dot(e, spring) / 2
+        output["F_drift"] = grasp.while_held(u, spring + p["B_pc"] * rate)
         force += output["F_drift"]
         law_text = r"$F_{drift} = K_{pc} (x_S - x_D)$" "\n" r"$+ B_{pc} (v_S - v_D)$"
         gains = (*apart, "K_pc", "B_pc", *clutch)
@@ -196,7 +191,7 @@ def _wrenches(
         )
         terms, reads = " + F_{drift}", ["F_drift"]
     if spec.contact:
-        force += held(u["F_env"])
+        force += grasp.while_held(u, u["F_env"])
         terms, reads = terms + " + F_{env}", [*reads, "F_env", *clutch]
     if spec.damping is not None:
         force -= p["B_d"] * u["v_D"]
@@ -213,7 +208,7 @@ def _wrenches(
         if spec.bias == "full":
             a += u["a_bias"]
             desired, reads = desired + "\n" r"$+ a_{bias}$", [*reads, "a_bias"]
-        motor = held(u["M"] @ a + u["c"] - u["F_hand"], u["c"] + force)
+        motor = grasp.while_held(u, u["M"] @ a + u["c"] - u["F_hand"], u["c"] + force)
         parts.append(BlockPart("desired motion", desired, "(4.3), (4.4)", tuple(reads), ("a",)))
         summed, reads = "M_d a + C_d v - F_h", ["M", "a", "c", "F_hand", *clutch]
     if law:
@@ -221,8 +216,7 @@ def _wrenches(
         def constrain(pull: ca.SX) -> ca.SX:
             return topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"])
 
-        e = space.difference(u["x_S"], u["x_D"])
-        F_T = held(constrain(p["k_j"] * e + p["b_j"] * (u["v_S"] - u["v_D"])))
+        F_T = grasp.while_held(u, constrain(p["k_j"] * e + p["b_j"] * rate))
         coupling_energy += ca.dot(e, constrain(p["k_j"] * e)) / 2
         output["F_constraint"], motor = F_T, motor + F_T
         pulled = (*apart, "M", "P_c", "k_j", "b_j", "length_scale", *clutch)
@@ -237,7 +231,7 @@ def _wrenches(
         BlockPart(name, f"$u = {summed}$", source, tuple(dict.fromkeys(reads)), ("F_motor",))
     )
     if clutch:
-        output["coupling_energy"] = held(coupling_energy)
+        output["coupling_energy"] = grasp.while_held(u, coupling_energy)
         known = ("x_S", "x_D", "K_pc", "k_j", "M", "P_c", "length_scale", grasp.HELD)
         springs = tuple(name for name in known if name in u or name in p)
         law_text = r"$E = (e \cdot K_{pc} e + e \cdot F_T(k_j e)) / 2$"

@@ -54,7 +54,7 @@ def _wrench(spec: ConstantHand | ProfileHand, clutch: bool) -> Component:
     """F = F(t) - B v, with a damper to ground if the spec has one; 0 while a hand with a clutch
     holds no point."""
     parameters = []
-    inputs = [Variable(grasp.HELD, (), "1", 1.0, "point that the hand holds")] if clutch else []
+    inputs = [grasp.CLUTCH] if clutch else []
     if isinstance(spec, ConstantHand):
         parameters += [Variable("wrench", *SPACE.wrench, spec.wrench, "wrench on the handle")]
     if spec.damping is not None:
@@ -68,9 +68,7 @@ def _wrench(spec: ConstantHand | ProfileHand, clutch: bool) -> Component:
         F, kind = signals[0].value(block.t), "a wrench over time"
     if spec.damping is not None:
         F = F - block.p["damping"] * block.u["v"]
-    if clutch:
-        F = ca.if_else(block.u[grasp.HELD] > 0.5, F, 0)
-    return _hand(block, kind, "sampled", F, signals)
+    return _hand(block, kind, "sampled", grasp.while_held(block.u, F), signals)
 
 
 def _arm(spec: ArmHand) -> Component:

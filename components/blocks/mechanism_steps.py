@@ -25,6 +25,7 @@ from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.forces import friction, gravity
 from hapticlink.components.integrators.base import Integrator, MechanicalSystem
 from hapticlink.components.linkage.closures import rows
+from hapticlink.components.linkage.model import same_point
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.components.time_signals import TimeSignal
 
@@ -163,7 +164,7 @@ class MechanismSteps(MechanicalSystem):
             return [(model.x_h, wrench)]
         choices = [ca.SX(k + 1) for k in range(len(model.linkage.choices))]
         return [
-            (model.pose_of_choice(k), ca.if_else(grasp.same(model.point, k), wrench, 0))
+            (model.pose_of_choice(k), ca.if_else(same_point(model.point, k), wrench, 0))
             for k in choices
         ]
 

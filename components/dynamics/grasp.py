@@ -22,9 +22,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from hapticlink.components.component import Block, Variable
+from hapticlink.components.component import Block, Signals, Variable
 from hapticlink.components.dynamics.constrained_directions import Points
-from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.model import LinkageModel, same_point
 from hapticlink.components.parts import BlockPart
 from hapticlink.components.specs.linkage import Linkage
 
@@ -35,6 +35,8 @@ ASKED, HELD, READY = "asked_point", "held_point", "ready_point"
 graphics copy puts out mobility and directions."""
 OFFSET, PATH, HANDLE = "x_offset", "path", "x_handle"
 _BEGIN = "path_offset"
+CLUTCH = Variable(HELD, (), "1", 1.0, "point that the hand holds, 0 for none")
+"""The input of a block that is let go with the point."""
 
 
 def start(linkage: Linkage) -> int:
@@ -98,15 +100,15 @@ class Grasp:
         asked, held = self.block.p[POINT], self.block.x[HELD]
         is_granted = ca.SX(1)
         if READY in self.block.u:
-            is_granted = same(self.block.u[READY], asked)
+            is_granted = same_point(self.block.u[READY], asked)
         if HANDLE in self.block.u:
-            is_granted *= ca.logic_or(same(held, asked), same(held, ca.SX(0)))
+            is_granted *= ca.logic_or(same_point(held, asked), same_point(held, ca.SX(0)))
         return ca.if_else(is_granted, asked, 0)
 
     @property
     def changes(self) -> ca.SX:
         """Whether the point changes when a step begins."""
-        return ca.logic_not(same(self.held, self.block.x[HELD]))
+        return ca.logic_not(same_point(self.held, self.block.x[HELD]))
 
     @property
     def points(self) -> Points:
@@ -118,7 +120,7 @@ class Grasp:
         x, u, after = self.block.x, self.block.u, self.model.pose_of_choice(self.held)
         before = self.model.x_h + x[OFFSET]
         if HANDLE in u:
-            before = ca.if_else(same(self.held, ca.SX(0)), before, u[HANDLE])
+            before = ca.if_else(same_point(self.held, ca.SX(0)), before, u[HANDLE])
         path = self.model.x_h + x[_BEGIN]
         return {
             HELD: self.held,
@@ -145,12 +147,13 @@ def outputs_of_copy(linkage: Linkage) -> list[Variable]:
 def points_of_copy(block: Block) -> Points:
     """The operational point of a graphics copy over a step."""
     asked = block.u[ASKED]
-    return Points(asked, asked, ca.logic_not(same(asked, block.x[READY])))
+    return Points(asked, asked, ca.logic_not(same_point(asked, block.x[READY])))
 
 
-def same(first: ca.SX, second: ca.SX) -> ca.SX:
-    """Whether two numbers of points are the same."""
-    return ca.fabs(first - second) < 0.5
+def while_held(u: Signals, wrench: ca.SX, otherwise: ca.SX | float = 0.0) -> ca.SX:
+    """A wrench on the point that is held, and what stands in its place while none is; the wrench
+    itself in a block without a CLUTCH among its inputs u."""
+    return ca.if_else(u[HELD] > 0.5, wrench, otherwise) if HELD in u else wrench
 
 
 def part(block: Block) -> BlockPart:

@@ -240,7 +240,7 @@ class LinkageModel:
         pose = ca.SX(self.linkage.space.size, 1)
         for k, name in enumerate(self.linkage.choices, 1):
             there = self.pose(self.linkage.points[name].body, f"{name}.at")
-            pose += ca.if_else(ca.fabs(number - k) < 0.5, there, 0)
+            pose += ca.if_else(same_point(number, ca.SX(k)), there, 0)
         return pose
 
     def pose(self, body: str, point: str) -> ca.SX:
@@ -259,3 +259,8 @@ class LinkageModel:
     @cached_property
     def Jdot_qd(self) -> ca.SX:
         return self.rate(self.v_h)
+
+
+def same_point(first: ca.SX, second: ca.SX) -> ca.SX:
+    """Whether two numbers of a linkage's choices are the same."""
+    return ca.fabs(first - second) < 0.5

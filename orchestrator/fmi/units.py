@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from hapticlink.components.ports import BASES
+from hapticlink.fmus.units import base_unit
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,11 @@ class Unit:
     base: tuple[int, ...] | None = None
     factor: float = 1.0
     offset: float = 0.0
+
+    @classmethod
+    def named(cls, name: str) -> Unit:
+        """The unit that a name like N.m/s2 stands for. Raises InvalidUnit for other names."""
+        return cls(name, tuple(base_unit(name).get(base, 0) for base in BASES))
 
     @classmethod
     def read(cls, element: Element, space: str = "") -> Unit:

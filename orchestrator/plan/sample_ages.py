@@ -120,9 +120,8 @@ def _ages(
     plan: Plan, ticks: NDArray[np.int64], kinds: Mapping[Event, NDArray[np.intp]]
 ) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64]]]:
     """By connection, in events of each kind, the ticks at which its inputs are set and their ages
-    (ticks): what these leave in the
-    places is found once a kind, and goes on from event to event for all of them at once. Without
-    latencies, of which each sample has its own."""
+    (ticks): what these leave in the places is found once a kind, and goes on from event to event
+    for all of them at once. Without latencies, of which each sample has its own."""
     left: dict[Place, dict[Event, Stamp]] = {}
     used: dict[Event, list[tuple[str, Stamp]]] = {}
     for kind in kinds:

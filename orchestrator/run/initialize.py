@@ -34,8 +34,9 @@ MOST = 50
 TOLERANCE = 1e-12
 MAX_COLUMNS = 500
 """Signals on a loop up to which Newton's Jacobian is evaluated; Aitken's method needs none."""
-LONGEST = 1.5 / SLOWEST
-"""Step (s) of a clock that is slowed down as far as it may be, and jitters."""
+LONGEST = 2 / SLOWEST
+"""Bound of the step (s) of a clock that is slowed down as far as it may be, and whose steps end up
+to half of a period early and late."""
 
 
 def initialize(fmus: LoadedFmus, rates_change: bool = False) -> bool:

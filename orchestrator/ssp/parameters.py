@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.base.terminal_output import printable
 from hapticlink.orchestrator.fmi.units import SAME, Linear, Unit, conversion
-from hapticlink.orchestrator.fmi.variables import entry_of
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, entry_of
 from hapticlink.orchestrator.ssp.connections import ReachedVariable, Wires
 from hapticlink.orchestrator.ssp.names import SSC, SSD, SSM, SSV
 from hapticlink.orchestrator.ssp.tree import (
@@ -34,7 +34,7 @@ from hapticlink.orchestrator.ssp.tree import (
 
 Value = bool | int | float | str
 READ: dict[str, Callable[[str], Value]] = {
-    **dict.fromkeys(("Real", "Float64", "Float32"), float),
+    **dict.fromkeys(CONTINUOUS, float),
     **dict.fromkeys(("Integer", *(f"{u}Int{n}" for u in ("", "U") for n in (8, 16, 32, 64))), int),
     "Boolean": lambda text: text in ("true", "1"),
     "String": str,

@@ -10,8 +10,6 @@ from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from hapticlink.components.ports import BASES
-from hapticlink.fmus.units import base_unit
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.units import SAME, Unit, conversion, why_unsuitable
@@ -62,7 +60,7 @@ def in_units_of(description: Description, block: Component) -> Description:
     has others: as they are read, so that whoever reads them finds what the block would have given.
     What cannot be converted stays as it is."""
     declared = {
-        name: Unit(unit, tuple(base_unit(unit).get(base, 0) for base in BASES))
+        name: Unit.named(unit)
         for v in block.outputs
         for name, unit in zip(v.names, v.units, strict=True)
     }

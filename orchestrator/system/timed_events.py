@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.base.signal_names import CHOSEN_POINT
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.transfer import as_signal
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import TimedEvent, Value
 from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem
@@ -153,7 +153,7 @@ def _require_type(scalar: Scalar, number: bool | float | str) -> None:
     elif isinstance(number, bool):
         takes = "a number"
     else:
-        fits = scalar.type in ("Real", "Float64", "Float32") or float(number).is_integer()
+        fits = scalar.type in CONTINUOUS or float(number).is_integer()
         takes = "" if fits else "a whole number"
     if takes:
         given = str(number).lower()

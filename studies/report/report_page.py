@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hapticlink.analysis.findings.report_premises import CHAPTER_6, describe_experiment
+from hapticlink.analysis.findings.report_premises import CHAPTER_6, describe_experiment, setting
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Results
@@ -82,15 +82,8 @@ def premises(name: str, results: Results) -> str:
     of_the_report = "".join(describe_experiment(scene))
     if of_the_report:
         return f"{name}: {of_the_report}"
-    values = (f"{p.key} = {_setting(scene, p.key)}" for p in CHAPTER_6)
+    values = (f"{p.key} = {setting(scene, p.key)}" for p in CHAPTER_6)
     return f"{name}: not an experiment of the report; {', '.join(values)}"
-
-
-def _setting(scene: Mapping[str, Any], key: str) -> object:
-    value: Any = scene
-    for name in key.split("."):
-        value = (value or {}).get(name)
-    return value
 
 
 def write(folder: Path, entries: Sequence[Entry], counts: str) -> Path:

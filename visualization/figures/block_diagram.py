@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 WIDTH = 1.75
 """Of a column (in)."""
+TIMING = {"sampled": "sampled", "continuous": "plant", "frame": "frames"}
+"""What a box says of its FMU."""
 
 
 def figure(system: System, title: str) -> Figure:
@@ -41,6 +43,6 @@ def label(connection: Connection) -> str:
 
 def _box(fmu: Fmu, system: System) -> Box:
     clocks = [clock.name for clock in system.timeline.clocks]
-    timing, steps = "sampled" if fmu.sampled else "plant", system.timeline.clock(fmu.clock).period
+    timing, steps = TIMING[fmu.description.timing], system.timeline.clock(fmu.clock).period
     rate = f"{1 / system.timeline.seconds(steps):.4g} Hz" if steps else "rate varies"
     return Box(fmu.name, (f"{timing}, {rate}",), clocks.index(fmu.clock))
