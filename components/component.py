@@ -21,8 +21,8 @@ from typing import Literal
 
 import casadi as ca
 
-from hapticlink.components.parts import BlockPart, require_complete
 from hapticlink.components.ports import Kind, Power, SpringPorts
+from hapticlink.components.schematic_parts import BlockPart, require_complete
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
 Timing = Literal["continuous", "sampled", "frame"]

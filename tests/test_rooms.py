@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5736,
+    "components": 5735,
     "fmus": 2785,
-    "orchestrator": 12357,
-    "programs": 1117,
-    "analysis": 6722,
-    "visualization": 3270,
+    "orchestrator": 12366,
+    "programs": 1116,
+    "analysis": 6724,
+    "visualization": 3271,
     "api": 402,
     "commands": 1350,
 }

@@ -28,9 +28,9 @@ import casadi as ca
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
 from hapticlink.components.dynamics import grasp
-from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import SpringPorts
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.control import Controller, PassivityLaw, Topology
 
 _DRIFT = SpringPorts("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")

@@ -45,9 +45,9 @@ from hapticlink.components.device.variables import (
     observer_gains,
     variables,
 )
-from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.ports import Power
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.device import Device
 
 SPACE = PLANE

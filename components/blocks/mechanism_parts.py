@@ -13,7 +13,7 @@ from hapticlink.components.dynamics.variables import (
     mobility_part,
     operational_point,
 )
-from hapticlink.components.parts import BlockPart
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 
 _EFFORTS = (".F_hand", ".F_drift", ".effort")

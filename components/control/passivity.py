@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import casadi as ca
 
 from hapticlink.components.component import STEP_SIZE, Signals, Variable
-from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.control import PassivityLaw
 
 PERIOD = Variable(STEP_SIZE, (), "s", 1e-3, "period T", "fixed")

@@ -28,7 +28,7 @@ from hapticlink.components.dynamics.projection import MU, projection
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import coordinates
-from hapticlink.components.parts import BlockPart
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
 
 

@@ -3,12 +3,12 @@ handle.
 
     x = x_k(q) + c,   v = J_k qd,   path = x_k(q) + s
 
-with k the number of the point that is held, from 1. Of no point, k = 0, pose, Jacobian and mobility
-are 0: the hand's wrench and the coupling act on nothing, and x and path stand still. A change takes
-effect when a step begins. The handle is not where the new point is, so c is taken anew at the
-grasp: x is then the handle's pose x_D, and the coupling starts relaxed; without a device x goes on
-from where it was. s makes path, with which wrenches are paired for their work, continuous over all
-changes:
+with k the number of the point that is held, from 1, and offsets c and s, both 0 at the start. Of no
+point, k = 0, pose, Jacobian and mobility are 0: the hand's wrench and the coupling act on nothing,
+and x and path stand still. A change takes effect when a step begins. The handle is not where the
+new point is, so c is taken anew at the grasp: x is then the handle's pose x_D, and the coupling
+starts relaxed; without a device x goes on from where it was. s makes path, with which wrenches are
+paired for their work, continuous over all changes:
 
     c <- x_D - x_k(q)  or  x - x_k(q),    s <- path - x_k(q)
 
@@ -25,7 +25,7 @@ import casadi as ca
 from hapticlink.components.component import Block, Signals, Variable
 from hapticlink.components.dynamics.constrained_directions import Points
 from hapticlink.components.linkage.model import LinkageModel, same_point
-from hapticlink.components.parts import BlockPart
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.linkage import Linkage
 
 POINT = "point"

@@ -10,8 +10,8 @@ from hapticlink.components.linkage.parameters import (
     coordinates,
     mean_link_length,
 )
-from hapticlink.components.parts import BlockPart
 from hapticlink.components.port_space import PortSpace
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 
 

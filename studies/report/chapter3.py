@@ -16,12 +16,15 @@ EULER = "mechanism.integrator=semi-implicit-euler"
 PREMISES = ("the mechanism alone under the wrench of chapter 6, semi-implicit Euler at 512 Hz",)
 
 
-def _options(kind: str) -> tuple[str, str]:
+def stabilised(kind: str) -> tuple[str, str]:
+    """The options of figures 3.3 and 3.4."""
     return EULER, f"mechanism.stabilization={kind}"
 
 
 def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
-    made = {kind: runs("five-bar", *_options(kind)) for kind in ("none", "baumgarte", "projection")}
+    made = {
+        kind: runs("five-bar", *stabilised(kind)) for kind in ("none", "baumgarte", "projection")
+    }
     time = made["none"].haptics["time"]
     error = {kind: measures.closure_gap(results) for kind, results in made.items()}
     worst = {kind: float(e.max()) for kind, e in error.items()}
@@ -38,7 +41,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         f"grows to {1e3 * worst['none']:.2g} mm in 3 s, by the constraint equations of Appendix A "
         "at the recorded angles",
         PREMISES,
-        command("five-bar", *_options("none")),
+        command("five-bar", *stabilised("none")),
     )
 
     figure, (axis,) = draw.panels(1, width=6)
@@ -61,5 +64,5 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
         f"at most {1e6 * worst['baumgarte']:.2g} um, {share:.1e} of the shortest link, with "
         f"alpha = 512 /s, beta = 1/2 (dead beat); projection {worst['projection']:.1e} m",
         PREMISES,
-        command("five-bar", *_options("baumgarte")),
+        command("five-bar", *stabilised("baumgarte")),
     )

@@ -6,12 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from hapticlink.analysis.findings import block_costs
 from hapticlink.analysis.findings.measures import Measures
 from hapticlink.analysis.findings.tracking import tracking
-from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.system.timeline import timeline
 from studies import draw
+from studies.report import measures
 from studies.report.report_page import Entry, Runs, premises
 from studies.report.systems import IDEAL_6, STATED_6, System
 
@@ -40,7 +38,7 @@ def entries(runs: Runs, folder: Path) -> Iterator[Entry]:
     title = f"bias full: {next(ratios)} at {RATES[0]} as at {RATES[-1]} Hz, ideally {next(ratios)}"
     errors.set_title(title, fontsize="medium")
     energies.set_title("energy at the user's port", fontsize="medium")
-    operations = [_operations(system) for system, *_ in SYSTEMS]
+    operations = [measures.operations(system.scene, *system.options) for system, *_ in SYSTEMS]
     yield Entry(
         "Section 4.2.1, what encoders and observer cost",
         f"{stated[0]:.2g} mm at {RATES[0]} Hz and {stated[-1]:.2g} mm at {RATES[-1]} Hz with them, "
@@ -68,12 +66,6 @@ def _measured(runs: Runs, system: System, bias: str, rate: int) -> tuple[float, 
     port = Measures(results).port
     assert port is not None
     return float(tracking(results)[1].max()), 1e3 * port.peak
-
-
-def _operations(system: System) -> float:
-    """Operations of the blocks' graphs in a haptic tick."""
-    scene = open_scene.load(system.scene, system.options)
-    return sum(each.operations for each in block_costs.costs(scene, timeline(scene)))
 
 
 def _listed(values: list[float]) -> str:

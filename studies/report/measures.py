@@ -13,8 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.analysis.findings import block_costs
 from hapticlink.analysis.findings.tracking import tracking
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.results.read_results import Results, Vector
+from hapticlink.orchestrator.system.timeline import timeline
 from studies.report import appendix_a
 
 
@@ -143,6 +146,12 @@ def by_count(results: Results) -> ByCount:
         return one, more
 
     return ByCount(both(np.median, gap), both(rms, force), both(rms, multipliers))
+
+
+def operations(scene: str, *options: str) -> float:
+    """Operations of the blocks' graphs in a haptic tick."""
+    read = open_scene.load(scene, options)
+    return sum(each.operations for each in block_costs.costs(read, timeline(read)))
 
 
 def folding(q4: Vector) -> Vector:

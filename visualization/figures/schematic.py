@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hapticlink.components.component import Component, Variable
-    from hapticlink.components.parts import BlockPart
+    from hapticlink.components.schematic_parts import BlockPart
     from hapticlink.orchestrator.system.system import System
 
 WIDTH = 2.2

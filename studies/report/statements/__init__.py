@@ -13,7 +13,7 @@ from studies.report.statements import (
     paper_method,
     rendering,
 )
-from studies.report.statements.record import Statement
+from studies.report.statements.statement import Statement
 
 CHAPTERS = (
     introduction,

@@ -11,7 +11,7 @@ from studies.report.appendix_a import J, L, M
 from studies.report.five_bar import FRACTIONS as F
 from studies.report.five_bar import MovingFiveBar
 from studies.report.report_page import Runs
-from studies.report.statements.record import (
+from studies.report.statements.statement import (
     SLOPE,
     Statement,
     compare,

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
 
+from hapticlink.orchestrator import open_scene
 from studies.report import appendix_a, measures
-from studies.report.five_bar import FRACTIONS, WRENCH, MovingFiveBar
+from studies.report.chapter3 import stabilised
+from studies.report.five_bar import FRACTIONS, WRENCH, MovingFiveBar, shipped
 from studies.report.report_page import Runs, command
-from studies.report.statements.record import (
+from studies.report.statements.statement import (
     SLOPE,
     Statement,
     compare,
@@ -18,7 +21,9 @@ from studies.report.statements.record import (
     leave,
     misprint,
     misprinted,
+    tested,
 )
+from studies.report.systems import ON, STATED_6
 
 ERRATA = "test_errata.py::"
 SIGN = f"{ERRATA}test_one_sign_of_lambda"
@@ -27,7 +32,6 @@ CHRISTOFFEL = f"{ERRATA}test_last_sign_of_the_christoffel_symbols"
 TRANSPOSED = f"{ERRATA}test_constraint_jacobian_is_not_transposed"
 WRENCHES = f"{ERRATA}test_wrench_enters_through_the_transposed_jacobian"
 TERMS = "components/linkage/test_linkage.py::test_terms_meet_appendix_a"
-EULER = "mechanism.integrator=semi-implicit-euler"
 
 
 def statements(runs: Runs) -> Iterator[Statement]:
@@ -35,7 +39,7 @@ def statements(runs: Runs) -> Iterator[Statement]:
     yield from _kinematics(bar)
     yield from _lagrange(bar)
     yield from _matrices(bar)
-    yield from _constraints_and_forces(bar)
+    yield from _constraints_and_forces(runs, bar)
     yield from _implementation(runs, bar)
 
 
@@ -64,18 +68,21 @@ def _kinematics(bar: MovingFiveBar) -> Iterator[Statement]:
         "pytest tests/components/blocks/test_virtual_mechanism_options.py::"
         "test_rank_of_shipped_linkages",
     )
-    yield compare(
+    yield tested(
         "2.1; figure 2.2",
         "absolute and relative coordinates describe the same system",
-        True,
         "motions of shipped linkages agree with those in absolute coordinates",
-        "pytest tests/reference/test_textbook.py::test_motion_is_that_in_absolute_coordinates",
+        "reference/test_textbook.py::test_motion_is_that_in_absolute_coordinates",
     )
+    scene = open_scene.load("enclosure")
+    assert scene.linkage
+    assert scene.contacts
+    walls = len(scene.contacts.enclosure or ())
     yield compare(
         "2; figure 2.1",
         "the five-bar moves freely inside a rigid enclosure",
-        True,
-        "scene `enclosure`",
+        walls > 2 and scene.linkage.body == shipped().body and scene.linkage.loop,
+        f"scene `enclosure` has its links, and {walls} walls around them",
         "hapticlink info enclosure",
     )
 
@@ -213,7 +220,7 @@ def _matrices(bar: MovingFiveBar) -> Iterator[Statement]:
     )
 
 
-def _constraints_and_forces(bar: MovingFiveBar) -> Iterator[Statement]:
+def _constraints_and_forces(runs: Runs, bar: MovingFiveBar) -> Iterator[Statement]:
     t, qd = bar.terms, bar.qd
     yield equation(
         "2.2.2 (2.13)",
@@ -221,11 +228,12 @@ def _constraints_and_forces(bar: MovingFiveBar) -> Iterator[Statement]:
         float(np.abs(t.h).max() / min(appendix_a.L)),
         TERMS,
     )
+    other = bar.at(bar.q, -2 * qd).h
     yield compare(
         "2.2.2",
         "only constraints that do not depend on time (scleronomic) are considered",
-        True,
-        "h is a function of q alone",
+        np.array_equal(t.h, other),
+        "h is a function of q alone: the same at other velocities",
         f"pytest tests/{TERMS}",
     )
     rows, columns = t.W.shape
@@ -264,13 +272,7 @@ def _constraints_and_forces(bar: MovingFiveBar) -> Iterator[Statement]:
         f"{len(WRENCH)} components",
         "hapticlink info closed-loop",
     )
-    yield compare(
-        "2.2.3",
-        "only one outside force acts, that of the hand",
-        True,
-        "one connection into `F_hand`; the coupling's F_drift comes beside it",
-        "hapticlink run closed-loop --set duration=0.1",
-    )
+    yield _outside_forces(runs)
     yield misprinted(
         "2.2.3 (2.18)",
         "J_h = dr_h/dq, and Q = J_h F_h",
@@ -315,11 +317,11 @@ def _implementation(runs: Runs, bar: MovingFiveBar) -> Iterator[Statement]:
         "hapticlink info closed-loop",
     )
     gaps = {
-        kind: measures.closure_gap(runs("five-bar", EULER, f"mechanism.stabilization={kind}"))
+        kind: measures.closure_gap(runs("five-bar", *stabilised(kind)))
         for kind in ("none", "baumgarte")
     }
-    lost = command("five-bar", EULER, "mechanism.stabilization=none")
-    kept = command("five-bar", EULER, "mechanism.stabilization=baumgarte")
+    lost = command("five-bar", *stabilised("none"))
+    kept = command("five-bar", *stabilised("baumgarte"))
     yield compare(
         "3; figure 3.3",
         "without stabilisation the closure error diverges from zero",
@@ -367,12 +369,27 @@ def _implementation(runs: Runs, bar: MovingFiveBar) -> Iterator[Statement]:
         f"at most {1e6 * gaps['baumgarte'].max():.2g} um",
         kept,
     )
+    record = STATED_6.run(runs, ON).record
+    kind, rate = record.scene["mechanism"]["stabilization"], record.scene["haptics"]["rate"]
     yield compare(
         "figure 3.5",
         "the mechanism with stabilisation is what runs at the haptic rate",
-        True,
-        '`virtual_mechanism` at 512 Hz with `mechanism.stabilization = "baumgarte"`',
+        record.fmus["virtual_mechanism"].rate == "haptics" and kind == "baumgarte",
+        f'`virtual_mechanism` at {float(rate):g} Hz with `mechanism.stabilization = "{kind}"`',
         "hapticlink info closed-loop",
+    )
+
+
+def _outside_forces(runs: Runs) -> Statement:
+    into = STATED_6.run(runs, ON).record.connections
+    wrenches = [c for c in into if re.search(r"-> virtual_mechanism\.F_", c)]
+    hands = [c for c in wrenches if c.endswith(".F_hand")]
+    return compare(
+        "2.2.3",
+        "only one outside force acts, that of the hand",
+        len(hands) == 1 and len(wrenches) == 2,
+        f"{len(hands)} connection into `F_hand`; the coupling's F_drift comes beside it",
+        "hapticlink run closed-loop --set duration=0.1",
     )
 
 

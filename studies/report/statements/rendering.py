@@ -7,21 +7,31 @@ from collections.abc import Iterator
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import count_folded, tracking
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.results.read_results import Results
-from studies.report import chapter4, measures
+from studies.report import appendix_a, chapter4, measures
 from studies.report.chapter6 import FULL, LENGTH_SCALE
-from studies.report.five_bar import shipped
 from studies.report.graphics_copy import PULLED
 from studies.report.report_page import Runs, command
-from studies.report.statements.record import Statement, compare, leave, misprinted
+from studies.report.statements.experiment import TOPOLOGY
+from studies.report.statements.statement import (
+    Statement,
+    compare,
+    leave,
+    misprinted,
+    test_command,
+    tested,
+)
 from studies.report.systems import IDEAL_6, OFF, ON, STATED_6
 
 INFO = "hapticlink info closed-loop"
 CONTROLLER = "pytest tests/components/blocks/test_controller.py::"
-LAW = f"{CONTROLLER}test_whole_law"
+WHOLE_LAW = "components/blocks/test_controller.py::test_whole_law"
+LAW = test_command(WHOLE_LAW)
 COUNTED_TWICE = f"{CONTROLLER}test_device_at_rest_accelerates_like_the_mechanism"
 RATES = (10, 30, 60)
 FRESH = "graphics.rate=512"
+FELT = "virtual_mechanism.F_env -> controller.F_env"
 
 
 def statements(runs: Runs) -> Iterator[Statement]:
@@ -56,14 +66,33 @@ def channel_stiffness(results: Results) -> tuple[float, np.ndarray]:
     return k_j, np.sort(values)[::-1]
 
 
+def are_connected(results: Results, *names: str) -> bool:
+    """Whether a run has these connections."""
+    return {*names} <= {*results.record.connections}
+
+
+def _touching(runs: Runs) -> Results:
+    """A run with contacts, as stated."""
+    return runs("enclosure", *chapter4.STATED, chapter4.SHOWN)
+
+
+def _drifts(runs: Runs) -> tuple[float, float]:
+    """The largest distance (mm) of handle and operational point with the coupling, and without."""
+    both = STATED_6.run(runs, ON), STATED_6.run(runs, ON, "controller.teleoperation=false")
+    held, loose = (float(tracking(results)[1].max()) for results in both)
+    return held, loose
+
+
 def _structure(runs: Runs) -> Iterator[Statement]:
     results = STATED_6.run(runs, ON)
     blocks = {"haptic_device", "virtual_mechanism", "virtual_environment", "controller"}
+    linkages = [open_scene.load(name).linkage for name in ("single-body", "serial")]
+    sizes = [len(linkage.body) for linkage in linkages if linkage and not linkage.loop]
     yield compare(
         "4.1",
         "users can touch single objects and serial linkages today",
-        True,
-        "scenes `single-body` and `serial`",
+        len(sizes) == 2 and sizes[0] == 1 < sizes[1],
+        f"scenes `single-body` and `serial`, which has {sizes[-1]} bodies and no closure",
         "hapticlink info serial",
     )
     yield compare(
@@ -95,28 +124,24 @@ def _device(runs: Runs) -> Iterator[Statement]:
         "F_motor carries the last three; x, v and F_hand_observed come back",
         INFO,
     )
-    yield compare(
+    yield tested(
         "4.2.1; figure 4.2",
         "the handle moves in the plane and turns without limit",
-        True,
         "theta stays continuous over many turns",
-        "pytest tests/components/blocks/test_haptic_device.py::"
-        "test_theta_is_continuous_over_many_turns",
+        "components/blocks/test_haptic_device.py::test_theta_is_continuous_over_many_turns",
     )
-    yield compare(
+    yield tested(
         "4.2.1; figure 4.2",
         "two pantographs in parallel planes carry the ends of a crank",
-        True,
         "links close on the crank's ends at any pose",
-        "pytest tests/components/device/test_pantograph.py::"
+        "components/device/test_pantograph.py::"
         "test_links_close_on_the_crank_ends_with_elbows_outward",
     )
-    yield compare(
+    yield tested(
         "4.2.1",
         "two motors at the base joints drive each pantograph, as torque sources",
-        True,
         f"four torques, limited to {scene['device']['torque_limit']} N.m (assumed)",
-        "pytest tests/components/device/test_pantograph.py",
+        "components/device/test_pantograph.py",
     )
     degrees = np.degrees(scene["device"]["encoder_resolution"])
     yield compare(
@@ -150,17 +175,17 @@ def _device(runs: Runs) -> Iterator[Statement]:
 
 
 def _impedance(runs: Runs) -> Iterator[Statement]:
-    on, off = IDEAL_6.run(runs, ON), IDEAL_6.run(runs, OFF)
+    on = IDEAL_6.run(runs, ON)
     error = measures.acceleration_error(on)
     shown = IDEAL_6.command(ON)
-    yield compare(
+    yield tested(
         "4.2.1 (4.1)",
         "Lambda xdd + B_d xd + K_d x = F_HD is what the hand shall feel",
-        True,
         "the law with B_d and K_d is that of the controller to rounding",
-        LAW,
+        WHOLE_LAW,
     )
-    yield compare("4.2.1 (4.2)", "x_h is (x, y, theta)", True, "3 coordinates", LAW)
+    count = on.haptics["haptic_device.x"].shape[1]
+    yield compare("4.2.1 (4.2)", "x_h is (x, y, theta)", count == 3, f"{count} coordinates", LAW)
     yield misprinted(
         "4.2.1 (4.3)",
         "F_HD is the sum of F_h, F_drift, F_env and F_T",
@@ -175,12 +200,11 @@ def _impedance(runs: Runs) -> Iterator[Statement]:
         f"velocities of device and mechanism after one period differ by {error:.0e} of themselves",
         shown,
     )
-    yield compare(
+    yield tested(
         "4.2.1 (4.5)",
         "M_d xdd + C_d xd = F_h + u is the device",
-        True,
         "held torques against SciPy",
-        "pytest tests/components/blocks/test_haptic_device.py::test_held_torques_against_scipy",
+        "components/blocks/test_haptic_device.py::test_held_torques_against_scipy",
     )
     yield misprinted(
         "4.2.1 (4.6)",
@@ -219,7 +243,6 @@ def _impedance(runs: Runs) -> Iterator[Statement]:
         IDEAL_6.command(OFF, FULL),
     )
     yield leave("figure 4.3", "the control structure of the device block", "a drawing", INFO)
-    del off
 
 
 def _simulation(runs: Runs) -> Iterator[Statement]:
@@ -227,8 +250,14 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
     yield compare(
         "4.2.2",
         "the simulation gets F_h and F_drift, and gives x_S and F_env",
-        True,
-        "inputs and outputs of `virtual_mechanism`",
+        are_connected(
+            _touching(runs),
+            "haptic_device.F_hand_observed -> virtual_mechanism.F_hand",
+            "controller.F_drift -> virtual_mechanism.F_drift",
+            "virtual_mechanism.x -> controller.x_S",
+            FELT,
+        ),
+        "connections of `virtual_mechanism`, of F_env in scene `enclosure`",
         INFO,
     )
     yield compare(
@@ -269,7 +298,9 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
     yield compare(
         "4.2.2",
         "the haptics block applies contact forces where the graphics tell of a contact",
-        True,
+        are_connected(
+            _touching(runs), "virtual_environment.contacts -> virtual_mechanism.contacts"
+        ),
         'contacts.detection = "graphics" in scene `enclosure`',
         "hapticlink info enclosure",
     )
@@ -284,13 +315,7 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
         STATED_6.command(ON, PULLED),
     )
     q, x = (results.graphics[f"virtual_environment.{name}"] for name in ("q", "x"))
-    link1, link2 = 0.042, shipped().held.at or (0.0, 0.0)
-    found = np.array(
-        [
-            link1 * np.cos(q[:, 0]) + link2[0] * np.cos(q[:, 0] + q[:, 1]),
-            link1 * np.sin(q[:, 0]) + link2[0] * np.sin(q[:, 0] + q[:, 1]),
-        ]
-    ).T
+    found = appendix_a.r_h(q.T)[:2].T
     yield compare(
         "4.2.2",
         "generalised coordinates become operational ones in the block T",
@@ -302,16 +327,14 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
 
 def _teleoperation(runs: Runs) -> Iterator[Statement]:
     results = STATED_6.run(runs, ON)
-    yield compare(
+    yield tested(
         "4.2.3; figure 4.5",
         "two force channels feed F_h and F_env forward, two position "
         "channels make F_drift by a PD controller",
-        True,
         "F_drift = K_pc (x_S - x_D) + B_pc (v_S - v_D), + on the device and - on the mechanism",
-        LAW,
+        WHOLE_LAW,
     )
-    without = STATED_6.run(runs, ON, "controller.teleoperation=false")
-    held, loose = tracking(results)[1].max(), tracking(without)[1].max()
+    held, loose = _drifts(runs)
     yield compare(
         "4.2.3",
         "it prevents the drift between device and simulation",
@@ -360,7 +383,16 @@ def _topology(runs: Runs) -> Iterator[Statement]:
     yield compare(
         "4.2.4",
         "the topology controller gets x_S and x_D and gives F_T",
-        True,
+        TOPOLOGY in results.haptics
+        and are_connected(
+            results,
+            "virtual_mechanism.x -> controller.x_S",
+            "haptic_device.x -> controller.x_D",
+            "virtual_mechanism.v -> controller.v_S",
+            "haptic_device.v -> controller.v_D",
+            "haptic_device.M -> controller.M",
+            "virtual_environment.P_c -> controller.P_c",
+        ),
         "with both velocities, M_d and P_c",
         LAW,
     )
@@ -404,11 +436,12 @@ def _summary(runs: Runs) -> Iterator[Statement]:
         f"to {measures.acceleration_error(IDEAL_6.run(runs, ON)):.0e} in the first period",
         IDEAL_6.command(ON),
     )
+    held, loose = _drifts(runs)
     yield compare(
         "4.2.5",
         "four-channel control renders contacts and takes out drift",
-        True,
-        "F_env reaches the device; see 4.2.3",
+        are_connected(_touching(runs), FELT) and held < loose,
+        f"F_env reaches the device; {held:.2g} mm apart, {loose:.0f} mm without it: see 4.2.3",
         "hapticlink run enclosure",
     )
     yield compare(

@@ -6,13 +6,14 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
-from studies.report.statements.record import Statement
+from studies.report.statements.statement import Statement
 
 HEAD = """# All statements of the report
 
 Every equation, figure, table, gain and claim of the traineeship report *Haptic manipulation of
 virtual linkages with closed loops*, in other words than its own, compared with what was found. The
-numbers are computed by `hapticlink reproduce`; the command beside each shows it. *As stated* and
+numbers are computed by `hapticlink reproduce`; the command beside each shows it. What is found *by
+the test* agrees as long as the test beside it passes. *As stated* and
 *idealised* are the two systems of [the figures](README.md). As CSV:
 [statements.csv](statements.csv).
 """

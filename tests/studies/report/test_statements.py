@@ -12,7 +12,7 @@ from hapticlink.commands import _commands
 from studies.report import measures
 from studies.report.report_page import Runs
 from studies.report.statements import every_statement, paper_experiment, rendering
-from studies.report.statements.record import misprint
+from studies.report.statements.statement import misprint
 from studies.report.systems import IDEAL_6, IDEAL_B6, OFF, ON, STATED_6, STATED_B6
 from tests.docs.test_examples import parsed
 from tests.mechanisms import MOBILITY
@@ -93,6 +93,12 @@ def test_every_test_that_is_named_is_there(table):
     assert len(named) > 20
     for path, _, test in (name.partition("::") for name in named):
         assert not test or f"def {test}(" in (ROOT / path).read_text(), (path, test)
+
+
+def test_what_a_test_shows_names_it(table):
+    by_test = [row["command"] for row in table if row["number"].startswith("by the test")]
+    assert by_test
+    assert all(command.startswith("pytest tests/") for command in by_test)
 
 
 def test_what_is_no_misprint_is_refused():

@@ -10,7 +10,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.parts import BlockPart
+from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system.build_system import build_system

@@ -44,6 +44,11 @@ def equation(place: str, text: str, error: float, test: str) -> Statement:
     return compare(place, text, error < ROUNDING, f"met to {error:.0e}", test_command(test))
 
 
+def tested(place: str, text: str, shown: str, test: str) -> Statement:
+    """A statement without a number, which agrees as long as a test of the project passes."""
+    return Statement(place, text, "agrees", f"by the test: {shown}", test_command(test))
+
+
 def misprint(
     place: str, text: str, printed: float, remedy: str, corrected: float, test: str
 ) -> Statement:
