@@ -32,6 +32,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
     not_recorded: outputs of which an entry is not written."""
     system, timeline = plan.system, plan.system.timeline
     seconds, base = timeline.seconds, timeline.base
+    end = seconds(timeline.end)
     held = [c for c in system.connections if c.hold]
     compiled = scene.packaging == "native" and blocks(scene).built
     packages = (*PACKAGES, "ziglang") if compiled else PACKAGES
@@ -74,7 +75,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         },
         get_after_set=list(system.coupling.get_after_set),
         power_across_rates=power_across_rates(system),
-        events=[(change.begin, change.text) for change in system.changes],
+        events=[(c.begin, c.text) for c in system.changes if c.begin < end],
         not_recorded=not_recorded,
         units=_units(system),
         without_effect=[*_find_idle_holds(scene, system), *_find_idle_events(scene, system)],
@@ -107,13 +108,15 @@ def _find_idle_holds(scene: Scene, system: System) -> Iterator[str]:
 
 def _find_idle_events(scene: Scene, system: System) -> Iterator[str]:
     """Events of `[[at]]` that no step of their FMU sees."""
-    for change in system.changes:
-        if change.end is not None and change.end <= change.begin:
-            first = f"the first one from there on is at {change.begin:g} s"
-            yield f"{change.text} acts on no step: {first}"
     end = system.timeline.seconds(system.timeline.end)
-    if late := [f"{event.time:g}" for event in scene.at if event.time >= end]:
-        yield f"[[at]] {', '.join(late)} s acts on no step: the run ends at {end:g} s"
+    for change in system.changes:
+        if change.begin >= end:
+            why = f"none begins before the run ends, at {end:g} s"
+        elif change.end is not None and change.end <= change.begin:
+            why = f"the first one is at {change.begin:g} s"
+        else:
+            continue
+        yield f"{change.text}, from {change.time:g} s on, acts on no step: {why}"
 
 
 def _units(system: System) -> dict[str, str]:

@@ -116,7 +116,8 @@ class LiveRun:
             name, value = CHOSEN_POINT, number_of_point(self.scene.linkage, value)
         fmu = require_name("input or parameter", name).partition(".")[0]
         if name not in self._setters:
-            change = InputChange(self.time, f"{name} set", fmu, settable(self.system, name))
+            inputs = settable(self.system, name)
+            change = InputChange(self.time, self.time, f"{name} set", fmu, inputs)
             self._setters[name] = InputSetter(change, self._simulation), len(change.inputs)
         setter, size = self._setters[name]
         try:

@@ -67,7 +67,7 @@ def inputs(linkage: Linkage, *, coupled: bool, followed: bool) -> list[Variable]
 
 def states(linkage: Linkage) -> list[Variable]:
     pose = linkage.space.pose
-    return [Variable(HELD), Variable(OFFSET, *pose), Variable(_BEGIN, *pose)]
+    return [Variable(ASKED), Variable(HELD), Variable(OFFSET, *pose), Variable(_BEGIN, *pose)]
 
 
 def outputs(linkage: Linkage) -> list[Variable]:
@@ -92,7 +92,8 @@ class Grasp:
     @property
     def initial(self) -> dict[str, ca.SX]:
         none = ca.SX(self.model.linkage.space.size, 1)
-        return {HELD: self.block.p[POINT], OFFSET: none, _BEGIN: none}
+        asked = self.block.p[POINT]
+        return {ASKED: asked, HELD: asked, OFFSET: none, _BEGIN: none}
 
     @property
     def held(self) -> ca.SX:
@@ -123,6 +124,7 @@ class Grasp:
             before = ca.if_else(same_point(self.held, ca.SX(0)), before, u[HANDLE])
         path = self.model.x_h + x[_BEGIN]
         return {
+            ASKED: self.block.p[POINT],
             HELD: self.held,
             OFFSET: ca.if_else(self.changes, before - after, x[OFFSET]),
             _BEGIN: ca.if_else(self.changes, path - after, x[_BEGIN]),
@@ -131,7 +133,7 @@ class Grasp:
     @property
     def output(self) -> dict[str, ca.SX]:
         x, x_h = self.block.x, self.model.x_h
-        named = {HELD: x[HELD], ASKED: self.block.p[POINT], OFFSET: x[OFFSET]}
+        named = {ASKED: x[ASKED], HELD: x[HELD], OFFSET: x[OFFSET]}
         return named | {PATH: x_h + x[_BEGIN], "x": x_h + x[OFFSET]}
 
 
@@ -160,6 +162,6 @@ def part(block: Block) -> BlockPart:
     """The part of a mechanism by which the hand lets go of a point and holds another."""
     reads = (POINT, *(name for name in (READY, HANDLE) if name in block.u), "q")
     names = [v.name for v in block.outputs]
-    given = (_BEGIN, ASKED, PATH)
+    given = (_BEGIN, PATH)
     gives = tuple(name for name in given if name in block.x or name in names)
     return BlockPart("point in the hand", r"$x = x_{point}(q) + x_{offset}$", "", reads, gives)

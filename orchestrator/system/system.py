@@ -143,12 +143,14 @@ class Recording:
 
 @dataclass(frozen=True)
 class InputChange:
-    """What the steps of an FMU from `begin` on get (s): `values` of `inputs` once, or before each
-    step that begins before `end` if that is given. Without values, the inputs keep what `held`
-    brings them at `begin`; `noise` is the standard deviation that adds to it, with a seed. text:
-    for the record of a run. Without inputs it is only for that record."""
+    """What the steps of an FMU get from its first one at or after `time` on, which is at `begin`
+    (s): `values` of `inputs` once, or before each step that begins before `end` if that is given.
+    Without values, the inputs keep what `held` brings them at `begin`; `noise` is the standard
+    deviation that adds to it, with a seed. text: for the record of a run. Without inputs it is only
+    for that record."""
 
     begin: float
+    time: float
     text: str
     fmu: str = ""
     inputs: tuple[Scalar, ...] = ()

@@ -27,8 +27,8 @@ from hapticlink.orchestrator.system.timeline import GRAPHICS_RATE
 
 
 def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[InputChange, ...]:
-    """The changes in the order of their times, without those after the end of the run. Findings are
-    appended to `problems`."""
+    """The changes in the order of their times; those that no step sees begin at the run's end or
+    later. Findings are appended to `problems`."""
     if scene.at and scene.coupling == "iterated":
         problems.append((("at",), 'steps are repeated with coupling = "iterated": take another'))
     events = _Events(scene, system)
@@ -45,8 +45,7 @@ def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[Inpu
             with collect_problem(problems, ("at", i, "noise", name)):
                 taken.append(events.disturb(event, name, noise))
         problems += ((("at", i, key), why) for key, why in _times(event))
-    end = system.timeline.seconds(system.timeline.end)
-    return tuple(sorted((c for c in taken if c.begin < end), key=lambda change: change.begin))
+    return tuple(sorted(taken, key=lambda change: change.begin))
 
 
 def _times(event: TimedEvent) -> Iterator[tuple[str, str]]:
@@ -69,7 +68,7 @@ class _Events:
             name, value = CHOSEN_POINT, number_of_point(self._scene.linkage, value)
         if name == GRAPHICS_RATE and key == "set":
             begin = self._begin("graphics", event.time)
-            return InputChange(begin, f"{name} = {value} Hz")
+            return InputChange(begin, event.time, f"{name} = {value} Hz")
         table = GRAPHICS_RATE.partition(".")[0]
         if name.startswith(f"{table}.") and table not in self._system.fmu:
             raise ValueError(f"of the keys of a scene's rates {GRAPHICS_RATE} alone can be set")
@@ -102,7 +101,7 @@ class _Events:
         begin = self._begin(self._system.fmu[fmu].clock, event.time)
         until = parts.get("end")
         text += f" until {event.until:g} s" if until is not None and event.until else ""
-        return InputChange(begin, text, fmu, **parts)  # type: ignore[arg-type]
+        return InputChange(begin, event.time, text, fmu, **parts)  # type: ignore[arg-type]
 
     def _begin(self, clock: str, time: float) -> float:
         """The first communication point of a clock at or after a time (s), infinity where there is

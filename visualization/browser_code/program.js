@@ -2,7 +2,7 @@
 
 import { loudness } from "./loudness.js";
 
-const RATE = "graphics.rate", RENDERED = "controller.topology";
+const RATE = "graphics.rate", RENDERED = "controller.topology", POINT = "linkage.operational_point";
 // The key of what is set at once: a rate with its jitter, a hold with its delay.
 const together = (key) => (key === "jitter" ? RATE : key.replace(/^delays\./, "holds."));
 
@@ -20,8 +20,9 @@ export class Program {
     this.start = Object.fromEntries(data.controls.map((control) => [control.key, control]));
     this.m = this.c.create();
     this.pulling = new Map();
-    for (const key of new Set(Object.keys(changed).map(together))) this.act(key);
+    for (const key of new Set(Object.keys(changed).map(together))) if (key !== POINT) this.act(key);
     this.require(this.c.begin_run(this.m));
+    if (POINT in changed) this.act(POINT); // the hand begins at the scene's point, where the handle is
   }
 
   require(done) {
@@ -57,6 +58,7 @@ export class Program {
     const [kind] = key.split("."), name = key.slice(kind.length + 1);
     if (key === RATE) this.rate();
     else if (kind === "holds") this.hold(name);
+    else if (key === POINT) this.point();
     else for (const gain of key === RENDERED ? this.data.topology : [name]) this.gain(gain);
   }
 
@@ -78,6 +80,12 @@ export class Program {
     const { [RATE]: rate, jitter = 0 } = changed;
     if (!rate && !own) throw new Error("the rate varies in this scene: set the rate first");
     this.c.rate(this.m, rate ?? (jitter ? own : 0), jitter);
+  }
+
+  point() {
+    const { choices } = this.start[POINT], number = choices.indexOf(this.changed[POINT]);
+    if (number < 0) throw new Error(`no point ${this.changed[POINT]}; there are ${choices.join(", ")}`);
+    this.set(this.data.point, [number]);
   }
 
   hold(name) {

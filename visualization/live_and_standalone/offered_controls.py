@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.findings import labels
+from hapticlink.components.specs.linkage import NO_POINT
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.changes import choices_of_slower
+from hapticlink.orchestrator.system.changes import OPERATIONAL_POINT, choices_of_slower
 from hapticlink.orchestrator.system.springs import find_limited_gains
 from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
@@ -49,6 +50,7 @@ class Offered:
         holds: Mapping[str, list[str]] | None = None,
         ranges: Mapping[str, tuple[float, float]] = RANGES,
     ) -> None:
+        self._linkage = scene.linkage
         self.gains = _gains(scene, system)
         self.holds = choices_of_slower(system) if holds is None else holds
         fmus = [f for f in system.fmus if f.clock == CLOCK]
@@ -80,6 +82,10 @@ class Offered:
         for name, (value, units) in self.gains.items():
             start = {"start": value.tolist(), "units": units}
             controls.append({"key": f"gains.{name}", "value": 1.0} | start)
+        if self._linkage and self._linkage.choices:
+            points = {"key": OPERATIONAL_POINT, "value": self._linkage.held_name}
+            choices = [NO_POINT, *self._linkage.choices]
+            controls.append(points | {"words": "Point in the hand", "choices": choices})
         for control in controls:
             control["value"] = settings.get(control["key"], control["value"])
             if limits := self._ranges.get(control["key"].partition(".")[0]):

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.specs.linkage import NO_POINT
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.system.changes import OPERATIONAL_POINT, choices_between_rates
@@ -43,12 +42,7 @@ class Controls:
 
     def described(self) -> list[dict[str, Any]]:
         """The controls, as JSON has them."""
-        linkage, controls = self._live.scene.linkage, self._offered.described(self._settings)
-        if linkage and linkage.choices:
-            value = self._settings.get(OPERATIONAL_POINT, linkage.held_name)
-            points = {"key": OPERATIONAL_POINT, "value": value, "words": "Point in the hand"}
-            controls.append(points | {"choices": [NO_POINT, *linkage.choices]})
-        return controls
+        return self._offered.described(self._settings)
 
     def apply(self, message: messages.Hand | messages.SetControl) -> None:
         """Change the run. Raises InputFault where the message does not fit this scene; nothing is

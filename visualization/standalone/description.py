@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
+from hapticlink.orchestrator.base.signal_names import CHOSEN_POINT, MECHANISM_ENERGY
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.prepared_changes import LEAST_RATE, MOST_DELAY
@@ -52,6 +52,7 @@ class PageDescription:
             self.parameters[target(user)] = handle
         hands = {u: {"stiffness": stiffness(u), "target": target(u)} for u in users(scene)}
         chosen = [*offered.gains, *(hand["target"] for hand in hands.values())]
+        chosen += [CHOSEN_POINT] if scene.linkage.choices else []
         self.data: dict[str, Any] = {
             "name": name,
             "scene": first_messages.describe_viewed_run(scene, system, program.meters)
@@ -59,6 +60,7 @@ class PageDescription:
             "controls": offered.described({}),
             "topology": offered.topology,
             "hands": hands,
+            "point": CHOSEN_POINT,
             "parameters": {name: references[name] for name in chosen},
             "choices": [
                 {"connection": c.connection, "hold": c.hold} for c in program.changes.choices

@@ -84,8 +84,12 @@ FREEZE = {"freeze": ["controller.F_hand"], "time": 0.3}
 NOWHERE = [
     ({"hold": "foh", "graphics.rate": 512}, "acts on no connection: there is no connection from a"),
     ({"hold": "foh", "holds.controller.Lambda_inv": "zoh", "holds.controller.P_c": "zoh"}, "have"),
-    ({"at": [{**FREEZE, "until": 0.30001}]}, "acts on no step: the first one from there on"),
-    ({"at": [{**FREEZE, "time": 9.0}]}, "[[at]] 9 s acts on no step: the run ends at 0.5 s"),
+    ({"at": [{**FREEZE, "until": 0.30001}]}, "on, acts on no step: the first one is at"),
+    ({"at": [{**FREEZE, "time": 9.0}]}, "frozen, from 9 s on, acts on no step: none begins before"),
+    (
+        {"at": [{"freeze": ["virtual_environment.q_ref"], "time": 0.49}]},
+        "q_ref frozen, from 0.49 s",
+    ),
     ({"hand": {**SPRING, "target": [[*AT_START, 5.5]]}}, "a whole turn from the handle's angle"),
     ({"hand": {**SPRING, "target": [[*AT_START, -13.35]]}}, "2 whole turns from the handle's"),
 ]

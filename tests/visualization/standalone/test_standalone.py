@@ -10,9 +10,11 @@ import pytest
 
 import hapticlink as hl
 from benchmarks import standalone as bench
+from hapticlink.orchestrator.open_scene import load
 from tests.shared_fixtures import status
 from tests.visualization.browser_code.chromium import AT, Page, differ_without_topology
 from tests.visualization.browser_code.javascript import NODE
+from tests.visualization.live_page.test_controls import POINTS
 
 BYPASS_CSP = False
 Window = Callable[..., Page]
@@ -25,8 +27,9 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def dragged(page: Page, folder: Path) -> tuple[list[str], np.ndarray]:
-    """What the page saves of a run of a second with a drag: the names and the rows."""
+def dragged(page: Page, folder: Path, point: str = "") -> tuple[list[str], np.ndarray]:
+    """What the page saves of a run of a second with a drag: the names and the rows. point: what the
+    hand takes after its drag, for a second one."""
     page.page.click("#pause")
     page.page.click("#record")
     page.until("view.state.recording && view.frame?.t === 0 && view.stage.limits")
@@ -37,6 +40,13 @@ def dragged(page: Page, folder: Path) -> tuple[list[str], np.ndarray]:
     page.page.mouse.move(x + 0.03 * scale, y - 0.01 * scale, steps=5)
     page.until("view.frame?.t > 1.1")
     page.page.mouse.up()
+    if point:
+        page.until("view.frame?.t > 1.2")
+        page.page.select_option("[data-control='linkage.operational_point']", point)
+        page.until("view.frame?.t > 1.4")
+        page.pull(0.01, 0.02)
+        page.until("view.frame?.t > 1.8")
+        page.page.mouse.up()
     with page.page.expect_download() as download:
         page.page.click("#record")
     path = folder / "saved.csv"
@@ -52,17 +62,46 @@ def test_a_drag_gives_the_numbers_of_a_run_with_the_same_forces(
     """The run's hand is the force that was recorded, at each tick."""
     page = window(f"file://{file}", dark=True)
     names, rows = dragged(page, tmp_path)
-    rows = rows[: 1 + 512]
+    require_same_numbers(names, rows)
+
+
+def require_same_numbers(
+    names: list[str], rows: np.ndarray, *options: str, **changes: object
+) -> None:
+    """A run over the whole seconds of the rows has their numbers."""
+    rows = rows[: 1 + 512 * (len(rows) // 512)]
     force = [names.index(f"hand.F[{i}]") for i in (1, 2, 3)]
     assert np.abs(rows[:, force]).max() > 1
     hand = {"type": "profile", "table": rows[:, [0, *force]].tolist()}
-    changes = {"hand": hand, "duration": 1.0, "stop_when": "", "record": {"signals": "all"}}
-    table = hl.run("closed-loop-ideal", changes)["haptics"]
+    common = {"hand": hand, "stop_when": "", "record": {"signals": "all"}}
+    scene = load("closed-loop-ideal", options)
+    table = hl.run(scene, common | {"duration": float(rows[-1, 0])} | changes)["haptics"]
     assert np.array_equal(rows[:, 0], table["time"])
     columns = [name for name in table.columns[1:] if not name.startswith("hand.")]
     assert len(columns) > 40
     for name in columns:
         assert rows[:, names.index(name)] == pytest.approx(table[name], rel=1e-9, abs=1e-9), name
+
+
+def test_the_hand_takes_another_point_as_at_a_given_time(window: Window, tmp_path: Path) -> None:
+    """It holds none for a frame, and is let go meanwhile; a reset begins with the point of the
+    start."""
+    file = tmp_path / "points.html"
+    given = [part for option in POINTS for part in ("--set", option)]
+    assert status("view", "closed-loop-ideal", "--standalone", file, *given) == 0
+    page = window(f"file://{file}")
+    names, rows = dragged(page, tmp_path, "other")
+    asked, held = (
+        rows[:, names.index(f"virtual_mechanism.{kind}_point")] for kind in ("asked", "held")
+    )
+    assert [*held[np.flatnonzero(np.diff(held, prepend=-1.0))]] == [1.0, 0.0, 2.0]
+    begun = rows[np.argmax(asked == 2.0) - 1, 0]
+    event = {"time": begun, "set": {"linkage.operational_point": "other"}}
+    require_same_numbers(names, rows, *POINTS, at=[event])
+    page.page.click("#reset")
+    page.until("view.frame?.t > 0.2")
+    chosen = "document.querySelector('[data-control=\"linkage.operational_point\"]').value"
+    assert page.get(chosen) == "other"
 
 
 def test_no_request_leaves_the_page(file: Path, browser: Any, window: Window) -> None:
