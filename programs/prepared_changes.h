@@ -24,6 +24,7 @@ static int choose_hold(Model *m, int choice, int64_t microseconds) {
     const int k = choices[choice].hold;
     Scene *s = &m->now.scene;
     Loop *l = &s->loop;
+    const int64_t published = l->holds[k]->published, describes = l->holds[k]->describes;
     for (int i = 0; i < choices[choice].n; i++) {
         const size_t at = choice_regions[choices[choice].first + i].at;
         const size_t size = choice_regions[choices[choice].first + i].size;
@@ -33,6 +34,8 @@ static int choose_hold(Model *m, int choice, int64_t microseconds) {
     m->now.changes.direct[k] = microseconds < 0 ? !own_latency[k] : !microseconds;
     relocate(m);
     Hold *h = l->holds[k];
+    h->published = published; /* the source's newest sample is the one that it was */
+    h->describes = describes;
     if (microseconds > 0) {
         const double ticks = (double)microseconds * l->denominator / (1e6 * l->numerator);
         h->link->low = (int64_t)ceil(ticks);

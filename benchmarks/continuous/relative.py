@@ -42,7 +42,15 @@ class Relative:
         target = ca.SX.sym("target", 6)
 
         F_hand, arm = self.hand.rates(y[2 * n + 6 :], x_D, v_D, target, ca.vertcat)
-        state = ca.vertcat(motion, mode)
+        start = mechanism.start_inputs, mechanism.start_parameters
+        first = np.array(mechanism.initialize(*start)).ravel()
+        ends = np.cumsum([v.size for v in mechanism.states])
+        at_start = dict(
+            zip((v.name for v in mechanism.states), np.split(first, ends), strict=False)
+        )
+        # In continuous time no place passes a shape: its side is not kept, as at the start.
+        moves = {"q": motion[:n], "qd": motion[n:], "n_constrained": mode}
+        state = ca.vertcat(*(moves.get(name, ca.DM(value)) for name, value in at_start.items()))
         free = _outputs(mechanism, state, {}, t)
         M, c = pantograph.motion(x_D, v_D, device)
         seen = {
@@ -68,9 +76,7 @@ class Relative:
         self._mobility = ca.Function("mobility", [motion], [free["Lambda_inv"]], cse)
         self.guards = Guards(scene, self.mobility)
 
-        start = mechanism.start_inputs, mechanism.start_parameters
-        first = np.array(mechanism.initialize(*start)).ravel()
-        self.first_mode = int(first[2 * n])
+        self.first_mode = int(at_start["n_constrained"][0])
         pose = np.array(mechanism.output(first, *start, 0.0)).ravel()[:3]
         self.start = np.r_[first[: 2 * n], pose, np.zeros(3), self.hand.start(pose)]
         self.handle = slice(2 * n, 2 * n + 2)

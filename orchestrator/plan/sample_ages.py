@@ -165,9 +165,10 @@ def pattern_end(system: System) -> int:
 
 def _pattern_begin(system: System) -> int:
     """The tick from which on the pattern of samples repeats, where it does: after all phases and
-    constant latencies, and after the first frames, whose samples describe t = 0 as those before."""
+    constant latencies, and after the first frames, whose samples describe t = 0 as those before.
+    A clock without a period has no phase."""
     timeline = system.timeline
     clocks, late = timeline.clocks, [c.latency for c in system.connections if c.latency]
-    begun = max(c.first % c.longest for c in clocks)
+    begun = max((c.first % c.period for c in clocks if c.period), default=0)
     begun += max((timeline.clock(u.clock).longest for u in system.fmus if u.frames), default=0)
     return begun + max((math.ceil(exact(way.min) / timeline.base) for way in late), default=0)

@@ -72,7 +72,7 @@ def test_info_names_rates_and_connections(capsys: pytest.CaptureFixture[str]) ->
     assert status("info", "closed-loop-ideal") == 0
     said = capsys.readouterr().out
     assert "ticks of 1/7680 s, gauss-seidel" in said
-    assert "virtual_environment.Lambda_inv -> controller.Lambda_inv: 0 to 33.2, zoh" in said
+    assert "virtual_environment.Lambda_inv -> controller.Lambda_inv: 33.3 to 66.5, zoh" in said
 
 
 @pytest.mark.parametrize(

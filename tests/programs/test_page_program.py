@@ -23,6 +23,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
+from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import build_system
@@ -91,6 +92,7 @@ def changed_run(scene: Scene, apply: Callable[[LiveRun, Any], None]) -> np.ndarr
     with build_system(scene) as system, ExitStack() as stack:
         simulation = Simulation(system, RunResults(), stack)
         loop = CompiledLoop(Plan(system), simulation)
+        simulation.pace = Pace()  # rates may change: tables have room for more rows
         simulation.start()
         live = LiveRun(scene)
         vars(live).update(

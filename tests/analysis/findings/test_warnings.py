@@ -80,6 +80,8 @@ def test_turns_that_cost_the_rate_are_told(
 
 SPRING = {"type": "spring", "stiffness": [10, 10, 0.1], "damping": [1, 1, 0.01]}
 AT_START = [0.0, 0.0445, 0.0148]
+AT_TURN = [0.0445, 0.0148, 5.5 + 0.2]
+SINE = {"amplitude": [0, 0, 0.2], "frequency": [1, 1, 1], "phase": [0, 0, -1.5708]}
 FREEZE = {"freeze": ["controller.F_hand"], "time": 0.3}
 NOWHERE = [
     ({"hold": "foh", "graphics.rate": 512}, "acts on no connection: there is no connection from a"),
@@ -92,11 +94,13 @@ NOWHERE = [
     ),
     ({"hand": {**SPRING, "target": [[*AT_START, 5.5]]}}, "a whole turn from the handle's angle"),
     ({"hand": {**SPRING, "target": [[*AT_START, -13.35]]}}, "2 whole turns from the handle's"),
+    ({"hand": {**SPRING, "target": {**SINE, "mean": AT_TURN}}}, "a whole turn from the handle's"),
 ]
 SOMEWHERE = [
     {"hold": "foh"},
     {"at": [{**FREEZE, "until": 0.301}]},
     {"hand": {**SPRING, "target": [[*AT_START, -0.8]]}},
+    {"hand": {**SPRING, "target": {**SINE, "mean": [0.0445, 0.0148, -0.6]}}},
     {"hand": {**SPRING, "stiffness": [10, 10, 0], "target": [[*AT_START, 5.5]]}},
 ]
 SAID = "acts on no|turn.* from the handle"

@@ -277,7 +277,7 @@ def test_softer_gains_stand_beside_another_remedy() -> None:
     hands = {"firm grip": HANDS["firm grip"]}
     (case,), _ = in_poses(scene, poses, hands, DRIFT)
     assert case.verdict == "unstable"
-    margin, remedies = improvements(scene, poses, hands, DRIFT, case, lambda _: poses)
+    margin, remedies = improvements(scene, poses, hands, DRIFT, case, lambda _: (poses, ""))
     assert margin.stiffness
     softer = f"{100 * margin.stiffness / SAFE:.4g}"
     found = [r for r in remedies if f"teleoperation.stiffness=[{softer}" in r.options[0]]

@@ -6,6 +6,7 @@ from hapticlink.components.blocks import BLOCKS
 from hapticlink.orchestrator.base import signal_names
 from hapticlink.orchestrator.base.signal_names import block_of_user, signal_of_user, user_of_block
 from tests.orchestrator.systems import system_of
+from tests.visualization.live_page.test_controls import POINTS
 
 
 def _constants() -> Iterator[str]:
@@ -14,16 +15,23 @@ def _constants() -> Iterator[str]:
             yield from (value,) if isinstance(value, str) else value
 
 
-def _outputs(scene: str, options: tuple[str, ...]) -> Iterator[str]:
+def _variables(scene: str, options: tuple[str, ...]) -> Iterator[str]:
     for fmu in system_of(scene, *options).fmus:
-        yield from (f"{fmu.name}.{s.port}" for s in fmu.description.outputs)
+        yield from (
+            f"{fmu.name}.{s.port}" for s in fmu.description.scalars if s.causality != "input"
+        )
 
 
-def test_every_name_is_a_block_or_an_output_of_one():
-    options = ("mechanism.directions=true", "controller.passivity=true")
-    midpoint = ("mechanism.integrator=passive-midpoint",)
-    scenes = {"closed-loop-ideal": (), "obstacles": options, "pendulum": midpoint}
-    known = {*BLOCKS, *(name for item in scenes.items() for name in _outputs(*item))}
+SCENES = {
+    "closed-loop-ideal": POINTS,
+    "closed-loop": ("device.observer.beside=true",),
+    "obstacles": ("mechanism.directions=true", "controller.passivity=true"),
+    "pendulum": ("mechanism.integrator=passive-midpoint",),
+}
+
+
+def test_every_name_is_a_block_or_an_output_or_parameter_of_one():
+    known = {*BLOCKS, *(name for item in SCENES.items() for name in _variables(*item))}
     missing = sorted({*_constants()} - known)
     assert not missing, missing
 

@@ -37,7 +37,7 @@ def test_the_mechanism_is_seen_and_the_blocks_are_told_before_they_are_built(
             stack.callback(served.__exit__)
             page = Page(browser, served.url, shown="view.stage.frame && view.building")
             page.until("document.getElementById('note').textContent.includes('block 5 of 5')")
-            assert page.page.inner_text("#title") == "Five-bar in the hand"
+            assert page.page.inner_text("#title") == "Five-bar in the hand, idealised"
             assert page.get("view.frame") is None
             before = page.get("view.stage.frame.poses")
             page.page.mouse.click(400, 400)  # pulls nothing
