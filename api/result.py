@@ -52,12 +52,16 @@ class Run(Results):
         table: Table = self.tables[name] if name in self.tables else self._table(name)
         return table["time"]
 
-    def frame(self, rate: str) -> pd.DataFrame:
-        """The Table of a rate as a pandas frame with the index `time` (s), a column per scalar.
-        Raises InputFault if pandas is not installed, KeyError for an unknown rate."""
-        if rate not in self.tables:
-            raise KeyError(unknown("rate", rate, self.tables))
-        return frame(self.tables[rate], "time")
+    def frame(self, rate: str | None = None) -> pd.DataFrame:
+        """The Table of a rate, by default of the only one, as a pandas frame with the index `time`
+        (s), a column per scalar. Raises InputFault if pandas is not installed, KeyError for an
+        unknown rate, and without one where there are several."""
+        if rate is None and len(self.tables) != 1:
+            raise KeyError(f"name one of the rates: {', '.join(self.tables)}")
+        name = next(iter(self.tables)) if rate is None else rate
+        if name not in self.tables:
+            raise KeyError(unknown("rate", name, self.tables))
+        return frame(self.tables[name], "time")
 
     @property
     def fault(self) -> str | None:

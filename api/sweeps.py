@@ -19,6 +19,7 @@ from hapticlink.api.result import frame
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault, unknown
 from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -31,7 +32,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Sweep:
-    """The table of a sweep: `s["tracking_max_mm"]` is a column as a NumPy array, one entry per run.
+    """The table of a sweep: `s["tracking_max_mm"]` is a column as a NumPy array, one entry per run,
+    of which there are `len(s)`. A notebook shows it.
 
     `rows` are the runs, `keys` the varied keys, `folder` contains `files`, None in memory.
     """
@@ -50,6 +52,9 @@ class Sweep:
     def failed(self) -> list[dict[str, Any]]:
         """The rows of failed runs, with the reason in `end` and `message`."""
         return [r for r in self.rows if r["end"] in row.FAILED]
+
+    def __len__(self) -> int:
+        return len(self.rows)
 
     def __getitem__(self, column: str) -> NDArray[Any]:
         """A column as numbers, NaN where a run has none, or as text if an entry is no number.
@@ -73,6 +78,10 @@ class Sweep:
     def __str__(self) -> str:
         """The lines of `hapticlink sweep`."""
         return "\n".join(table.lines(self.rows, self.keys))
+
+    def _repr_html_(self) -> str:
+        columns = self.columns
+        return html_table(columns, ([run.get(name, "") for name in columns] for run in self.rows))
 
     def __repr__(self) -> str:
         return f"{self}\n  columns: {', '.join(self.columns)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Iterable, Iterator
 
-from hapticlink.fmus.versions import find_versions
+from hapticlink.fmus.versions import find_code, find_versions
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.signal_names import MECHANISM
 from hapticlink.orchestrator.fmi.units import MATRICES
@@ -39,7 +39,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
     return RunSetup(
         scene=scene.tables(),
         options=list(scene.source.options) if scene.source else [],
-        versions=find_versions(packages) | {"python": platform.python_version()},
+        versions=find_versions(packages) | {"python": platform.python_version()} | find_code(),
         plugins=plugins.list_plugins(),
         seeds=_seeds(scene, system),
         files=["run.json", *(f"{table}.{scene.record.format}" for table in tables)],

@@ -33,12 +33,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 
 CODE_LINES = {
     "components": 5737,
-    "fmus": 2785,
-    "orchestrator": 12370,
+    "fmus": 2800,
+    "orchestrator": 12381,
     "programs": 1116,
-    "analysis": 6729,
+    "analysis": 6741,
     "visualization": 3273,
-    "api": 402,
+    "api": 410,
     "commands": 1350,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and

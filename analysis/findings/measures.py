@@ -19,6 +19,7 @@ from hapticlink.analysis.findings.tracking import (
     has_tracking,
     of_block,
     pose_error,
+    rms,
 )
 from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.base.signal_names import CLOSURE_ERROR
@@ -148,9 +149,3 @@ class Measures:
         """The energies of the connections with a hold, in the whole run."""
         record = self._results.record
         return {name: record.meters[name] for name in record.holds if name in record.meters}
-
-
-def rms(values: Vector) -> float:
-    """The root mean square, without overflow of the squares."""
-    largest = values.max()
-    return float(largest * np.sqrt(np.mean((values / largest) ** 2))) if largest else 0.0

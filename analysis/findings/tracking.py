@@ -3,6 +3,7 @@ graphics copy is folded."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,15 +30,38 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
     user_of_block,
 )
+from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 
 
+def rms(values: Vector) -> float:
+    """The root mean square, without overflow of the squares."""
+    largest = values.max()
+    return float(largest * np.sqrt(np.mean((values / largest) ** 2))) if largest else 0.0
+
+
 class Tracking(NamedTuple):
-    """Distance |x_S - x_D| (mm) and angle |theta_S - theta_D| (rad) at times (s)."""
+    """Distance |x_S - x_D| (mm) and angle |theta_S - theta_D| (rad) at times (s). Printed, and in a
+    notebook, the largest and the root mean square of each."""
 
     time_s: Vector
     distance_mm: Vector
     angle_rad: Vector
+
+    def _summary(self) -> Iterator[tuple[str, float, float, float]]:
+        for name, values in (("distance (mm)", self.distance_mm), ("angle (rad)", self.angle_rad)):
+            if len(values):
+                at = int(np.argmax(values))
+                yield name, float(values[at]), float(self.time_s[at]), rms(values)
+
+    def __repr__(self) -> str:
+        lines = (
+            f"{n}: {m:.4g} at most, at {t:.4g} s, {r:.4g} RMS" for n, m, t, r in self._summary()
+        )
+        return "\n".join(lines) or "no samples"
+
+    def _repr_html_(self) -> str:
+        return html_table(("", "at most", "at (s)", "RMS"), self._summary())
 
 
 @dataclass(frozen=True)

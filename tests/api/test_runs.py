@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import sys
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.findings.tracking import Tracking
 from hapticlink.fmus.versions import install_command
 from hapticlink.visualization.figures import run_figures
 from tests.shared_fixtures import sets, status
@@ -190,6 +192,25 @@ def test_a_frame_is_the_table_over_its_times(short: hl.Run) -> None:
     assert np.array_equal(frame[name], found[name])
     with pytest.raises(KeyError, match="there are haptics, graphics"):
         found.frame("hand.F")
+    with pytest.raises(KeyError, match="name one of the rates: haptics, graphics"):
+        found.frame()
+
+
+def test_a_frame_of_the_only_rate_needs_no_name(bar: Path) -> None:
+    pytest.importorskip("pandas")
+    assert hl.run(bar).frame().equals(hl.run(bar).frame("haptics"))
+
+
+def test_a_tracking_error_shows_its_largest_and_its_root_mean_square() -> None:
+    found = Tracking(np.array([0.0, 1.0]), np.array([3.0, 4.0]), np.array([0.5, 0.0]))
+    assert repr(found).splitlines() == [
+        "distance (mm): 4 at most, at 1 s, 3.536 RMS",
+        "angle (rad): 0.5 at most, at 0 s, 0.3536 RMS",
+    ]
+    cells = ET.fromstring(found._repr_html_()).findall(".//td")
+    assert [cell.text for cell in cells[:4]] == ["distance (mm)", "4", "1", "3.536"]
+    none = np.array([])
+    assert repr(Tracking(none, none, none)) == "no samples"
 
 
 def test_without_pandas_a_frame_says_what_to_install(

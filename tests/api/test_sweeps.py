@@ -4,6 +4,7 @@ import csv
 import os
 import signal
 import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.sweep import table
 from hapticlink.analysis.sweep.grid import points
+from hapticlink.api.sweeps import Sweep
+from hapticlink.orchestrator.results.html_table import MOST
 from hapticlink.visualization.figures import sweep_figure
 from tests.shared_fixtures import status
 
@@ -95,6 +98,20 @@ def test_a_frame_has_a_row_a_run(bar: Path) -> None:
     assert isinstance(frame, pandas.DataFrame)
     assert frame["duration"].tolist() == [0.05, 0.1]
     assert frame["end"].tolist() == ["duration", "duration"]
+
+
+def test_a_notebook_shows_the_rows_of_a_sweep() -> None:
+    rows = [{"k": f"<{i}>", "end": "duration", "tracking_max_mm": i / 3} for i in range(MOST + 2)]
+    made = Sweep(rows, ("k",), None)
+    shown = ET.fromstring(made._repr_html_())
+    assert len(made) == len(rows) == len(shown.findall(".//tbody/tr")) + 2
+    assert shown.findtext("caption") == "2 further rows"
+    assert [cell.text for cell in shown.findall(".//th")] == ["k", "end", "tracking_max_mm"]
+    assert [cell.text for cell in shown.findall(".//tbody/tr[2]/td")] == [
+        "<1>",
+        "duration",
+        "0.3333",
+    ]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
