@@ -21,7 +21,7 @@ from typing import Literal
 
 import casadi as ca
 
-from hapticlink.components.ports import Kind, Power, SpringPorts
+from hapticlink.components.ports import Gradient, Kind, Power, SpringPorts
 from hapticlink.components.schematic_parts import BlockPart, require_complete
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
@@ -55,6 +55,8 @@ class Variable:
     """The output of which this output is the time derivative."""
     power: Power | None = None
     """The power port of an input."""
+    gradient: Gradient | None = None
+    """Of an output that is the gradient of another one."""
     on_request: bool = False
     """Whether a step leaves an output of a plant out while nobody reads it, since it takes many
     operations and often only a record has it."""

@@ -24,6 +24,16 @@ class Power:
 
 
 @dataclass(frozen=True)
+class Gradient:
+    """Of an output that gives the gradient of another one, `of` (k entries), in what an input `by`
+    (n entries) brings: k x n, row by row, at the value of `by` that the output `at` (n) has."""
+
+    of: str
+    at: str
+    by: str
+
+
+@dataclass(frozen=True)
 class SpringPorts:
     """A spring-damper within a block, whose far end is set by inputs:
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from hapticlink.components.component import Component
-from hapticlink.components.ports import Power, SpringPorts
+from hapticlink.components.ports import Gradient, Power, SpringPorts
 from hapticlink.fmus.scalar_variables import (
     ScalarVariable,
     initial_dependencies,
@@ -159,6 +159,8 @@ def annotation(component: Component) -> ET.Element:
     for v in component.outputs:
         if v.kind:
             ET.SubElement(block, "Port", name=v.name, kind=v.kind)
+        if v.gradient:
+            ET.SubElement(block, "Gradient", {"name": v.name} | _attributes(v.gradient))
     for spring in component.springs:
         ET.SubElement(block, "Spring", _attributes(spring))
     states = (name for v in component.states for name in v.names)
@@ -166,5 +168,5 @@ def annotation(component: Component) -> ET.Element:
     return block
 
 
-def _attributes(record: Power | SpringPorts) -> dict[str, str]:
+def _attributes(record: Power | Gradient | SpringPorts) -> dict[str, str]:
     return {name: str(value) for name, value in asdict(record).items() if value != ""}

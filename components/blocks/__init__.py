@@ -65,6 +65,7 @@ def _virtual_environment(
     mobility: bool = True,
     local_model: bool = False,
     users: tuple[str, ...] = (),
+    predicted: bool = False,
 ) -> Component:
     from hapticlink.components.blocks.virtual_environment import virtual_environment
 
@@ -73,6 +74,7 @@ def _virtual_environment(
         "local_model": local_model,
         "frame_s": FRAME,
         "users": users,
+        "predicted": predicted,
     }
     return virtual_environment(linkage, graphics, directions, contacts, **options)
 

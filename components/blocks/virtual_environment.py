@@ -16,7 +16,7 @@ import numpy as np
 from hapticlink.components.component import FRAME_SIZE, Block, Component, Variable
 from hapticlink.components.contact import contact_forces, kept_sides
 from hapticlink.components.contact.kept_sides import KeptSides
-from hapticlink.components.dynamics import follow_mechanism, further_points, grasp
+from hapticlink.components.dynamics import follow_mechanism, further_points, gradients, grasp
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
 from hapticlink.components.dynamics.light_bodies import require_inertia
@@ -56,11 +56,13 @@ def virtual_environment(
     local_model: bool = False,
     frame_s: float = 1 / 30,
     users: further_points.Users = (),
+    predicted: bool = False,
 ) -> Component:
     """The FMU `virtual_environment` with the outputs that are requested: `mobility` Lambda_inv,
     `directions` P_c and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h
     (B.15). Mobility and directions are those of the operational point and of the further points of
-    `users`. frame_s (s) is where the parameter `frame_size` starts, for contacts.
+    `users`; `predicted`: at predicted coordinates, with their gradients (gradients.py). frame_s (s)
+    is where the parameter `frame_size` starts, for contacts.
 
     Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
@@ -72,8 +74,14 @@ def virtual_environment(
     block = Block(
         inputs=[*follow_mechanism.inputs(linkage, copy), *grasp.inputs_of_copy(linkage)],
         parameters=_parameters(linkage, copy, directions, contacts, frame_s),
-        states=[*states(linkage), *(Variable(name) for name in counts), *sides, *ready],
-        outputs=_outputs(linkage, directions, contacts, users, mobility, local_model),
+        states=[
+            *states(linkage),
+            *(gradients.states(linkage) if predicted else []),
+            *(Variable(name) for name in counts),
+            *sides,
+            *ready,
+        ],
+        outputs=_outputs(linkage, directions, contacts, users, mobility, local_model, predicted),
     )
     model = LinkageModel(
         linkage, block.p, block.x["q"], block.x["qd"], point=block.x.get(grasp.READY)
@@ -82,16 +90,27 @@ def virtual_environment(
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial, step = {"q": q0, "qd": qd0}, {"q": q1, "qd": qd1}
     output = {"x": model.x_h, "v": model.v_h, "q": model.q}
-    space = OperationalSpace(model)
+    space, q_next = OperationalSpace(model), q1
+    if predicted:
+        q = block.x[gradients.PREDICTED]
+        initial[gradients.PREDICTED], output[gradients.PREDICTED] = q0, q
+        step[gradients.PREDICTED] = q_next = gradients.predict(block, q1, qd1)
+        point = block.x.get(grasp.READY)
+        space = OperationalSpace(LinkageModel(linkage, block.p, q, block.x["qd"], point=point))
     if mobility:
-        output["Lambda_inv"] = space.Lambda_inv
-        output |= further_points.mobilities(space, users)
+        mobilities = {"Lambda_inv": space.Lambda_inv} | further_points.mobilities(space, users)
+        output |= mobilities
+        for name, matrix in mobilities.items() if predicted else ():
+            output |= gradients.of_matrix(name, matrix, space.model.q)
     if directions:
         points = grasp.points_of_copy(block) if linkage.choices else None
-        found = further_points.directions(block, space, users, q0, q1, points)
+        found = further_points.directions(block, space, users, q0, q_next, points)
         for name, directed in found.items():
             initial[name], step[name] = directed.first, directed.after
             output |= directed.output
+            if predicted:
+                P_c = name.replace("n_constrained", "P_c")
+                output |= gradients.of_projector(P_c, directed, space.model.q)
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:
@@ -149,16 +168,22 @@ def _outputs(
     users: further_points.Users,
     mobility: bool,
     local_model: bool,
+    predicted: bool,
 ) -> list[Variable]:
     units, space = linkage.coordinate_units, linkage.space
-    return [
-        Variable("x", *space.pose, description="pose of the copy's operational point"),
-        Variable("v", *space.twist, description="its velocity", derivative_of="x"),
-        Variable("q", (len(units),), units, description="the copy's coordinates"),
+    matrices = [
         *([mobility_output(space)] if mobility else []),
         *(direction_outputs(space) if directions else []),
         *(mobility_output(space, f"{name}.", name) for name in users if mobility),
         *(output for name in users if directions for output in direction_outputs(space, name)),
+    ]
+    shaped = (v for v in matrices if v.shape)
+    return [
+        Variable("x", *space.pose, description="pose of the copy's operational point"),
+        Variable("v", *space.twist, description="its velocity", derivative_of="x"),
+        Variable("q", (len(units),), units, description="the copy's coordinates"),
+        *matrices,
+        *(gradients.outputs(linkage, shaped) if predicted else ()),
         *(_BRANCH if linkage.closed else []),
         *([contact_forces.contact_port(linkage, contacts)] if contacts else []),
         *(held_matrices.ports(linkage) if local_model else []),
@@ -176,6 +201,8 @@ def _schematic(block: Block, copy: GraphicsCopy) -> list[BlockPart]:
                 "point in the hand", "the one that is asked for", "", (grasp.ASKED,), (grasp.READY,)
             )
         )
+    if gradients.PREDICTED in outputs:
+        parts.append(gradients.part(outputs))
     mobilities = tuple(name for name in outputs if name.endswith("Lambda_inv"))
     if mobilities:
         parts.append(mobility_part(mobilities))

@@ -92,11 +92,15 @@ def count(
     return number
 
 
+def is_among_smallest(eigenvalues: ca.SX, number: ca.SX) -> ca.SX:
+    """1 for each of the `number` smallest eigenvalues, 0 for the others (n x 1)."""
+    return ca.vertcat(*(ca.if_else(r < number, 1, 0) for r in _ranks(eigenvalues)))
+
+
 def projector(eigenvalues: ca.SX, vectors: ca.SX, number: ca.SX) -> ca.SX:
     """P_c, the orthogonal projector (n x n, dimensionless) on the eigenvectors of the `number`
     smallest eigenvalues."""
-    chosen = ca.vertcat(*(ca.if_else(r < number, 1, 0) for r in _ranks(eigenvalues)))
-    return vectors @ ca.diag(chosen) @ vectors.T
+    return vectors @ ca.diag(is_among_smallest(eigenvalues, number)) @ vectors.T
 
 
 @dataclass(frozen=True)
@@ -111,11 +115,16 @@ class Points:
 
 @dataclass(frozen=True)
 class ConstrainedDirections:
-    """The state n_constrained at the start and after a step, and the outputs."""
+    """The state n_constrained at the start and after a step, and the outputs; the scaled mobility
+    with its eigenvalues and eigenvectors, of which P_c has the `number` smallest."""
 
     first: ca.SX
     after: ca.SX
     output: dict[str, ca.SX]
+    scaled: ca.SX
+    values: ca.SX
+    vectors: ca.SX
+    number: ca.SX
 
 
 def constrained_directions(
@@ -146,12 +155,12 @@ def constrained_directions(
         mobility, least = scaled(q, block.u.vector, p.vector, *point)
         return count(eigen(mobility)[0], before, tolerance, hysteresis, least)
 
-    output = {
-        f"{prefix}P_c": projector(*eigen(scaled(q, *given)[0]), before),
-        f"{prefix}n_constraints": before,
-    }
+    A = scaled(q, *given)[0]
+    found = (*eigen(A), before)
+    output = {f"{prefix}P_c": projector(*found), f"{prefix}n_constraints": before}
     first, after = own, own
     if points:
         first, after = [points.first], [points.after]
         before = ca.if_else(points.changes, 0, before)
-    return ConstrainedDirections(number(q0, ca.SX(0), *first), number(q1, before, *after), output)
+    numbers = number(q0, ca.SX(0), *first), number(q1, before, *after)
+    return ConstrainedDirections(*numbers, output, A, *found)

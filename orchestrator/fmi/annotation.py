@@ -25,7 +25,7 @@ from dataclasses import replace
 from typing import Any, get_args
 from xml.etree.ElementTree import Element
 
-from hapticlink.components.ports import Kind, Power, SpringPorts
+from hapticlink.components.ports import Gradient, Kind, Power, SpringPorts
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.units import Unit, why_unsuitable
 from hapticlink.orchestrator.fmi.variables import Scalar
@@ -73,13 +73,16 @@ def read_annotation(
     ports = _Ports(scalars, units)
     kinds: dict[str, Kind] = {}
     power: dict[str, Power] = {}
+    gradients: dict[str, Gradient] = {}
     springs: list[SpringPorts] = []
     states: tuple[str, ...] | None = None
     for element in declared:
-        _one_of(element.tag, "element", ("Port", "Spring", "States"))
+        _one_of(element.tag, "element", ("Port", "Gradient", "Spring", "States"))
         name = element.get("name", "")
         if element.tag == "States":
             states = tuple(_attributes(element, "names")["names"].split())
+        elif element.tag == "Gradient":
+            gradients[name] = ports.gradient(element)
         elif element.tag == "Spring":
             springs.append(ports.spring(element))
         elif "units" in element.attrib:
@@ -88,8 +91,15 @@ def read_annotation(
             kinds[name] = ports.kind(element)
         else:
             power[name] = ports.power(element)
-    found = {"kinds": kinds, "power": power, "springs": tuple(springs), "states": states}
-    return {"timing": timing or "continuous", "declares_timing": bool(timing), **found}
+    return {
+        "timing": timing or "continuous",
+        "declares_timing": bool(timing),
+        "kinds": kinds,
+        "power": power,
+        "gradients": gradients,
+        "springs": tuple(springs),
+        "states": states,
+    }
 
 
 class _Ports:
@@ -115,6 +125,15 @@ class _Ports:
         if abs(sign) != 1.0:
             raise ValueError(f"{given['name']}: sign {sign:g} is neither 1 nor -1")
         return Power(given["displacement"], sign)
+
+    def gradient(self, element: Element) -> Gradient:
+        given = _attributes(element, "name of at by")
+        found = Gradient(given["of"], given["at"], given["by"])
+        size = len(self._entries(found.by, "input"))
+        self._entries(found.at, "output", size=size)
+        size *= len(self._entries(found.of, "output"))
+        self._entries(given["name"], "output", size=size)
+        return found
 
     def spring(self, element: Element) -> SpringPorts:
         needed = "set_position position stiffness"

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
-from hapticlink.components.ports import Kind, Power, SpringPorts
+from hapticlink.components.ports import Gradient, Kind, Power, SpringPorts
 from hapticlink.orchestrator.base.errors import SHOWN, InputFault
 from hapticlink.orchestrator.fmi import annotation, clocks
 from hapticlink.orchestrator.fmi.archive import open_archive, read_xml, require_whole
@@ -79,6 +79,7 @@ class Description:
     """By output: the output that is its derivative with respect to time."""
     kinds: Mapping[str, Kind] = field(default_factory=dict)
     power: Mapping[str, Power] = field(default_factory=dict)
+    gradients: Mapping[str, Gradient] = field(default_factory=dict)
     springs: tuple[SpringPorts, ...] = ()
     """What the FMU declares of its ports, by port (`annotation`)."""
     states: tuple[str, ...] | None = None
@@ -144,6 +145,15 @@ class Description:
     def integral(self, outputs: Iterable[Scalar]) -> tuple[Scalar, ...] | None:
         """The outputs of which `outputs` are the derivatives, all or none."""
         return self._related(outputs, {rate: name for name, rate in self.derivatives.items()})
+
+    def gradient(self, outputs: Sequence[Scalar]) -> tuple[Scalar, ...] | None:
+        """The outputs at which the gradient of a whole port is taken, and that gradient; None where
+        none is declared."""
+        port = outputs[0].port
+        for name, declared in self.gradients.items():
+            if declared.of == port and tuple(outputs) == self.port(port, "output"):
+                return self.port(declared.at, "output") + self.port(name, "output")
+        return None
 
     def _related(
         self, outputs: Iterable[Scalar], names: Mapping[str, str]

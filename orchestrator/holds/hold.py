@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 
 from hapticlink.orchestrator.base.arrays import Vector
 
-Needs = Literal["derivative", "integral", "power"]
+Needs = Literal["derivative", "integral", "gradient", "power"]
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ TABLE: dict[str, HoldRow] = {
     ),
     "delayed": HoldRow("delayed", "delayed", depth=2, remembers=1, degree=1),
     "smooth": HoldRow("smooth", "smooth", depth=2, remembers=2, degree=3),
+    "model": HoldRow("samples", "model", needs="gradient"),
     "passive": HoldRow("account", "passive", needs="power"),
     "nepce": HoldRow("account", "nearly_energy_preserving", needs="power"),
     "pspm": HoldRow("set_position", "set_position", needs="spring"),

@@ -10,6 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.hold import Hold, HoldContext
 from hapticlink.orchestrator.holds.table import HoldRow
@@ -49,9 +50,10 @@ class HoldParts:
     or the energy that the far side of a spring has put in. turns: for each entry of a sample that
     is a wrapped angle, a full turn in its unit. matrix: "projector" or "semidefinite". context:
     what a plugin's hold is constructed from. frames: whether a sample describes the beginning of
-    its source's step. base: a tick (s). spring: the one that it sets, or on
-    whose far side it is; row: 0 for its set position, 1 for its set velocity. far: the connection
-    whose hold observes the far side of the spring that this one sets.
+    its source's step. coordinates: reads those in which the gradient beside a sample is. base: a
+    tick (s). spring: the one that it sets, or on whose far side it is; row: 0 for its set position,
+    1 for its set velocity. far: the connection whose hold observes the far side of the spring that
+    this one sets.
     """
 
     name: str
@@ -66,6 +68,7 @@ class HoldParts:
     frames: bool = False
     displacement: Reader | None = None
     velocity: Reader | None = None
+    coordinates: Reader | None = None
     spring: SetSpring | None = None
     row: int = 0
     far: str | None = None
@@ -106,6 +109,7 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
         frames=system.fmu[connection.source].frames,
         displacement=displacement,
         velocity=velocity,
+        coordinates=_coordinates(connection, signals) if kind.needs == "gradient" else None,
         spring=of,
         row=of.ports.index(f"{connection.target}.{connection.target_port}") if of else 0,
     )
@@ -144,6 +148,27 @@ def _motion(connection: Connection, signals: SignalVector) -> tuple[Reader, Read
         return moved, None
     places[entries] = power.moving
     return moved, Reader(signals, places.tolist(), work)
+
+
+def _coordinates(connection: Connection, signals: SignalVector) -> Reader:
+    """Reads what the input of the source, in which the gradient is, would get at the moment. Raises
+    InputFault where it is not fed by one connection."""
+    fmu = connection.source
+    description = signals.system.fmu[fmu].description
+    by = next(g.by for g in description.gradients.values() if g.of == connection.source_port)
+    fed = [c for c in signals.system.into(fmu) if c.inputs == description.port(by, "input")]
+    if len(fed) != 1:
+        raise InputFault(
+            f"hold of {connection.name}: its gradient is in {fmu}.{by}, which is not fed by one "
+            "connection as a whole: take another hold"
+        )
+    conversions = [s.conversion for s in fed[0].inputs]
+    return Reader(
+        signals,
+        signals.sources(fed[0]),
+        np.array([c.factor for c in conversions]),
+        np.array([c.offset for c in conversions]),
+    )
 
 
 def describe_spring(of: SetSpring, signals: SignalVector) -> SpringParts:

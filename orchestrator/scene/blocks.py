@@ -19,6 +19,7 @@ from hapticlink.orchestrator.base.signal_names import (
     OBSERVER,
     block_of_user,
 )
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -184,7 +185,15 @@ def _environment(scene: Scene, wanted: FromGraphics) -> dict[str, Any]:
         "mobility": wanted.mobility,
         "local_model": wanted.local_model,
     }
+    if holds_model(scene) and copied["sync"] != "operational":
+        settings["predicted"] = True
     return settings | ({"users": tuple(scene.devices)} if scene.devices else {})
+
+
+def holds_model(scene: Scene) -> bool:
+    """Whether a hold is asked for that needs gradients of what the graphics copy puts out."""
+    asked = {scene.hold, *scene.named_holds.values()}
+    return any(HOLDS[name].needs == "gradient" for name in asked if name in HOLDS)
 
 
 def impedance(scene: Scene) -> bool:

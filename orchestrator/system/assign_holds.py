@@ -141,6 +141,11 @@ def why_unsuitable(
             f"{c.source} does not put out anything of which {c.source_port} is the derivative, or "
             "does not declare it (docs/holds.md, Derivatives); take 'foh'"
         )
+    if needs == "gradient" and not companion_outputs(c, fmus, hold):
+        return (
+            f"{c.source} does not put out the gradient of {c.source_port}, or does not declare it "
+            "(docs/holds.md, Gradients); take 'foh'"
+        )
     if needs == "power" and not carries_power(c, power):
         return (
             f"it is not a declared power connection: write a [[power]] that pairs the effort "

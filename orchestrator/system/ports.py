@@ -1,5 +1,5 @@
-"""Properties of a connection that follow from its ports: names, kind, power, derivative and
-integral."""
+"""Properties of a connection that follow from its ports: names, kind, power, derivative, integral
+and gradient."""
 
 from __future__ import annotations
 
@@ -90,9 +90,13 @@ def companion_outputs(
     c: Connection, fmus: Mapping[str, Fmu], hold: str | None = None
 ) -> tuple[Scalar, ...]:
     """The outputs of the source that `hold`, by default the connection's own, reads beside the
-    connection's outputs: their time derivatives or integrals, if it needs them; () where the source
-    does not declare them."""
+    connection's outputs: their time derivatives or integrals, or where their gradient is taken and
+    the gradient, if it needs them; () where the source does not declare them."""
     name, source = hold or c.hold, fmus[c.source].description
-    related = {"derivative": source.derivative, "integral": source.integral}
+    related = {
+        "derivative": source.derivative,
+        "integral": source.integral,
+        "gradient": source.gradient,
+    }
     find = related.get(HOLDS[name].needs or "") if name else None
     return (find(c.outputs) or ()) if find else ()

@@ -96,7 +96,8 @@ class CompiledHold:
         width, rows = len(places), math.isqrt(n) if parts.matrix else 0
         self._push, self._value, self._loop, self._n = library.push, library.value, loop, n
         self.width, self.places = width, np.array(places, np.intp)
-        words = {"samples": row.depth * width, "memory": row.remembers * n, "scratch": 6 * n}
+        words = {"samples": row.depth * width, "memory": row.remembers * n}
+        words["scratch"] = 6 * n + width
         words |= {"last": turned, "chosen": rows}
         words["scale"] = rows if parts.matrix == "semidefinite" else 0
         self.c = c = _with_arrays(structures.Hold, words)
@@ -108,6 +109,8 @@ class CompiledHold:
         if parts.matrix:
             kinds = {"projector": structures.PROJECTOR, "semidefinite": structures.SEMIDEFINITE}
             c.fill(manifold=kinds[parts.matrix], rows=rows, rank=-1)
+        if parts.coordinates:
+            fill_reader(c.coordinates, parts.coordinates)
         self._growing: list[tuple[structures.Structure, dict[str, int]]] = []
         self.link: Any = None
         self.account: Any = None

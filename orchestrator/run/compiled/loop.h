@@ -179,16 +179,16 @@ typedef struct {
 } Account;
 
 /* A hold of any kind, the row of hold_table.h with that index. `samples`: (depth, width), oldest first;
- * `width` is 2 n where a sample is followed by its derivative or integral. `memory`: (remembers, n),
- * what else the kind remembers. `scratch`: (6, n), since the stack is no place for arrays of any size: for matrices and
- * a sample that is unwrapped, for the caller, for the kind.
+ * `width` is 2 n where a sample is followed by its derivative or integral, more where it is by a gradient.
+ * `memory`: (remembers, n), what else the kind remembers. `scratch`: since the stack is no place for arrays of any
+ * size, 2 n for matrices and a sample that is unwrapped, as many and `width` for the caller, 2 n of these for the kind.
  * restart, take, give: of a hold in Python. published: when the source had its newest sample; describes: the instant
  * that this describes, which is its stamp in all that the hold does. */
 typedef struct {
     int64_t kind, n, width, depth, remembers;
     const int64_t *sources /* [width] */;
     double *held /* [n] */;               /* where `evaluate` puts the value */
-    double *scratch /* [6 * n] */;
+    double *scratch /* [6 * n + width] */;
     int64_t n_angles;
     const int64_t *angles /* [n_angles] */;
     const double *turns /* [n_angles] */;
@@ -200,6 +200,7 @@ typedef struct {
     double *chosen /* [rows] */;
     void *restart, *take, *give;
     int64_t frames;                       /* whether a sample describes the instant at which the one before was published */
+    Reader coordinates;                   /* in which a gradient is, n = 0 without one */
     /* state: */
     int64_t published, describes;
     int64_t count, stamps[3], arrival, span, interval, begun, unwrapped, rank;
@@ -416,7 +417,7 @@ int signal_came(void);
 int exception_left(void);
 void note_arithmetic(void);      /* how numbers are rounded from here on */
 void keep_arithmetic(StepState *p);  /* restored where an FMU has changed it, and counted */
-double *hold_scratch(const Hold *h); /* (2, n), of the caller of a hold */
+double *hold_scratch(const Hold *h); /* 2 n, or a sample, of the caller of a hold */
 int manifold_push(Hold *h, const double *y);
 void manifold_value(const Hold *h, double *value);
 double tank_share(
