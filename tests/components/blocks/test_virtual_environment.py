@@ -1,11 +1,13 @@
 """The graphics copy: mobility, directions, synchronisation and branch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.specs.linkage import Directions, GraphicsCopy
+from hapticlink.components.specs.linkage import Directions, FurtherPoint, GraphicsCopy
 from studies.report import appendix_a
 from studies.report.appendix_a import L
 from tests.blocks import Running, running, virtual_environment
@@ -123,3 +125,50 @@ def test_a_folded_copy_is_reported():
     np.testing.assert_allclose(appendix_a.h(folded), 0, atol=1e-12)
     block.set(q_ref=folded)
     assert block.y["branch_ok"] == 0
+
+
+@pytest.mark.parametrize("users", [(), ("left",)])
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_gradients_are_those_of_the_matrices_at_the_predicted_coordinates(users, seed):
+    """Against central differences; also where the projector's rank is 2."""
+    linkage = five_bar()
+    if users:
+        left = FurtherPoint(name="left", body="link4", at=(0.02, 0.0))
+        linkage = replace(linkage, point=(left,))
+    copy = virtual_environment(linkage, GraphicsCopy(), Directions(), users=users, predicted=True)
+    copy = Running(copy)
+    rng = np.random.default_rng(seed)
+    turned = copy.y["q_predicted"] + rng.uniform(-1, 1, 4)
+    matrices = [f"{prefix}{name}" for prefix in ("", *(f"{u}." for u in users))
+                for name in ("Lambda_inv", "P_c")]  # fmt: skip
+
+    def at(q):
+        return copy.put(q_predicted=q).outputs(*matrices)
+
+    copy.put(n_constrained=float(rng.integers(1, 3)))
+    gradients = {name: copy.put(q_predicted=turned).y[f"{name}_gradient"] for name in matrices}
+    for k, e in enumerate(1e-5 * np.eye(4)):
+        ahead, behind = at(turned + e), at(turned - e)
+        for name in matrices:
+            slope = (ahead[name] - behind[name]).ravel() / 2e-5
+            size = np.abs(gradients[name]).max()
+            np.testing.assert_allclose(gradients[name][:, k], slope, atol=1e-5 * size, err_msg=name)
+
+
+def test_matrices_are_computed_in_the_middle_of_the_frame_in_which_they_are_used():
+    linkage, h = five_bar(), 1 / 20
+    copy = Running(virtual_environment(linkage, GraphicsCopy(), Directions(), predicted=True))
+    plain = Running(virtual_environment(linkage, GraphicsCopy(), Directions()))
+    leader = running(linkage).set(F_hand=WRENCH)
+    for _ in range(100):
+        leader.step(1 / 512)
+    for block in (copy, plain):
+        block.set(q_ref=leader.y["q"], qd_ref=leader.y["qd"]).step(h)
+    predicted = leader.y["q"] + 1.5 * h * leader.y["qd"]
+    np.testing.assert_allclose(copy.y["q_predicted"], predicted, atol=1e-9)
+    np.testing.assert_array_equal(copy.y["q"], plain.y["q"])
+    elsewhere = plain.put(q=predicted)
+    np.testing.assert_allclose(
+        copy.y["Lambda_inv"], elsewhere.y["Lambda_inv"], rtol=1e-9, atol=1e-9
+    )

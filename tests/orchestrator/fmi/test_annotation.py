@@ -7,7 +7,7 @@ import casadi as ca
 import pytest
 
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.ports import Power, SpringPorts
+from hapticlink.components.ports import Gradient, Power, SpringPorts
 from hapticlink.fmus.build_fmu import build, build_native
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator.base.errors import InputFault
@@ -26,6 +26,7 @@ def declaring(**replaced: Variable) -> Component:
         "P": Variable("P", (2, 2), kind="projector"),
         "rows": Variable("rows", (3, 2), kind="table"),
         "turned": Variable("turned", (2,), ("m", "rad"), kind="angle"),
+        "G": Variable("G", (4, 2), gradient=Gradient("P", at="x", by="far")),
     } | replaced
     block = Block(
         inputs=[
@@ -85,6 +86,9 @@ def test_a_derivative_of_nothing_is_refused_at_build(tmp_path):
         ('stiffness="K"', 'stiffness="far"', "there is no parameter 'far'"),
         ('position="x"', 'position="P"', "P has 4 entries, and 2 are needed"),
         (' displacement="x"', ' units="m"', "F has 2 entries, and 1 units"),
+        ('at="x" by', 'at="P" by', "P has 4 entries, and 2 are needed"),
+        ('by="far"', 'by="x"', "there is no input 'x'"),
+        ('of="P"', 'of="v"', "G has 8 entries, and 4 are needed"),
         ("<Spring", "<Sprung", "no element 'Sprung'; did you mean 'Spring'"),
     ],
 )
