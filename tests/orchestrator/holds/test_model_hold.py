@@ -1,6 +1,7 @@
 """The hold along a gradient, alone and in the loop."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
