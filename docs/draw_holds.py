@@ -30,6 +30,7 @@ STIFFNESS = 100.0
 NOTES = {
     "zoh": ", latest",
     "slope": " (a velocity, from its pose)",
+    "model": " (sinh of a coordinate)",
     "passive": " (force of a spring)",
     "nepce": " (force of a spring)",
     "pspm": " (dotted: near end)",
@@ -63,14 +64,16 @@ class Signals:
     def hold(self, name: str, size: int = 1, **parts: Any) -> CompiledHold:
         """A hold, which lives as long as these signals."""
         kind, position = HOLDS[name], Reader(self, [0])  # type: ignore[arg-type]
-        width, tank = (2 if kind.needs in ("derivative", "integral") else 1) * size, None
+        width, tank = {"derivative": 2, "integral": 2, "gradient": 3}.get(kind.needs or "", 1), None
         if kind.needs == "power":
             parts["displacement"] = position
+        elif kind.needs == "gradient":
+            parts["coordinates"] = position
         elif kind.needs == "spring":
             stiffness = np.full(1, STIFFNESS)
             spring = SpringParts(stiffness, np.zeros(1), position, np.zeros(1), TICK, sampled=True)
             tank = make_tank(spring)
-        every = HoldParts(name, kind, tuple(range(width)), HoldContext(size), **parts)
+        every = HoldParts(name, kind, tuple(range(width * size)), HoldContext(size), **parts)
         loop = ctypes.addressof(self.loop)
         return CompiledHold(load(), loop, every, np.zeros(size), "", tank)
 
@@ -83,9 +86,10 @@ def waveform(name: str) -> tuple[Vector, Vector]:
     fast = kind.downsamples and name == "mean"
     every = 1 if fast else PERIOD
     for tick in range(END):
-        # The near end of the spring, or the target on the spring of which the signal is the force.
-        spring = kind.needs == "spring"
-        signals.values[0] = near_end(tick) if spring else -signal(tick) / STIFFNESS
+        # The near end of the spring, the coordinate q of the signal sinh(q), or the target on the
+        # spring of which the signal is the force.
+        reads = {"spring": near_end(tick), "gradient": np.arcsinh(signal(tick))}
+        signals.values[0] = reads.get(kind.needs or "", -signal(tick) / STIFFNESS)
         if tick % every == 0:
             hold.push(tick, sample(kind, tick), tick)
         read = not fast or tick % PERIOD == 0
@@ -97,6 +101,9 @@ def sample(kind: HoldRow, tick: int) -> Vector:
     """The signal at `tick`, and beside it what the hold needs."""
     if kind.needs == "derivative":
         return np.array([signal(tick), rate(tick)])
+    if kind.needs == "gradient":
+        q = np.arcsinh(signal(tick))
+        return np.array([signal(tick), q, np.cosh(q)])
     if kind.needs == "integral":  # the signal is a velocity, held as the slope of its pose
         return np.array([rate(tick), signal(tick)])
     return np.array([signal(tick)])

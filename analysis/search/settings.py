@@ -36,6 +36,7 @@ HOLDS: dict[str, tuple[str, ...]] = {
     "foh, slope": ("hold=foh", *_SLOPE),
     "second-order": ("hold=second-order",),
     "delayed": ("hold=delayed",),
+    "model": ("hold=model",),
     "zoh, mean": ("hold=zoh", "downsampling=mean"),
     "passive": ("hold=passive",),
     "foh-derivative, passive": ("hold=foh-derivative", *_PASSIVE),

@@ -17,11 +17,11 @@ from studies.mismatch.methods import (
     COMPARED,
     FEW,
     GAINS,
-    HOLDS,
     INTEGRATORS,
     KEPT_APART,
     LIKELY,
     OF_MATRICES,
+    OF_MOTION,
     RATES,
     REPORT,
     VARIABLE,
@@ -90,7 +90,7 @@ def methods(arrangement: str, bias: str, rate: str) -> list[Method]:
     gains = [g for g in GAINS if whole or g != REPORT]
     if arrangement == MOBILITY:
         return [Method(*each) for each in product(OF_MATRICES, gains) if each[1] != "soft"]
-    found = [Method(hold, g) for hold, g in product(HOLDS if whole else LIKELY, gains)]
+    found = [Method(hold, g) for hold, g in product(OF_MOTION if whole else LIKELY, gains)]
     others = [i for i in INTEGRATORS if whole and i != "rk4"]
     return found + [Method(h, "medium", i) for h, i in product(COMPARED, others)]
 

@@ -23,10 +23,10 @@ from studies.mismatch.methods import (
     COMPARED,
     FEW,
     GAINS,
-    HOLDS,
     INTEGRATORS,
     LIKELY,
     OF_MATRICES,
+    OF_MOTION,
     RATES,
     REPORT,
     Method,
@@ -66,7 +66,7 @@ def _by_hold(
         point = _point(rows, value, of)
         return point and point._replace(taken=chosen.admitted and chosen.best.hold == hold)
 
-    holds = OF_MATRICES if arrangement == MOBILITY else HOLDS
+    holds = OF_MATRICES if arrangement == MOBILITY else OF_MOTION
     return [_panel(COMPENSATION[bias], holds, COLUMNS, partial(at, bias)) for bias in BIAS]
 
 
@@ -159,7 +159,7 @@ def _energy(folder: Path, found: Found) -> Iterator[str]:
 
 
 def _margins(folder: Path, found: Found) -> Iterator[str]:
-    holds = [h for h in HOLDS if mapped(Method(h, "soft"))]
+    holds = [h for h in OF_MOTION if mapped(Method(h, "soft"))]
 
     def at(gains: str, hold: str, rate: str) -> Point | None:
         least = margin(found.margins, DIRECT, Method(hold, gains), rate)

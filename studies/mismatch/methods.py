@@ -19,8 +19,11 @@ LIKELY = ("zoh", "foh", "second-order", "passive", "foh-derivative, passive")
 KEPT_APART, NEAREST = "22", "20"
 """A rate at which nothing is chosen, whose frames are no whole ticks, and the row it takes."""
 BIAS = ("none", "full")
-OF_MATRICES = ("zoh", "foh", "second-order", "delayed")
+OF_MATRICES = ("zoh", "foh", "second-order", "delayed", "model")
 """Holds that are tried on Lambda^-1 and P_c."""
+OF_MOTION = tuple(hold for hold in HOLDS if hold != "model")
+"""Holds that are tried on what a mechanism at the graphics rate and its loop exchange, of which no
+FMU puts out gradients."""
 
 REPORT = "stiff"
 INTEGRATORS = ("rk4", "semi-implicit-euler", "passive-midpoint")
