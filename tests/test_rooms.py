@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5735,
-    "fmus": 2785,
-    "orchestrator": 12366,
+    "components": 5737,
+    "fmus": 2786,
+    "orchestrator": 12430,
     "programs": 1116,
-    "analysis": 6724,
-    "visualization": 3271,
-    "api": 402,
-    "commands": 1350,
+    "analysis": 6734,
+    "visualization": 3275,
+    "api": 422,
+    "commands": 1366,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
