@@ -50,6 +50,7 @@ from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.results.read_results import Results
@@ -65,6 +66,7 @@ Progress = Callable[[str, int, int], object]
 Hands = Mapping[str, Hand | None]
 
 
+@one_blas_thread()
 def stability(
     scene: str | Path | Scene,
     options: Options = (),
@@ -114,6 +116,7 @@ def stability(
     return replace(judged, run_fault=own_fault)
 
 
+@one_blas_thread()
 def equilibrium_stability(
     scene: str | Path | Scene,
     options: Options = (),

@@ -36,6 +36,7 @@ from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.base.terminal_output import align_columns
 from hapticlink.orchestrator.base.ticks import exact
@@ -153,6 +154,7 @@ class Transparency:
         }
 
 
+@one_blas_thread()
 def transparency(
     scene: str | Path | Scene, options: Sequence[str] = (), *, count: int = 2
 ) -> list[Transparency]:
@@ -243,6 +245,7 @@ class ChangeCost:
         return self.felt.record() | {"stable_up_to": self.times, "stiffest": most}
 
 
+@one_blas_thread()
 def costs(
     scene: str | Path | Scene, options: Sequence[str], tell: Callable[[str], object]
 ) -> list[ChangeCost]:

@@ -5,6 +5,7 @@ for every instance."""
 from __future__ import annotations
 
 import shutil
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -97,7 +98,10 @@ def _extract(path: Path, folder: str, own: bool) -> str:
 
 def _is_needed(entry: str) -> bool:
     """Whether a run needs an entry of an FMU of this project: no binary of another platform, which
-    is a third of a Python FMU."""
+    is a third of a Python FMU, and no pythonfmu where one is imported, which Python takes in the
+    place of any other."""
+    if entry.startswith("resources/pythonfmu/") and "pythonfmu" in sys.modules:
+        return False
     here = (f"binaries/{platform}/" for platform in PLATFORMS.values())
     return entry.startswith(("modelDescription.xml", "resources/", *here))
 

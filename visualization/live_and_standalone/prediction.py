@@ -18,6 +18,7 @@ from hapticlink.analysis.stability.resting_scene import resting_system
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.components.specs.hand import SpringHand
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
@@ -91,6 +92,7 @@ def judge_hands(
     changed = _at_rate(scene, settings.get(RATE))
     with (
         interrupt.defer_signals(),
+        one_blas_thread(),
         np.errstate(invalid="ignore", over="ignore"),
         build_system(scene) as whole,
     ):
