@@ -201,6 +201,7 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     found = hl.stability("virtual-wall", beyond, poses=1)
     assert found.verdict == "unstable"
     assert found.worst.kind == "vibration"
+    assert found.record()["growth_rate"] == found.growth == found.worst.growth > 0.0
     assert found.remedies[0].stable
     line = next(line for line in found.lines() if line.startswith("remedy: "))
     pasted = shlex.split(line.removeprefix("remedy: ").rpartition(": ")[0])[1::2]

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.holds.table import TABLE
 from hapticlink.orchestrator.run.compiled.hold_structures import array
 from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.latency_and_loss import SampleLink
-from tests.orchestrator.holds.bench import Bench, generated
+from tests.orchestrator.holds.bench import Bench, generated, vector
 
 BASE = Fraction(3, 7680)
 N = 3
@@ -188,6 +188,40 @@ def test_forces_of_holds_that_observe_their_energy(name, seed, every):
         close(generated(hold), E, 1 + abs(E))
         bench.values[0] += v[-1] * tick_s / 2 * generator.uniform(-0.5, 1.5)
         x.append(2.0 * bench.values[0])
+
+
+@few
+@given(seeds, st.integers(1, 12))
+def test_with_late_samples_the_friction_of_passive_has_the_way_since_the_stamp(seed, late):
+    """F_n - beta sign(d) c with P = E + r times the length of the way since the stamp of F_n, back
+    and forth; r of all samples that are held after the stamp before. E, beta and d are tested with
+    samples that are in time, and E with late ones by meters."""
+    generator = np.random.default_rng(seed)
+    bench = Bench(2, BASE)
+    readers = {"displacement": bench.reader([0]), "velocity": bench.reader([1])}
+    hold = bench.hold("passive", **readers)
+    x, until, swing, stamp, force, largest = [0.0], [], 0.0, 0, 1.0, 1.0
+    hold.push(0, np.array([force]), 0)
+    for tick in range(80):
+        if tick > late and generator.random() < 0.4:
+            before, force = force, float(generator.normal())
+            hold.push(tick - late, np.array([force]), tick)
+            until.append((tick, before))
+            held = [other for ended, other in until if ended > stamp]
+            swing = max(swing, *(abs((before + force) / 2 - other) for other in held))
+            stamp, largest = tick - late, max(abs(force), abs(before))
+        bench.values[:] = x[-1], 10 * generator.normal()
+        found = float(hold.value(tick, 0.5)[0])
+        beta, ahead, steady = (
+            float(vector(hold, name)[0]) for name in ("beta", "predicted", "steady")
+        )
+        way = np.abs(np.diff(x[stamp:])).sum() if until else abs(x[-1])
+        P = generated(hold) + swing * way
+        D = abs(ahead) + (0.0 if P > 0 else abs(steady))
+        c = np.clip(swing + (P / D if D else 0.0), 0.0, max(swing, largest))
+        close(found, force - np.sign(ahead) * beta * c, 1 + abs(force))
+        share = generator.uniform(0.0, 1.5) if generator.random() < 0.95 else -0.5
+        x.append(x[-1] + share * ahead)
 
 
 @pytest.mark.parametrize("sampled", [False, True])
