@@ -359,7 +359,7 @@ class ForwardSensitivity:
 
     def _find_known(
         self, tick: int, operation: Instruction, template: Template, sizes: tuple[int, int]
-    ) -> tuple[tuple[Hashable, ...], list[Slopes]]:
+    ) -> tuple[tuple[Any, ...], list[Slopes]]:
         """The slopes of an operation that are known, of so many numbers before and after it, and by
         what."""
         key: tuple[Any, ...]

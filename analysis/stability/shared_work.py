@@ -20,7 +20,7 @@ class Slopes:
     E: Matrix
 
 
-KnownSlopes = dict[tuple[Hashable, ...], list[Slopes]]
+KnownSlopes = dict[tuple[Any, ...], list[Slopes]]
 """Slopes at different numbers, the newest first, by what else they depend on."""
 
 
