@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5735,
-    "fmus": 2785,
-    "orchestrator": 12366,
+    "components": 5737,
+    "fmus": 2792,
+    "orchestrator": 12387,
     "programs": 1116,
-    "analysis": 6724,
-    "visualization": 3271,
+    "analysis": 6971,
+    "visualization": 3273,
     "api": 402,
-    "commands": 1350,
+    "commands": 1359,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -133,6 +133,7 @@ class _Search:
 
     def margin(self, place: RestingScene) -> Margin:
         found: dict[str, Largest] = {}
+        self._steps.tell(f"margins at {self._pose.name}")
         if place.gains.laws:
             self._steps.begin("margin of stiffness")
             found["stiffness"] = largest_scale(lambda s: self._stable(place, s), FINE)
