@@ -37,7 +37,7 @@ def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int]
 
     def tell(what: str, done: int, of: int) -> None:
         nonlocal begun
-        begun = f"at {what}: {done} of {of} steps were done"
+        begun = f"({what}; {done} of {of} steps were done)"
         if show:
             show(done, of, what)
 

@@ -265,7 +265,7 @@ def test_a_verdict_that_is_interrupted_says_what_was_done(
         raise Interrupted
 
     monkeypatch.setattr(_Search, "_stable", interrupted)
-    said = r"interrupted at margins at .* \(.* 1/s in .*\): \d of \d steps were done"
+    said = r"interrupted \(margins at .* \(.* 1/s in .*\); \d of \d steps were done\)"
     with pytest.raises(Interrupted, match=said), steps("stability", hidden=True) as tell:
         hl.stability("virtual-wall", poses=1, progress=tell)
 
