@@ -72,19 +72,30 @@ def build_block(
                 return build(block, folder, **experiment)
         return build_native(block, folder, platforms=platforms, fmi=fmi, **experiment)
 
-    material: dict[str, Any] = {
-        "block": name,
-        "settings": to_jsonable_python(dict(settings)),
-        **experiment,
-    }
+    material = _block_material(name, settings) | dict(experiment)
     if engine:
         material["engine"] = engine
     if starts:
         material["starts"] = dict(starts)
     if packaging == "native" and not engine:
-        from hapticlink.fmus.native.compiler import compiler_version, host_platform
-
-        material["compiler"] = compiler_version()
-        material["platforms"] = list(platforms) or [host_platform(fmi)]
-        material["fmi"] = fmi
+        material |= _native_material(platforms, fmi)
     return cache.get_or_build(material, make, build_folder, poll)
+
+
+def has_compiled(name: str, settings: Settings) -> bool:
+    """Whether the cache has the native FMU of a block for this machine."""
+    try:
+        return cache.has(_block_material(name, settings) | _native_material((), fmi=2))
+    except FmuError:  # none can be made here
+        return False
+
+
+def _block_material(name: str, settings: Settings) -> dict[str, Any]:
+    return {"block": name, "settings": to_jsonable_python(dict(settings))}
+
+
+def _native_material(platforms: Sequence[str], fmi: int) -> dict[str, Any]:
+    from hapticlink.fmus.native.compiler import compiler_version, host_platform
+
+    chosen = list(platforms) or [host_platform(fmi)]
+    return {"compiler": compiler_version(), "platforms": chosen, "fmi": fmi}

@@ -151,6 +151,12 @@ def get_or_build(
         return _whole_file(entry) or _build(build_function, build_folder, root, entry)
 
 
+def has(key_material: Mapping[str, Any]) -> bool:
+    """Whether the FMU for `key_material` is in the cache."""
+    root = folder()
+    return root is not None and _whole_file(root / key(key_material)) is not None
+
+
 def _whole_file(entry: Path) -> Path | None:
     with suppress(OSError):  # it cannot be read: built, which tells whether it can be written
         for path in entry.glob("[!.]*.fmu"):

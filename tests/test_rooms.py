@@ -33,13 +33,13 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 
 CODE_LINES = {
     "components": 5737,
-    "fmus": 2801,
-    "orchestrator": 12441,
+    "fmus": 2808,
+    "orchestrator": 12458,
     "programs": 1116,
-    "analysis": 6751,
+    "analysis": 6998,
     "visualization": 3275,
     "api": 430,
-    "commands": 1366,
+    "commands": 1375,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.stability.hand_cases import Case, worst_case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
 from hapticlink.analysis.stability.modes import Bounds
@@ -117,7 +117,7 @@ class Stability:
             where = f"in {hands} and {in_poses}"
             return f"drifts slowly, and does not vibrate, {where}: {_name_case(worst)}"
         if self.verdict == "not held":
-            loose = max((c for c in self.cases if c.free), key=lambda c: c.severity)
+            loose = worst_case(c for c in self.cases if c.free)
             if loose.verdict != "unstable":
                 return f"not held: in free air it does not grow, nor come to rest; {calm}"
             does = "drifts" if loose.drifts else f"shows a growing {loose.kind}"
@@ -141,7 +141,7 @@ class Stability:
             )
         yield f"{'hand':28s} {'worst pose':24s} {'growth 1/s':>11s} {'Hz':>7s}  what"
         for hand in _hands(self.cases):
-            worst = max((c for c in self.cases if c.hand == hand.hand), key=lambda c: c.severity)
+            worst = worst_case(c for c in self.cases if c.hand == hand.hand)
             what = worst.kind if worst.verdict == "unstable" else worst.verdict
             yield (
                 f"{worst.hand:28s} {worst.pose:24s} {worst.growth:11.3g} {worst.hertz:7.3g}  {what}"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 
-from hapticlink.fmus.blocks import Starts, build_block
+from hapticlink.fmus.blocks import Starts, build_block, has_compiled
 from hapticlink.fmus.cache import remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.orchestrator.base import interrupt
@@ -21,6 +22,20 @@ from hapticlink.orchestrator.system.step_sizes import STEP_SIZE, sizes
 
 LOG = logging.getLogger(__name__)
 """Says, at level INFO, which block is begun to be built, or taken from the cache."""
+
+_prefer_compiled = False
+
+
+@contextmanager
+def prefer_compiled() -> Iterator[None]:
+    """Within the context blocks are native FMUs, which give the same bits as Python ones and take a
+    third of the time, where the cache has them."""
+    global _prefer_compiled
+    before, _prefer_compiled = _prefer_compiled, True
+    try:
+        yield
+    finally:
+        _prefer_compiled = before
 
 
 def fmu_files(
@@ -49,6 +64,9 @@ def fmu_files(
         LOG.info("building block %d of %d: %s", next(begun), len(every), block.name)
         given: Starts = {}
         experiment: dict[str, float] = {}
+        packaging = scene.packaging
+        if _prefer_compiled and not block.engine and has_compiled(block.block, block.settings):
+            packaging = "native"
         if starts is not None:
             steps = sizes(timeline.of[block.name], timeline)
             given = {
@@ -62,7 +80,7 @@ def fmu_files(
                 block.settings,
                 room / block.name,  # two hands are two files of one name
                 experiment=experiment,
-                packaging=scene.packaging,
+                packaging=packaging,
                 platforms=platforms,
                 fmi=fmi,
                 starts=given,

@@ -10,7 +10,7 @@ import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.frozen_nonlinearities import has_friction
-from hapticlink.analysis.stability.hand_cases import Case, InHands
+from hapticlink.analysis.stability.hand_cases import Case, InHands, worst_case
 from hapticlink.analysis.stability.hands import HANDS
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.modes import DRIFT
@@ -68,7 +68,7 @@ def predict_stepwise(
 
 
 def _verdict(cases: Sequence[Case], beside: str, so_far: bool = False) -> dict[str, str]:
-    worst = max(cases, key=lambda case: case.severity)
+    worst = worst_case(cases)
     verdict = "marginal" if worst.drifts else worst.verdict
     said = f"{_summary(worst)}{beside}{', so far' if so_far else ''}"
     if so_far and verdict != "unstable":  # what only the worst of all hands tells

@@ -7,6 +7,7 @@ import math
 import shlex
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
@@ -14,14 +15,13 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.analysis.stability import forward_sensitivity
-from hapticlink.analysis.stability.forward_sensitivity import ForwardSensitivity
-from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
+from hapticlink.analysis.stability import forward_sensitivity, judge_scene
+from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses, worst_case
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
 from hapticlink.analysis.stability.lifted_map import long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
-from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, improvements
+from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, _Search, improvements
 from hapticlink.analysis.stability.modes import DRIFT, kind, modes
 from hapticlink.analysis.stability.poses import (
     choose_evenly_spaced,
@@ -29,16 +29,30 @@ from hapticlink.analysis.stability.poses import (
     simulate_scene,
 )
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
 from hapticlink.analysis.stability.verdict_record import Stability
+from hapticlink.commands.progress import steps
 from hapticlink.components.specs.hand import ArmHand, SpringHand
+from hapticlink.fmus.blocks import build_block, has_compiled
+from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.scene import overrides
+from hapticlink.orchestrator.scene.blocks import blocks
+from hapticlink.orchestrator.system import fmu_files
 from tests.analysis.stability.own_hand import linearised
 
 POINT = (0.044493, 0.014823, -0.788148)
 FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5.0, 0.01]}
 SCENE = {"graphics.rate": 64, "hand": {**FIRM, "target": [[0.0, *POINT]]}}
 LEADING = 6
+COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
+    ("closed-loop-ideal", {}, (15, 89, 2118)),
+    ("closed-loop-ideal", {"hold": "foh"}, (15, 102, 4665)),
+    ("serial", {}, (27, 144, 1637)),
+    ("enclosure", {}, (14, 104, 1772)),
+    ("two-users", {}, (13, 161, 1958)),
+    ("closed-loop-direct", {}, (39, 345, 3846)),
+]
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +97,7 @@ def test_slopes_that_are_taken_over_stay_within_what_a_growth_rate_is_uncertain(
     poses = find_rest_poses(read, read.linkage)[:1]
     taken_over, _ = in_poses(read, poses, HANDS, DRIFT)
     monkeypatch.setattr(forward_sensitivity, "SAME", 1e-13)
-    monkeypatch.setattr(ForwardSensitivity, "_nodes", lambda *_: ())
+    monkeypatch.setattr(forward_sensitivity, "is_polynomial", lambda hold: False)
     anew, _ = in_poses(read, poses, HANDS, DRIFT)
     assert [case.growth for case in taken_over] == [
         pytest.approx(case.growth, abs=0.1 * case.uncertainty) for case in anew
@@ -170,9 +184,12 @@ def test_of_cases_that_differ_by_rounding_the_first_is_the_worst() -> None:
     def case(hand: str, growth: float) -> Case:
         return Case("0 s", hand, growth, 1e-4, 1.0, "oscillation", "stable", ())
 
+    for growth in (-0.5, -0.5000000005, 3.25, 0.0):  # the second is cut by rounding to 9 digits
+        for less in (-1e-14, 1e-14):
+            tie = [case("light touch", growth), case("firm grip", growth + less)]
+            assert worst_case(tie) is tie[0]
     tie = [case("light touch", -0.5), case("firm grip", -0.5 * (1 - 1e-14))]
-    assert max(tie, key=lambda case: case.severity) is tie[0]
-    assert max([*tie, case("stiff arm", -0.4999)], key=lambda case: case.severity) is not tie[0]
+    assert worst_case([*tie, case("stiff arm", -0.4999)]) is not tie[0]
 
 
 def test_a_margin_whose_search_ended_says_at_least() -> None:
@@ -191,6 +208,85 @@ def test_a_margin_whose_search_ended_says_at_least() -> None:
         "at least 15.6 ms of further delay (not searched further), "
         "graphics at least down to 8 Hz (not searched further)"
     )
+
+
+@pytest.mark.parametrize(("scene", "options", "expected"), COUNTS, ids=str)
+def test_a_verdict_takes_so_many_equilibria_slopes_and_products(
+    scene: str,
+    options: dict[str, Any],
+    expected: tuple[int, int, int],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As many on every machine, whatever numbers happen to repeat there."""
+    work = SharedWork()
+    monkeypatch.setattr(judge_scene, "SharedWork", lambda: work)
+    hl.stability(scene, options)
+    assert tuple(work.counts[of] for of in ("equilibria", "differentiated", "products")) == expected
+
+
+def test_poses_that_share_what_they_find_have_the_cases_of_each_alone() -> None:
+    read = hl.scene("closed-loop-ideal")
+    assert read.linkage is not None
+    poses = choose_evenly_spaced(simulate_scene(read, ("duration=1",)), read.linkage, 2)
+    shared, _ = in_poses(read, poses, HANDS, DRIFT)
+    alone = [case for pose in poses for case in in_poses(read, [pose], HANDS, DRIFT)[0]]
+    assert [case.pose for case in shared] == [case.pose for case in alone]
+    assert [case.growth for case in shared] == [
+        pytest.approx(case.growth, abs=0.1 * case.uncertainty) for case in alone
+    ]
+
+
+def test_native_fmus_that_are_there_give_the_verdict_of_python_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
+    wall = {"fmu.wall.start.stiffness": 4000.0}
+    python = hl.stability("virtual-wall", wall, poses=1)
+    built = blocks(hl.scene("virtual-wall", wall)).built
+    assert not any(has_compiled(block.block, block.settings) for block in built)
+    hl.run("virtual-wall", {**wall, "packaging": "native", "duration": 0.01}, out=tmp_path / "run")
+    assert all(has_compiled(block.block, block.settings) for block in built)
+    made: list[str] = []
+
+    def noted(name: str, *rest: Any, packaging: str, **others: Any) -> Path:
+        made.append(packaging)
+        return build_block(name, *rest, packaging=packaging, **others)
+
+    monkeypatch.setattr(fmu_files, "build_block", noted)
+    native = hl.stability("virtual-wall", wall, poses=1)
+    assert {*made} == {"native", "python"}  # the hand at a pose is another block
+    assert native.record() == python.record()
+
+
+def test_a_verdict_that_is_interrupted_says_what_was_done(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise Interrupted
+
+    monkeypatch.setattr(_Search, "_stable", interrupted)
+    said = r"interrupted \(margins at .* \(.* 1/s in .*\); \d of \d steps were done\)"
+    with pytest.raises(Interrupted, match=said), steps("stability", hidden=True) as tell:
+        hl.stability("virtual-wall", poses=1, progress=tell)
+
+
+def test_a_verdict_tells_what_is_judged_and_counts_its_steps() -> None:
+    told: list[tuple[str, int, int]] = []
+    found = hl.stability(
+        "virtual-wall",
+        {"fmu.wall.start.stiffness": 20000.0},
+        poses=1,
+        progress=lambda *step: told.append(step),
+    )
+    done = [k for _, k, _ in told]
+    assert done == sorted(done)
+    assert set(done) == set(range(done[-1] + 1))
+    assert all(k < of for _, k, of in told)
+    names = [what.partition(" (")[0] for what, *_ in told]
+    assert names[:2] == ["the scene's own run", "pose at 0 s"]
+    assert found.remedies
+    assert any(name.startswith("remedy ") and name.endswith("its own run") for name in names)
+    assert all(found.worst.hand in what for what, *_ in told if what.startswith("remedy"))
 
 
 def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
