@@ -8,7 +8,7 @@ A mode that only drifts counts as stable.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 
 from hapticlink.analysis.search.search import (
@@ -20,6 +20,7 @@ from hapticlink.analysis.search.search import (
 from hapticlink.analysis.search.settings import LAWS, REMEDIES, set_rate
 from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
+from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
@@ -32,7 +33,7 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
 
-FINE = 0.1
+FINE = 0.02
 """Of the logarithm of the factor on all stiffnesses."""
 LATEST, SLOWEST = 8, 64
 """Haptic periods up to which a further delay, and a frame, are tried."""
@@ -58,14 +59,19 @@ class Margin:
     """How far the worst pose is from the limit in all hands; None where it has no such quantity."""
 
     stiffness: float | None
-    """The factor on all stiffnesses, dampings by its root, up to which it is stable; 0 where it is
-    unstable with any."""
+    """The factor on all stiffnesses, dampings by its root, up to which it is stable, to FINE of its
+    logarithm; 0 where it is unstable with all that were tried."""
     delay: float | None
-    """The further delay (s) of all that the controller reads."""
+    """The further delay (s) of all that the controller reads, in whole haptic periods: with one
+    more it is unstable. None, too, where it is unstable with none."""
     rate: float | None
-    """The lowest graphics rate (Hz) down to which it is stable; infinite where it is with none."""
+    """The lowest graphics rate (Hz) down to which it is stable: with frames a haptic period longer
+    it is unstable. Infinite where it is with all that were tried."""
     not_searched_further: tuple[str, ...] = ()
     """The quantities that are stable as far as they were searched: at least these."""
+    alone: float = 0.0
+    """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
+    where it is no more than a drift."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +133,8 @@ class _Search:
         if place.gains.laws:
             found["stiffness"] = largest_scale(lambda s: self._stable(place, s), FINE)
         stable = ("stiffness" in found and found["stiffness"].value >= 1.0) or self._stable(place)
-        if CONTROLLER in place.map.system.fmu:
-            found["delay"] = Largest(0.0)
-            if stable:
-                found["delay"] = largest_count(lambda n: self._stable(place, late=n), 1, LATEST)
+        if CONTROLLER in place.map.system.fmu and stable:
+            found["delay"] = largest_count(lambda n: self._stable(place, late=n), 1, LATEST)
         if self._read.graphics is not None:
             found["rate"] = self._slowest_frame(stable)
         beyond = tuple(name for name, limit in found.items() if not limit.limited)
@@ -140,11 +144,23 @@ class _Search:
             delay=float(int(delay.value) / self._haptic) if delay else None,
             rate=self._frame_rate(int(frame.value)) if frame else None,
             not_searched_further=beyond,
+            alone=self._alone(place),
         )
 
+    def _alone(self, place: RestingScene) -> float:
+        with suppress(InputFault, FmuFault):  # no equilibrium with the scene's gains
+            return growth_alone(place.period({}), self._bounds)
+        return 0.0
+
     def _frame_rate(self, periods: int) -> float:
-        """The graphics rate (Hz) whose frames are so many haptic periods."""
-        return float(self._haptic / periods) if periods else float("inf")
+        """The graphics rate (Hz) whose frames are so many haptic periods; the scene's own rate for
+        its own frames, which need not be whole periods."""
+        if not periods:
+            return float("inf")
+        own = self._read.graphics.rate if self._read.graphics else None
+        if periods == frame_length(self._read) and isinstance(own, int | float | str):
+            return float(exact(own))
+        return float(self._haptic / periods)
 
     def _slowest_frame(self, stable: bool) -> Largest:
         """The longest frame, in haptic periods, that is stable, with all shorter ones that were
@@ -232,6 +248,7 @@ class _Search:
         )
         if growth.get(softer, 0.0) < 0.0 and softer not in (remedy.options for remedy in judged):
             judged.append(self._in_all(softer, visited))
+        judged = [remedy for remedy in judged if remedy.growth < float("inf")]
         every = sorted(
             judged, key=lambda r: (r.growth >= 0.0, bool(r.breaks), len(r.marginal), r.growth)
         )

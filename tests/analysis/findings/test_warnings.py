@@ -20,6 +20,7 @@ from tests.little_fmus import entries, slave
         (4e-4, 2e-4, "generated at most 0.4 mJ, and by the end has generated 0.2 mJ"),
         (4e-4, 4e-4, "generated 0.4 mJ by the end, and at no time more"),
         (0.0, -2e-4, "generated no energy and dissipated 0.2 mJ"),
+        (3e-17, -2.69e-2, "generated no energy and dissipated 26.9 mJ"),
         (0.0, 0.0, "generated no energy"),
     ],
 )

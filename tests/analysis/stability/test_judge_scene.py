@@ -175,22 +175,35 @@ def test_of_cases_that_differ_by_rounding_the_first_is_the_worst() -> None:
     assert max([*tie, case("stiff arm", -0.4999)], key=lambda case: case.severity) is not tie[0]
 
 
-def test_a_margin_whose_search_ended_says_at_least() -> None:
-    ends = ("stiffness", "delay", "rate")
-    none = Margin(0.0, 0.0, math.inf)
-    some, most = Margin(8.7, 0.00195, 15.06), Margin(1024.0, 0.015625, 8.0, ends)
-    told = {
-        margin: ", ".join(Stability._margins(Mock(margin=margin))) for margin in (none, some, most)
-    }
-    assert told[none] == (
-        "unstable with any stiffness, less than a haptic period of further delay, no graphics rate"
-    )
-    assert told[some] == "stiffnesses times 8.7, 1.95 ms of further delay, graphics down to 15.1 Hz"
-    assert told[most] == (
-        "stiffnesses at least times 1e+03 (not searched further), "
-        "at least 15.6 ms of further delay (not searched further), "
-        "graphics at least down to 8 Hz (not searched further)"
-    )
+@pytest.mark.parametrize(
+    ("margin", "told"),
+    [
+        (
+            Margin(0.0, None, math.inf),
+            "unstable with stiffnesses down to times 0.001, unstable at each graphics rate tried",
+        ),
+        (
+            Margin(1.29, 0.0, 30.0),
+            "stiffnesses times 1.2, less than a haptic period of further delay, graphics down to "
+            "30 Hz",
+        ),
+        (
+            Margin(8.77, 0.001953125, 512 / 35),
+            "stiffnesses times 8.7, 1.95 ms of further delay, graphics down to 14.7 Hz",
+        ),
+        (
+            Margin(1024.0, 0.015625, 8.0, ("stiffness", "delay", "rate")),
+            "stiffnesses at least times 1000 (not searched further), "
+            "at least 15.6 ms of further delay (not searched further), "
+            "graphics at least down to 8 Hz (not searched further)",
+        ),
+    ],
+)
+def test_a_margin_is_told_on_its_safe_side_and_as_far_as_it_was_searched(
+    margin: Margin, told: str
+) -> None:
+    """512/35 = 14.63: at 14.6 Hz it is unstable."""
+    assert ", ".join(Stability._margins(Mock(margin=margin))) == told
 
 
 def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
