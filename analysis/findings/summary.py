@@ -478,13 +478,21 @@ def _start_apart(results: Results) -> Iterator[str]:
             )
     hand = results.record.scene["hand"] or {}
     if handle and hand.get("target") and hand["stiffness"][2] and len(handle["time"]):
-        angle, start = float(hand["target"][0][3]), float(handle[HANDLE_POSE][0][2])
+        angle, start = _first_angle(hand["target"]), float(handle[HANDLE_POSE][0][2])
         if turns := round((angle - start) / math.tau):
             away = "a whole turn" if abs(turns) == 1 else f"{abs(turns)} whole turns"
             yield (
                 f"warning: hand.target begins {away} from the handle's angle, {short(start)} rad, "
                 f"and pulls it there: {short(angle - math.tau * turns)} rad is the same direction"
             )
+
+
+def _first_angle(target: Any) -> float:
+    """The angle (rad) with which a target of a hand, rows or a sine, begins."""
+    if isinstance(target, Mapping):
+        mean, amplitude, phase = (float(target[key][2]) for key in ("mean", "amplitude", "phase"))
+        return mean + amplitude * math.sin(phase)
+    return float(target[0][3])
 
 
 def describe_assembly(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:

@@ -142,7 +142,7 @@ class _Search:
         return Margin(
             stiffness=stiffness.value if stiffness else None,
             delay=float(int(delay.value) / self._haptic) if delay else None,
-            rate=self._frame_rate(int(frame.value)) if frame else None,
+            rate=self._frame_rate(int(frame.value), stable) if frame else None,
             not_searched_further=beyond,
             alone=self._alone(place),
         )
@@ -152,25 +152,25 @@ class _Search:
             return growth_alone(place.period({}), self._bounds)
         return 0.0
 
-    def _frame_rate(self, periods: int) -> float:
-        """The graphics rate (Hz) whose frames are so many haptic periods; the scene's own rate for
-        its own frames, which need not be whole periods."""
+    def _frame_rate(self, periods: int, stable: bool) -> float:
+        """The graphics rate (Hz) whose frames are so many haptic periods; of the scene's own frames
+        its own rate, where that is stable: it need not be a whole number of periods."""
         if not periods:
             return float("inf")
         own = self._read.graphics.rate if self._read.graphics else None
-        if periods == frame_length(self._read) and isinstance(own, int | float | str):
+        if stable and periods == frame_length(self._read) and isinstance(own, int | float | str):
             return float(exact(own))
         return float(self._haptic / periods)
 
     def _slowest_frame(self, stable: bool) -> Largest:
-        """The longest frame, in haptic periods, that is stable, with all shorter ones that were
-        tried, from the scene's own on, at which it is `stable` or not."""
+        """The longest frame, in haptic periods, that is stable, searched from the scene's own on,
+        with which it is `stable` or not where it is not rounded."""
         own = frame_length(self._read)
 
         def holds(n: int) -> bool:
-            return (
-                stable if n == own else self._growth([set_rate("graphics", self._haptic / n)]) < 0.0
-            )
+            if n == own and stable:
+                return True
+            return self._growth([set_rate("graphics", self._haptic / n)]) < 0.0
 
         return largest_count(holds, own, SLOWEST)
 
