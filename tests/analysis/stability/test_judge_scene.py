@@ -246,6 +246,14 @@ def test_a_run_that_fails_is_said_first() -> None:
     assert next(calm.lines()).startswith("hand ")
 
 
+def test_a_run_without_a_pose_is_refused_with_its_own_fault() -> None:
+    """A start pose that the device does not reach: what is said of it is not that it was not
+    recorded."""
+    far = {"linkage.operational_point.at": [3.0, 0.0]}
+    with pytest.raises(hl.InputFault, match="own run fails before its first pose: .*outside the"):
+        hl.stability("closed-loop-ideal", far, poses=1)
+
+
 def test_what_cannot_be_held_is_refused() -> None:
     with pytest.raises(hl.InputFault, match="--equilibrium"):
         hl.stability("closed-loop-ideal", {"graphics.rate": {"min": 20, "max": 60, "seed": 1}})
