@@ -65,8 +65,8 @@ class Margin:
     """The further delay (s) of all that the controller reads, in whole haptic periods: with one
     more it is unstable. None, too, where it is unstable with none."""
     rate: float | None
-    """The lowest graphics rate (Hz) down to which it is stable: with frames a haptic period longer
-    it is unstable. Infinite where it is with all that were tried."""
+    """The lowest graphics rate (Hz) down to which it is stable with frames of whole haptic periods:
+    with frames a period longer it is unstable. Infinite where it is with all that were tried."""
     not_searched_further: tuple[str, ...] = ()
     """The quantities that are stable as far as they were searched: at least these."""
     alone: float = 0.0
@@ -218,6 +218,8 @@ class _Search:
         if read.graphics is not None:
             assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
             rate = exact(read.graphics.rate)
+            if (whole := self._haptic / frame_length(read)) != rate:
+                yield (set_rate("graphics", whole),)
             if margin.rate is not None and margin.rate > rate:
                 rate = self._haptic / max(1, round(self._haptic / margin.rate))
             for factor in (1, *FASTER):

@@ -191,7 +191,8 @@ class Stability:
             some = told("delay", "", f"{_within(1e3 * margin.delay, 3)} ms of further delay")
             yield some if margin.delay else "less than a haptic period of further delay"
         if margin.rate is not None:
-            some = told("rate", "graphics ", f"down to {-float(_within(-margin.rate, 3)):g} Hz")
+            down = f"down to {-float(_within(-margin.rate, 3)):g} Hz in whole haptic periods"
+            some = told("rate", "graphics ", down)
             yield some if math.isfinite(margin.rate) else "unstable at each graphics rate tried"
         if margin.stiffness is None and margin.delay is None and margin.rate is None:
             yield "no coupling and no second rate"

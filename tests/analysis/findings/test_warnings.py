@@ -82,6 +82,7 @@ def test_turns_that_cost_the_rate_are_told(
 SPRING = {"type": "spring", "stiffness": [10, 10, 0.1], "damping": [1, 1, 0.01]}
 AT_START = [0.0, 0.0445, 0.0148]
 FREEZE = {"freeze": ["controller.F_hand"], "time": 0.3}
+SINE = {"amplitude": [1e-4, 0.0, 0.0], "frequency": [2.0, 2.0, 2.0]}
 NOWHERE = [
     ({"hold": "foh", "graphics.rate": 512}, "acts on no connection: there is no connection from a"),
     ({"hold": "foh", "holds.controller.Lambda_inv": "zoh", "holds.controller.P_c": "zoh"}, "have"),
@@ -93,11 +94,13 @@ NOWHERE = [
     ),
     ({"hand": {**SPRING, "target": [[*AT_START, 5.5]]}}, "a whole turn from the handle's angle"),
     ({"hand": {**SPRING, "target": [[*AT_START, -13.35]]}}, "2 whole turns from the handle's"),
+    ({"hand": {**SPRING, "target": SINE | {"mean": [*AT_START[1:], 5.5]}}}, "a whole turn from"),
 ]
 SOMEWHERE = [
     {"hold": "foh"},
     {"at": [{**FREEZE, "until": 0.301}]},
     {"hand": {**SPRING, "target": [[*AT_START, -0.8]]}},
+    {"hand": {**SPRING, "target": SINE | {"mean": [*AT_START[1:], -0.8]}}},
     {"hand": {**SPRING, "stiffness": [10, 10, 0], "target": [[*AT_START, 5.5]]}},
 ]
 SAID = "acts on no|turn.* from the handle"
