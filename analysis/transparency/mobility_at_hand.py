@@ -148,8 +148,9 @@ class Transparency:
             grows = f"a {case.kind} of {short(case.hertz)} Hz grows at {short(case.growth)} 1/s"
             yield f"  unstable {where}: {grows}"
         if self.growing:
-            steady = f"what follows is felt in a hand that keeps it steady: {', '.join(self.steady_in)}"
-            yield f"  {steady if self.steady_in else 'no hand that was tried feels it steadily'}"
+            hands = ", ".join(self.steady_in)
+            steady = f"what follows is felt in a hand that keeps it steady: {hands}"
+            yield f"  {steady if hands else 'no hand that was tried feels it steadily'}"
 
     def record(self) -> dict[str, Any]:
         """The part of transparency.json on this pose."""
@@ -266,8 +267,8 @@ class ChangeCost:
         """The row of a table, without the change."""
         kg = ", ".join(short(float(at_slow(d.felt).real)) for d in self.felt.free)
         if self.felt.growing:
-            some = f"{kg}; unstable {'when let go' if self.felt.growing[0].free else 'in some hands'}"
-            kg = some if self.felt.steady_in else "unstable in all hands"
+            where = "when let go" if self.felt.growing[0].free else "in some hands"
+            kg = f"{kg}; unstable {where}" if self.felt.steady_in else "unstable in all hands"
         stiff, most = (_stiffness(f) if f else "-" for f in (self.felt, self.stiffest))
         times = f"{short(self.times)} times" if self.times else "-"
         width = _width(self.felt.width) if self.felt.constrained else "-"

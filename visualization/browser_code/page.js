@@ -68,7 +68,7 @@ const HANDLERS = {
     else note_address();
   },
   state(message) {
-    if (message.ended && !view.state.ended) ending.show(message.ended);
+    if (message.ended && !view.state.ended) ending.show(message.ended, shown?.b && (message.b ? "B" : "A"));
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));

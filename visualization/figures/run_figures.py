@@ -311,7 +311,8 @@ def _port(results: Results, port: UserPort) -> Figure:
     peak, at = measured.peak, int(np.argmax(port.generated_J))
     title = f"The rendering {summary.describe_generated(peak, measured.generated)}"
     if peak > summary.ROUNDING_J:
-        title = f"The rendering generated at most {short(1e3 * peak)} mJ, at {port.time_s[at]:.3g} s"
+        most = f"{short(1e3 * peak)} mJ, at {port.time_s[at]:.3g} s"
+        title = f"The rendering generated at most {most}"
         if put_in := float(port.put_in_J[at]):
             title += f", where the hand had put in {short(1e3 * put_in)} mJ"
     if peak > summary.ROUNDING_J and port.blocks_J:

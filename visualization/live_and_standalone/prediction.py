@@ -42,8 +42,8 @@ Parameters = Mapping[str, Sequence[float]]
 
 
 def predict_stability(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
-    """`verdict` ("" where there is none), that in the hand of the `mouse` alone, `said`, which is its
-    one line on the page, and `why`, its tooltip."""
+    """`verdict` ("" where there is none), that in the hand of the `mouse` alone, `said`, which is
+    its one line on the page, and `why`, its tooltip."""
     *_, last = predict_stepwise(scene, settings, parameters)
     return last
 

@@ -160,8 +160,8 @@ def test_a_loop_that_is_unstable_says_so_before_its_numbers() -> None:
 
 
 def test_what_is_felt_is_that_of_runs_in_the_hands_that_keep_it_steady() -> None:
-    """With frames of 17 haptic periods a firm grip shakes closed-loop-direct, and a light touch does
-    not: shaken by .1 mm at 2 Hz the latter has the compliance within 1 %."""
+    """With frames of 17 haptic periods a firm grip shakes closed-loop-direct, and a light touch
+    does not: shaken by .1 mm at 2 Hz the latter has the compliance within 1 %."""
     options: dict[str, Any] = {"graphics.rate": "512/17"}
     found = transparency.transparency("closed-loop-direct", write_options(options), count=1)[0]
     assert [case.hand for case in found.growing] == ["firm grip"]

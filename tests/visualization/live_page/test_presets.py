@@ -177,6 +177,20 @@ def test_what_a_run_ended_with_goes_at_a_press_and_is_read_meanwhile(
     assert javascript("ending.js", f"{statements}{press}{end}", None) == left
 
 
+@pytest.mark.parametrize(
+    ("run", "said"), [("B", "B diverged at 1.00 s"), ("null", "Diverged at 1.00 s")]
+)
+def test_the_line_names_the_run_that_diverged(run: str, said: str) -> None:
+    statements = """
+      globalThis.document = { createElement: () => ({}) };
+      const host = { replaceChildren(word) { answer = word.textContent; } };
+      const ending = new Ending(host, () => {});
+      ending.add({ t: 1 });
+    """
+    named = f"ending.show('the run has diverged', {run if run == 'null' else repr(run)});"
+    assert javascript("ending.js", statements + named + "clearTimeout(ending.later);", None) == said
+
+
 def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(
     served: Served, window: Callable[..., Page]
 ) -> None:
