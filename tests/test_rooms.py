@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5735,
+    "components": 5737,
     "fmus": 2785,
-    "orchestrator": 12366,
+    "orchestrator": 12370,
     "programs": 1116,
-    "analysis": 6724,
-    "visualization": 3271,
+    "analysis": 6807,
+    "visualization": 3281,
     "api": 402,
     "commands": 1350,
 }

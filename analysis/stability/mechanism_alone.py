@@ -30,13 +30,11 @@ def growth_alone(period: LinearPeriod, bounds: Bounds) -> float:
     if not (state and steps):
         return 0.0
     step, index = steps[0], {row: i for i, row in enumerate(state)}
+    into, of = ([i for i, r in enumerate(rows) if r in index] for rows in (step.into, step.of))
+    written, read = ([index[r] for r in rows] for rows in (step.into[into], step.of[of]))
     A = np.eye(len(state))
-    for i, row in enumerate(step.into):
-        if (into := index.get(int(row))) is not None:
-            A[into] = 0.0
-            for j, of in enumerate(step.of):
-                if (column := index.get(int(of))) is not None:
-                    A[into, column] = step.J[i, j]
+    A[written] = 0.0
+    A[np.ix_(written, read)] = step.J[np.ix_(into, of)]
     H = period.map_.period / period.map_.count(Step, MECHANISM)
     s = np.log(np.linalg.eigvals(A).astype(complex) + 1e-300) / H
     felt = (
