@@ -36,8 +36,8 @@ CODE_LINES = {
     "fmus": 2808,
     "orchestrator": 12458,
     "programs": 1116,
-    "analysis": 6998,
-    "visualization": 3275,
+    "analysis": 7077,
+    "visualization": 3283,
     "api": 430,
     "commands": 1375,
 }

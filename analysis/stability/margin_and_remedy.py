@@ -8,7 +8,7 @@ A mode that only drifts counts as stable.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 
 from hapticlink.analysis.search.search import (
@@ -20,6 +20,7 @@ from hapticlink.analysis.search.search import (
 from hapticlink.analysis.search.settings import LAWS, REMEDIES, set_rate
 from hapticlink.analysis.stability.hand_cases import Case, InHands, first_of_largest, in_poses
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
+from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
@@ -34,7 +35,7 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
 
-FINE = 0.1
+FINE = 0.02
 """Of the logarithm of the factor on all stiffnesses."""
 LATEST, SLOWEST = 8, 64
 """Haptic periods up to which a further delay, and a frame, are tried."""
@@ -61,14 +62,19 @@ class Margin:
     """How far the worst pose is from the limit in all hands; None where it has no such quantity."""
 
     stiffness: float | None
-    """The factor on all stiffnesses, dampings by its root, up to which it is stable; 0 where it is
-    unstable with any."""
+    """The factor on all stiffnesses, dampings by its root, up to which it is stable, to FINE of its
+    logarithm; 0 where it is unstable with all that were tried."""
     delay: float | None
-    """The further delay (s) of all that the controller reads."""
+    """The further delay (s) of all that the controller reads, in whole haptic periods: with one
+    more it is unstable. None, too, where it is unstable with none."""
     rate: float | None
-    """The lowest graphics rate (Hz) down to which it is stable; infinite where it is with none."""
+    """The lowest graphics rate (Hz) down to which it is stable with frames of whole haptic periods:
+    with frames a period longer it is unstable. Infinite where it is with all that were tried."""
     not_searched_further: tuple[str, ...] = ()
     """The quantities that are stable as far as they were searched: at least these."""
+    alone: float = 0.0
+    """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
+    where it is no more than a drift."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +146,6 @@ class _Search:
         stable = ("stiffness" in found and found["stiffness"].value >= 1.0) or self._stable(place)
         if CONTROLLER in place.map.system.fmu:
             self._steps.begin("margin of delay")
-            found["delay"] = Largest(0.0)
             if stable:
                 found["delay"] = largest_count(lambda n: self._stable(place, late=n), 1, LATEST)
         if self._read.graphics is not None:
@@ -151,23 +156,35 @@ class _Search:
         return Margin(
             stiffness=stiffness.value if stiffness else None,
             delay=float(int(delay.value) / self._haptic) if delay else None,
-            rate=self._frame_rate(int(frame.value)) if frame else None,
+            rate=self._frame_rate(int(frame.value), stable) if frame else None,
             not_searched_further=beyond,
+            alone=self._alone(place),
         )
 
-    def _frame_rate(self, periods: int) -> float:
-        """The graphics rate (Hz) whose frames are so many haptic periods."""
-        return float(self._haptic / periods) if periods else float("inf")
+    def _alone(self, place: RestingScene) -> float:
+        with suppress(InputFault, FmuFault):  # no equilibrium with the scene's gains
+            return growth_alone(place.period({}), self._bounds)
+        return 0.0
+
+    def _frame_rate(self, periods: int, stable: bool) -> float:
+        """The graphics rate (Hz) whose frames are so many haptic periods; of the scene's own frames
+        its own rate, where that is stable: it need not be a whole number of periods."""
+        if not periods:
+            return float("inf")
+        own = self._read.graphics.rate if self._read.graphics else None
+        if stable and periods == frame_length(self._read) and isinstance(own, int | float | str):
+            return float(exact(own))
+        return float(self._haptic / periods)
 
     def _slowest_frame(self, stable: bool) -> Largest:
-        """The longest frame, in haptic periods, that is stable, with all shorter ones that were
-        tried, from the scene's own on, at which it is `stable` or not."""
+        """The longest frame, in haptic periods, that is stable, searched from the scene's own on,
+        with which it is `stable` or not where it is not rounded."""
         own = frame_length(self._read)
 
         def holds(n: int) -> bool:
-            if n == own:
-                return stable
-            self._steps.tell(f"margin of the graphics rate: {self._frame_rate(n):.3g} Hz")
+            if n == own and stable:
+                return True
+            self._steps.tell(f"margin of the graphics rate: {self._frame_rate(n, stable):.3g} Hz")
             return self._growth([set_rate("graphics", self._haptic / n)]) < 0.0
 
         return largest_count(holds, own, SLOWEST)
@@ -223,6 +240,8 @@ class _Search:
         if read.graphics is not None:
             assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
             rate = exact(read.graphics.rate)
+            if (whole := self._haptic / frame_length(read)) != rate:
+                yield (set_rate("graphics", whole),)
             if margin.rate is not None and margin.rate > rate:
                 rate = self._haptic / max(1, round(self._haptic / margin.rate))
             for factor in (1, *FASTER):
@@ -260,6 +279,7 @@ class _Search:
         )
         if growth.get(softer, 0.0) < 0.0 and softer not in (remedy.options for remedy in judged):
             judged.append(self._in_all(softer, softer, visited))
+        judged = [remedy for remedy in judged if remedy.growth < float("inf")]
         every = sorted(
             judged, key=lambda r: (r.growth >= 0.0, bool(r.breaks), len(r.marginal), r.growth)
         )

@@ -238,11 +238,11 @@ def _average(run: Results, linkage: Linkage, since: float) -> Pose:
 
 def _read_poses(run: Results) -> Table:
     table = table_of(run, POINT_POSE)
-    if table is None or JOINT_COORDINATES not in table or not len(table["time"]):
-        raise InputFault(
-            f"{POINT_POSE} and {JOINT_COORDINATES} are not recorded: no poses of a run"
-        )
-    return table
+    if table is not None and JOINT_COORDINATES in table and len(table["time"]):
+        return table
+    if fault := fault_of(run):
+        raise InputFault(f"the scene's own run fails before its first pose: {fault}")
+    raise InputFault(f"{POINT_POSE} and {JOINT_COORDINATES} are not recorded: no poses of a run")
 
 
 def _force(table: Table) -> Matrix:

@@ -43,8 +43,8 @@ Parameters = Mapping[str, Sequence[float]]
 
 
 def predict_stability(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
-    """`verdict` ("" where there is none), `said`, which is its one line on the page, and `why`, its
-    tooltip."""
+    """`verdict` ("" where there is none), that in the hand of the `mouse` alone, `said`, which is
+    its one line on the page, and `why`, its tooltip."""
     *_, last = predict_stepwise(scene, settings, parameters)
     return last
 
@@ -70,14 +70,16 @@ def predict_stepwise(
 def _verdict(cases: Sequence[Case], beside: str, so_far: bool = False) -> dict[str, str]:
     worst = worst_case(cases)
     verdict = "marginal" if worst.drifts else worst.verdict
-    said = f"{_summary(worst)}{beside}{', so far' if so_far else ''}"
+    mouse = next(case for case in cases if case.hand == MOUSE)
+    calm = "; stable in the mouse's hand" if mouse.verdict == "stable" != worst.verdict else ""
+    said = f"{_summary(worst)}{calm}{beside}{', so far' if so_far else ''}"
     if so_far and verdict != "unstable":  # what only the worst of all hands tells
         verdict = ""
     lines = (
         f"{case.hand}: {case.verdict}, growth rate {case.growth:.4g} 1/s, {case.hertz:.3g} Hz"
         for case in cases
     )
-    return {"verdict": verdict, "said": said, "why": "\n".join(lines)}
+    return {"verdict": verdict, "mouse": mouse.verdict, "said": said, "why": "\n".join(lines)}
 
 
 def judge_hands(

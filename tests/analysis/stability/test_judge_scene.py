@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 from unittest.mock import Mock
 
 import numpy as np
@@ -22,8 +22,10 @@ from hapticlink.analysis.stability.hands import HANDS, OWN, free
 from hapticlink.analysis.stability.lifted_map import long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, _Search, improvements
+from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import DRIFT, kind, modes
 from hapticlink.analysis.stability.poses import (
+    at_pose,
     choose_evenly_spaced,
     find_rest_poses,
     simulate_scene,
@@ -39,6 +41,7 @@ from hapticlink.orchestrator.base.errors import Interrupted
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system import fmu_files
+from hapticlink.orchestrator.system.build_system import build_system
 from tests.analysis.stability.own_hand import linearised
 
 POINT = (0.044493, 0.014823, -0.788148)
@@ -192,22 +195,127 @@ def test_of_cases_that_differ_by_rounding_the_first_is_the_worst() -> None:
     assert worst_case([*tie, case("stiff arm", -0.4999)]) is not tie[0]
 
 
-def test_a_margin_whose_search_ended_says_at_least() -> None:
-    ends = ("stiffness", "delay", "rate")
-    none = Margin(0.0, 0.0, math.inf)
-    some, most = Margin(8.7, 0.00195, 15.06), Margin(1024.0, 0.015625, 8.0, ends)
-    told = {
-        margin: ", ".join(Stability._margins(Mock(margin=margin))) for margin in (none, some, most)
-    }
-    assert told[none] == (
-        "unstable with any stiffness, less than a haptic period of further delay, no graphics rate"
-    )
-    assert told[some] == "stiffnesses times 8.7, 1.95 ms of further delay, graphics down to 15.1 Hz"
-    assert told[most] == (
-        "stiffnesses at least times 1e+03 (not searched further), "
-        "at least 15.6 ms of further delay (not searched further), "
-        "graphics at least down to 8 Hz (not searched further)"
-    )
+@pytest.mark.parametrize(
+    ("margin", "told"),
+    [
+        (
+            Margin(0.0, None, math.inf),
+            "unstable with stiffnesses down to times 0.001, unstable at each graphics rate tried",
+        ),
+        (
+            Margin(1.29, 0.0, 30.0),
+            "stiffnesses times 1.2, less than a haptic period of further delay, graphics down to "
+            "30 Hz in whole haptic periods",
+        ),
+        (
+            Margin(8.77, 0.001953125, 512 / 35),
+            "stiffnesses times 8.7, 1.95 ms of further delay, graphics down to 14.7 Hz in "
+            "whole haptic periods",
+        ),
+        (
+            Margin(1024.0, 0.015625, 8.0, ("stiffness", "delay", "rate")),
+            "stiffnesses at least times 1000 (not searched further), "
+            "at least 15.6 ms of further delay (not searched further), "
+            "graphics at least down to 8 Hz in whole haptic periods (not searched further)",
+        ),
+    ],
+)
+def test_a_margin_is_told_on_its_safe_side_and_as_far_as_it_was_searched(
+    margin: Margin, told: str
+) -> None:
+    """512/35 = 14.63: at 14.6 Hz it is unstable."""
+    assert ", ".join(Stability._margins(Mock(margin=margin))) == told
+
+
+SLIDER = """
+title = "Slider"
+duration = 0.1
+
+[linkage]
+operational_point.body = "car"
+
+[[linkage.body]]
+name = "car"
+mass = 0.6
+inertia = 1e-4
+
+[[linkage.joint]]
+name = "rail"
+type = "prismatic"
+axis = 0.0
+child = "car"
+damping = 0.5
+
+[graphics]
+rate = 64
+
+[device]
+
+[controller.teleoperation]
+stiffness = [100.0, 100.0, 0.1]
+damping = [12.0, 12.0, 0.012]
+
+[hand]
+type = "spring"
+stiffness = [200.0, 200.0, 1.0]
+damping = [5.0, 5.0, 0.02]
+"""
+
+
+@pytest.fixture
+def slider(tmp_path: Path) -> hl.Scene:
+    """A scene of nobody else, with its mechanism at the graphics rate."""
+    path = tmp_path / "slider.toml"
+    path.write_text(SLIDER)
+    return hl.scene(path, {"mechanism_at": "graphics"})
+
+
+def test_inside_of_each_margin_a_changed_scene_is_stable_and_outside_unstable(
+    slider: hl.Scene,
+) -> None:
+    """By another road than the search: gains, delays and rates as keys of the scene."""
+    poses = choose_evenly_spaced(simulate_scene(slider), slider.linkage, 1)
+    hands = {"firm grip": HANDS["firm grip"]}
+
+    def stable(change: dict[str, Any]) -> bool:
+        cases, without = in_poses(hl.scene(slider, change), poses, hands, DRIFT)
+        assert not without
+        return cases[0].verdict == "stable"
+
+    (case,), _ = in_poses(slider, poses, hands, DRIFT)
+    margin, _ = improvements(slider, poses, hands, DRIFT, case, lambda _: (poses, ""))
+    assert "rate" not in margin.not_searched_further
+    assert margin.stiffness
+    assert margin.delay is not None
+    assert margin.rate
+    T, frame = 1 / 512, round(512 / margin.rate)
+    late = round(margin.delay / T)
+    with build_system(slider) as system:
+        into = [c.name for c in system.into("controller")]
+
+    def gains(s: float) -> dict[str, Any]:
+        stiffness, damping = np.array([100.0, 100.0, 0.1]), np.array([12.0, 12.0, 0.012])
+        law = "controller.teleoperation"
+        topology = {
+            "controller.topology.stiffness": 200.0 * s,
+            "controller.topology.damping": 50.0 * s**0.5,
+        }
+        return topology | {
+            f"{law}.stiffness": (s * stiffness).tolist(),
+            f"{law}.damping": (s**0.5 * damping).tolist(),
+        }
+
+    def delayed(periods: int) -> dict[str, Any]:
+        return {"delays": {name: periods * T for name in into}}
+
+    inside = [delayed(late), gains(margin.stiffness), {"graphics.rate": f"512/{frame}"}]
+    outside = [
+        delayed(late + 1),
+        gains(1.03 * margin.stiffness),
+        {"graphics.rate": f"512/{frame + 1}"},
+    ]
+    assert all(map(stable, inside))
+    assert not any(map(stable, outside))
 
 
 @pytest.mark.parametrize(("scene", "options", "expected"), COUNTS, ids=str)
@@ -317,6 +425,35 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     assert len(found.cases) >= len(HANDS)
 
 
+def test_a_mechanism_that_falls_over_is_said_to_do_so_by_itself(slider: hl.Scene) -> None:
+    """A rod on its end, with friction b in its pivot: J s^2 + b s - m g c = 0. The car on its rail
+    is at rest anywhere. No remedy ends the fall in an arm that is softer than m g c/l^2."""
+    m, c, J, b = 0.8, 0.04, 1e-3 + 0.8 * 0.04**2, 0.002
+    rod = {
+        "gravity": [0.0, -9.81],
+        "operational_point": {"body": "rod", "at": [0.05, 0.0]},
+        "start": {"pivot": math.pi / 2},
+        "body": [{"name": "rod", "mass": m, "inertia": 1e-3, "center": [c, 0.0]}],
+        "joint": [{"name": "pivot", "child": "rod", "damping": b}],
+    }
+    falls = hl.scene(slider, {"mechanism_at": "haptics", "linkage": rod, "controller.bias": "full"})
+    hands = {"arm at rest, soft grip": HANDS["arm at rest, soft grip"]}
+    poses = choose_evenly_spaced(simulate_scene(falls), falls.linkage, 1)
+    (case,), _ = in_poses(falls, poses, hands, DRIFT)
+    assert case.verdict == "unstable"
+
+    def fails(changed: hl.Scene) -> NoReturn:
+        raise hl.InputFault("its run fails")
+
+    margin, remedies = improvements(falls, poses, hands, DRIFT, case, fails)
+    s = max(np.roots([J, b, -m * 9.81 * c]).real)
+    assert margin.alone == pytest.approx(s, rel=1e-3)
+    assert remedies == ()  # those whose run fails are none
+    poses = choose_evenly_spaced(simulate_scene(slider), slider.linkage, 1)
+    with at_pose(slider, poses[0]) as (place, _):
+        assert growth_alone(place.period({}), DRIFT) == 0.0
+
+
 def test_a_run_that_fails_is_said_first() -> None:
     """A spring of 1e7 N/m on 1 kg, sampled at 20 Hz, throws it off; at 512 Hz it swings."""
     found = hl.stability("sampled-spring", {"hand.stiffness": [1e7, 0.0, 0.0]}, poses=1)
@@ -328,6 +465,14 @@ def test_a_run_that_fails_is_said_first() -> None:
     assert calm.record()["run_fault"] is None
     assert "fails" not in calm.finding
     assert next(calm.lines()).startswith("hand ")
+
+
+def test_a_run_without_a_pose_is_refused_with_its_own_fault() -> None:
+    """A start pose that the device does not reach: what is said of it is not that it was not
+    recorded."""
+    far = {"linkage.operational_point.at": [3.0, 0.0]}
+    with pytest.raises(hl.InputFault, match=r"own run fails before its first pose: .*outside the"):
+        hl.stability("closed-loop-ideal", far, poses=1)
 
 
 def test_what_cannot_be_held_is_refused() -> None:
