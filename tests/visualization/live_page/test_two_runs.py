@@ -75,6 +75,9 @@ def test_which_of_both_runs_has_diverged_is_said(served: Served) -> None:
         found = window.until(lambda new: new.get("state", {}).get("ended"))
         assert found["state"]["b"]
         assert "diverged" in found["state"]["ended"]
+        window.send(type="hand", at=None, user="")
+        window.send(type="compare", on=False)
+        window.until(lambda new: not second_runs(served) and new["scene"].get("runs") == 1)
 
 
 def test_a_second_run_that_dies_ends_the_comparison(served: Served) -> None:
