@@ -126,6 +126,12 @@ def source(module: str) -> str:
     return hashlib.sha256(Path(file).read_bytes() if file else os.urandom(32)).hexdigest()
 
 
+def find(key_material: Mapping[str, Any]) -> Path | None:
+    """The cached FMU for `key_material`, if there is one that is whole."""
+    root = folder()
+    return root and _whole_file(root / key(key_material))
+
+
 def get_or_build(
     key_material: Mapping[str, Any],
     build_function: Callable[[Path], Path],

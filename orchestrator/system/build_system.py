@@ -8,13 +8,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import describe_once
-from hapticlink.orchestrator.scene.blocks import Blocks, blocks
+from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks, blocks
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
@@ -54,11 +55,18 @@ def build_system(scene: Scene, starts: Mapping[str, Starts] | None = None) -> It
         planned = blocks(scene)
         time = timeline(scene, planned)
         files = fmu_files(scene, planned, time, room, starts=starts)
-        yield _assemble(scene, planned, time, files)
+        yield _assemble(scene, planned, time, files, exported=starts is not None)
 
 
-def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str, Path]) -> System:
-    """The system of `scene`; `files` are the FMU files of its blocks, by name.
+def _assemble(
+    scene: Scene,
+    planned: Blocks,
+    time: Timeline,
+    files: Mapping[str, Path],
+    exported: bool,
+) -> System:
+    """The system of `scene`; `files` are the FMU files of its blocks, by name, which already start
+    as in the scene where they are `exported`.
 
     Raises SceneFault with every finding: FMUs that cannot be read or used, connections and holds
     that do not fit, and, if all FMUs can be read, names in the scene that they do not have.
@@ -67,6 +75,8 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
     replaced, rows = replacements.find_replaced_blocks(planned.replaced), haptic_loop.rows(scene)
     of, order = time.of, {b.name: i for i, b in enumerate(planned.loop)}
     ours = [Fmu(b.name, describe_once(files[b.name]), of[b.name]) for b in planned.own]
+    if not exported:
+        ours = [_started(fmu, block) for fmu, block in zip(ours, planned.own, strict=True)]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (Fmu(t.name, about, of[t.name], starts, t.isolate) for t, about, starts, _ in tables)
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
@@ -108,6 +118,17 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
         replacements=replacements.replacements(replaced, rows, system, mapped),
         changes=changes,
     )
+
+
+def _started(fmu: Fmu, block: BlockPlan) -> Fmu:
+    """A block's FMU with the start values that its settings give parameters."""
+    _, starts = without_start_values(block.block, block.settings)
+    given = (
+        (s, value)
+        for parameter, values in starts.items()
+        for s, value in zip(fmu.description.port(parameter, "parameter"), values, strict=True)
+    )
+    return replace(fmu, starts=tuple(given))
 
 
 def _faults(scene: Scene, problems: Iterable[Problem]) -> SceneFault:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
 from pathlib import Path
 
-from hapticlink.fmus.blocks import Starts, build_block
+from hapticlink.components.blocks.start_settings import without_start_values
+from hapticlink.fmus.blocks import Starts, find_block
 from hapticlink.fmus.cache import remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.orchestrator.base import interrupt
@@ -37,18 +38,21 @@ def fmu_files(
 
     platforms: those of native FMUs, by default this machine's; fmi: their version of the standard.
     starts: for FMUs that other tools run, by block, values that replace the start values of its
-    parameters; these also have the scene's step sizes and default experiment, which a run sets
-    itself: it needs one FMU for all rates. Raises InputFault where no FMU can be built from the
-    settings (a loop that does not close), Fault where the compiler fails.
+    parameters; these also have the scene's step sizes, gains and default experiment, which a run
+    sets itself: it needs one FMU for all of them. Raises InputFault where no FMU can be built from
+    the settings (a loop that does not close), Fault where the compiler fails.
     """
     every = (*blocks.built, *blocks.engines)
     begun = count(1)
 
-    def file(block: BlockPlan) -> Path:
+    def find(block: BlockPlan) -> Path | Callable[[], Path]:
         interrupt.raise_if_interrupted()
         LOG.info("building block %d of %d: %s", next(begun), len(every), block.name)
         given: Starts = {}
         experiment: dict[str, float] = {}
+        settings = block.settings
+        if starts is None and block in blocks.own:
+            settings, _ = without_start_values(block.block, settings)
         if starts is not None:
             steps = sizes(timeline.of[block.name], timeline)
             given = {
@@ -56,30 +60,40 @@ def fmu_files(
                 **starts.get(block.name, {}),
             }
             experiment = {"stop_time": scene.duration, "step_size": steps[STEP_SIZE]}
-        try:
-            return build_block(
-                block.block,
-                block.settings,
-                room / block.name,  # two hands are two files of one name
-                experiment=experiment,
-                packaging=scene.packaging,
-                platforms=platforms,
-                fmi=fmi,
-                starts=given,
-                engine=block.engine,
-                poll=interrupt.raise_if_interrupted,
-            )
-        except CompilerError as error:
-            interrupt.raise_if_interrupted()  # Ctrl-C in a terminal ends the compiler too
-            raise Fault(str(error)) from error
-        except FmuError as error:
-            raise InputFault(str(error)) from error
+        return find_block(
+            block.block,
+            settings,
+            room / block.name,  # two hands are two files of one name
+            experiment=experiment,
+            packaging=scene.packaging,
+            platforms=platforms,
+            fmi=fmi,
+            starts=given,
+            engine=block.engine,
+            poll=interrupt.raise_if_interrupted,
+        )
 
+    try:
+        found = {b.name: find(b) for b in every}
+        missing = {name: f for name, f in found.items() if not isinstance(f, Path)}
+        return {n: f for n, f in found.items() if isinstance(f, Path)} | _build(missing)
+    except CompilerError as error:
+        interrupt.raise_if_interrupted()  # Ctrl-C in a terminal ends the compiler too
+        raise Fault(str(error)) from error
+    except FmuError as error:
+        raise InputFault(str(error)) from error
+
+
+def _build(missing: Mapping[str, Callable[[], Path]]) -> dict[str, Path]:
+    """The files of blocks that are not in the cache. While one is compiled, the equations of the
+    next are derived."""
+    if not missing:
+        return {}
     interrupt.add(remove_locks)
-    # While one block is compiled, the equations of the next are derived.
     pool = ThreadPoolExecutor(os.cpu_count())
     try:
-        return {b.name: f for b, f in zip(every, pool.map(file, every), strict=True)}
+        files = pool.map(lambda build: build(), missing.values())
+        return dict(zip(missing, files, strict=True))
     finally:
         pool.shutdown(cancel_futures=True)
         interrupt.remove(remove_locks)
