@@ -60,15 +60,20 @@ class InProcess(Instance):
         self.holds_python = False
         self.texts = any(s.type in WRITTEN for s in self.description.scalars)
         self.in_c = not self.texts
-        self._key = messages.open_log()
+        self._key = 0
 
     def _load(self) -> None:
-        if self.log_path:
-            messages.write_to(self._key, self.log_path, self.name, lambda: self.time)
         try:
             self._folder = process_cache.unpack(self.description, self._folder)
-            with host_state.restore_directory(self.name):
-                self.slave = self._instantiate()
+            idle = process_cache.take_instance(self._folder, self.name)
+            self._key = messages.open_log(idle.key if idle else None)
+            if self.log_path:
+                messages.write_to(self._key, self.log_path, self.name, lambda: self.time)
+            if idle:
+                self.slave = idle.slave
+            else:
+                with host_state.restore_directory(self.name):
+                    self.slave = self._instantiate()
             self._keep_arithmetic()
         except Exception as error:  # FMPy raises bare Exception
             reason = str(error)
@@ -330,6 +335,16 @@ class InProcess(Instance):
     def abandon(self) -> None:
         self._status = FATAL
 
+    def _reset(self, slave: Any) -> bool:
+        """Whether the instance was reset and is kept for the next run: a native one of this
+        project, all of whose calls have succeeded."""
+        own = self.description.block is not None and self.description.fmi == "2"
+        if not own or self.holds_python or self._status or not self._initialized:
+            return False
+        if not succeeded(slave.dll["fmi2Reset"](ctypes.c_void_p(slave.component))):
+            return False
+        return process_cache.keep_instance(self._folder, self.name, slave, self._key)
+
     def _logged(self) -> list[str]:
         return messages.newest_messages(self._key)
 
@@ -345,7 +360,7 @@ class InProcess(Instance):
                     terminate = f"fmi{self.description.fmi}Terminate"
                     status = slave.dll[terminate](ctypes.c_void_p(slave.component))
                     fault = None if succeeded(status) else self.failed(terminate, status)
-                if self._status < FATAL:
+                if self._status < FATAL and not self._reset(slave):
                     slave.freeInstance()
             return fault
         finally:
