@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5735,
-    "fmus": 2785,
-    "orchestrator": 12366,
-    "programs": 1116,
+    "components": 5786,
+    "fmus": 2791,
+    "orchestrator": 12819,
+    "programs": 1021,
     "analysis": 6724,
-    "visualization": 3271,
+    "visualization": 3274,
     "api": 402,
     "commands": 1350,
 }

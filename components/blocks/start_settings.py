@@ -8,6 +8,8 @@ from dataclasses import replace
 from functools import reduce
 from typing import Any
 
+from hapticlink.components.specs.control import PassivityLaw, Topology
+
 START_SETTINGS = {
     "controller": {
         "controller.damping": "B_d",
@@ -32,6 +34,8 @@ START_SETTINGS = {
 }
 """By block, and by dotted key of its settings: the parameter that starts at the setting, entry by
 entry."""
+TABLES = {"controller": {"controller.topology": Topology, "controller.passivity": PassivityLaw}}
+"""By block and key: the table whose defaults `true` stands for."""
 NOMINAL = 1.0
 """What stands for each entry in the settings of which the FMU is built."""
 
@@ -40,12 +44,16 @@ def without_start_values(
     block: str, settings: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, tuple[float, ...]]]:
     """The settings of a block with NOMINAL for its start settings, and these by parameter. What a
-    scene does not set, or sets to a word, stays: it is a part that the block has or has not."""
+    scene does not set stays so: it is a part that the block does not have."""
     common, starts = dict(settings), dict[str, tuple[float, ...]]()
+    for key, record in TABLES.get(block, {}).items():
+        first, *path = key.split(".")
+        if _at(common.get(first), path) is True:
+            common[first] = _with(common[first], path, record())
     for key, parameter in START_SETTINGS.get(block, {}).items():
         first, *path = key.split(".")
         table: Any = common.get(first)
-        value = reduce(lambda inner, name: getattr(inner, name, None), path, table)
+        value = _at(table, path)
         if isinstance(value, tuple):
             starts[parameter] = value
             common[first] = _with(table, path, (NOMINAL,) * len(value))
@@ -53,6 +61,11 @@ def without_start_values(
             starts[parameter] = (value,)
             common[first] = _with(table, path, NOMINAL)
     return common, starts
+
+
+def _at(table: Any, path: Sequence[str]) -> Any:
+    """The value at a path below a table, None where there is none."""
+    return reduce(lambda inner, name: getattr(inner, name, None), path, table)
 
 
 def _with(table: Any, path: Sequence[str], value: Any) -> Any:

@@ -14,16 +14,16 @@ import sys
 import time as clock
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy import fmi2
 
-from hapticlink.orchestrator.base.arrays import Matrix
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import load_library, messages, process_cache
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
-from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.instance import Instance, StepState
 from hapticlink.orchestrator.fmi.load_library import load_slave
 from hapticlink.orchestrator.fmi.saved_state import SavedFmuState
 from hapticlink.orchestrator.fmi.setter import Setter, Setting
@@ -41,6 +41,9 @@ from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, as_signal, tra
 from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 from hapticlink.orchestrator.host import host_state
 
+if TYPE_CHECKING:  # a worker process need not load what reads scenes
+    from hapticlink.orchestrator.fmi.start_values import Starts
+
 
 class InProcess(Instance):
     """An FMU of FMI 2.0 whose library is loaded into this process. `slave` (of FMPy, None where it
@@ -55,6 +58,7 @@ class InProcess(Instance):
         self._saved: dict[int, SavedFmuState] = {}
         self._saved_time: dict[int, float] = {}
         self._initialized = False
+        self._some: dict[tuple[int, ...], tuple[Vector, list[Transfer]]] = {}
         self._setters = 0
         """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
         self.holds_python = False
@@ -236,9 +240,12 @@ class InProcess(Instance):
         self._convert()
 
     def read_some(self, places: Sequence[int]) -> None:
-        values = np.zeros(len(places))
-        scalars = [self.description.outputs[i] for i in places]
-        self._carry_out(self._transfers("Get", scalars, values), "gets")
+        if (key := tuple(places)) not in self._some:
+            values = np.zeros(len(places))
+            scalars = [self.description.outputs[i] for i in places]
+            self._some[key] = values, self._transfers("Get", scalars, values)
+        values, transfers = self._some[key]
+        self._carry_out(transfers, "gets")
         self.outputs[list(places)] = values
         self._convert(list(places))
 
@@ -335,15 +342,32 @@ class InProcess(Instance):
     def abandon(self) -> None:
         self._status = FATAL
 
-    def _reset(self, slave: Any) -> bool:
-        """Whether the instance was reset and is kept for the next run: a native one of this
-        project, all of whose calls have succeeded."""
+    @property
+    def resets(self) -> bool:
+        """Whether it can be reset for the next run: a native one of this project."""
         own = self.description.block is not None and self.description.fmi == "2"
-        if not own or self.holds_python or self._status or not self._initialized:
-            return False
-        if not succeeded(slave.dll["fmi2Reset"](ctypes.c_void_p(slave.component))):
-            return False
+        return own and not self.holds_python
+
+    def _reset(self, slave: Any) -> bool:
+        return succeeded(slave.dll["fmi2Reset"](ctypes.c_void_p(slave.component)))
+
+    def _leave_idle(self, slave: Any) -> bool:
         return process_cache.keep_instance(self._folder, self.name, slave, self._key)
+
+    def begin_again(self, starts: Starts) -> None:
+        """Stand as a new instance with these start values, after a run without a fault. Raises
+        FmuFault where the FMU cannot be reset."""
+        if not self._reset(self.slave):
+            raise self.failed("fmi2Reset", ERROR)
+        self.starts, self._initialized, self._counted, self.held = starts, False, False, 0
+        self.good = None
+        self._waiting.clear()
+        self._saved_time.clear()
+        self.bounds.forget()
+        new, size = StepState(), ctypes.sizeof(StepState)
+        ctypes.memmove(ctypes.addressof(self.place), ctypes.addressof(new), size)
+        self.row_due = ctypes.c_int64(1)
+        messages.open_log(self._key)
 
     def _logged(self) -> list[str]:
         return messages.newest_messages(self._key)
@@ -351,7 +375,7 @@ class InProcess(Instance):
     def close(self) -> FmuFault | None:
         """After fmi2Fatal the FMU is not called again."""
         slave, self.slave = self.slave, None
-        fault = None
+        fault, kept = None, False
         try:
             if slave is not None and self._status < FATAL:
                 for saved in self._saved.values():
@@ -360,7 +384,9 @@ class InProcess(Instance):
                     terminate = f"fmi{self.description.fmi}Terminate"
                     status = slave.dll[terminate](ctypes.c_void_p(slave.component))
                     fault = None if succeeded(status) else self.failed(terminate, status)
-                if self._status < FATAL and not self._reset(slave):
+                    self._initialized = False
+                    kept = self.resets and not self._status and self._reset(slave)
+                if self._status < FATAL and not (kept and self._leave_idle(slave)):
                     slave.freeInstance()
             return fault
         finally:

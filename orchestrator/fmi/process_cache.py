@@ -17,7 +17,7 @@ from typing import Any
 from fmpy import extract
 
 from hapticlink.fmus.atomic_file import name_in_errors
-from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base import shelf, temporary_folders
 from hapticlink.orchestrator.fmi.description import PLATFORMS, Description, describe
 
 MAX_UNPACKED = 32
@@ -72,7 +72,8 @@ def keep_unpacked() -> Iterator[None]:
     global _stay
     before, _stay = _stay, True
     try:
-        yield
+        with shelf.keep():
+            yield
     finally:
         _stay = before
         trim(MAX_UNPACKED if before else 0)
@@ -128,7 +129,7 @@ def keep_instance(folder: str, name: str, slave: Any, key: int) -> bool:
 def take_instance(folder: str, name: str) -> Idle | None:
     """An instance that was kept, which is the caller's from now on."""
     with _lock:
-        return _reset.pop((folder, name), None)
+        return _reset.pop((folder, name), None) if _stay else None
 
 
 def count_instances() -> int:

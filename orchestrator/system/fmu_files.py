@@ -6,16 +6,19 @@ import logging
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts, find_block
-from hapticlink.fmus.cache import remove_locks
+from hapticlink.fmus.cache import folder, remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, plugins, shelf
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.fmi.process_cache import MAX_UNPACKED, File, file_at
 from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import STEP_SIZE, sizes
@@ -60,28 +63,46 @@ def fmu_files(
                 **starts.get(block.name, {}),
             }
             experiment = {"stop_time": scene.duration, "step_size": steps[STEP_SIZE]}
-        return find_block(
-            block.block,
-            settings,
-            room / block.name,  # two hands are two files of one name
-            experiment=experiment,
-            packaging=scene.packaging,
-            platforms=platforms,
-            fmi=fmi,
-            starts=given,
-            engine=block.engine,
-            poll=interrupt.raise_if_interrupted,
-        )
+        how: dict[str, Any] = {
+            "packaging": scene.packaging,
+            "experiment": experiment,
+            "platforms": platforms,
+            "fmi": fmi,
+            "starts": given,
+            "engine": block.engine,
+        }
+        made_of = block.block, settings, how, folder()
+        if path := _find_again(made_of):
+            return path
+        own = room / block.name  # two hands are two files of one name
+        found = find_block(block.block, settings, own, **how, poll=interrupt.raise_if_interrupted)
+        if isinstance(found, Path) and not plugins.list_plugins():
+            _FOUND.put((made_of, file_at(found)))
+        return found
 
     try:
         found = {b.name: find(b) for b in every}
-        missing = {name: f for name, f in found.items() if not isinstance(f, Path)}
-        return {n: f for n, f in found.items() if isinstance(f, Path)} | _build(missing)
+        built = _build({name: f for name, f in found.items() if not isinstance(f, Path)})
+        return {name: f if isinstance(f, Path) else built[name] for name, f in found.items()}
     except CompilerError as error:
         interrupt.raise_if_interrupted()  # Ctrl-C in a terminal ends the compiler too
         raise Fault(str(error)) from error
     except FmuError as error:
         raise InputFault(str(error)) from error
+
+
+_FOUND: shelf.Shelf[tuple[Any, File]] = shelf.Shelf(MAX_UNPACKED)
+"""What files in the cache are made of: finding one takes a hash of that."""
+
+
+def _find_again(made_of: Any) -> Path | None:
+    """The file that was found before for the same, if it has not changed since."""
+    known = _FOUND.take(lambda item: item[0] == made_of)
+    with suppress(OSError):
+        if known and file_at(known[1][0]) == known[1]:
+            _FOUND.put(known)
+            return known[1][0]
+    return None
 
 
 def _build(missing: Mapping[str, Callable[[], Path]]) -> dict[str, Path]:
