@@ -57,7 +57,7 @@ class InProcess(Instance):
         self._status = 0
         self._saved: dict[int, SavedFmuState] = {}
         self._saved_time: dict[int, float] = {}
-        self._initialized = False
+        self._initialized = self._over = self._is_new = False
         self._some: dict[tuple[int, ...], tuple[Vector, list[Transfer]]] = {}
         self._setters = 0
         """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
@@ -348,18 +348,28 @@ class InProcess(Instance):
         own = self.description.block is not None and self.description.fmi == "2"
         return own and not self.holds_python
 
-    def _reset(self, slave: Any) -> bool:
-        return succeeded(slave.dll["fmi2Reset"](ctypes.c_void_p(slave.component)))
+    def terminate(self) -> FmuFault | None:
+        """End the run, where it has begun and FMI allows it; the fault of an FMU that fails in
+        this."""
+        if self.slave is None or self._status >= ERROR or not self._initialized:
+            return None
+        self._initialized, self._over = False, True
+        terminate = f"fmi{self.description.fmi}Terminate"
+        status = self.slave.dll[terminate](ctypes.c_void_p(self.slave.component))
+        return None if succeeded(status) else self.failed(terminate, status)
 
-    def _leave_idle(self, slave: Any) -> bool:
-        return process_cache.keep_instance(self._folder, self.name, slave, self._key)
+    def reset(self) -> bool:
+        """Whether it stands as a new instance, behind `terminate`: one that `resets` does, all of
+        whose calls have succeeded."""
+        if self._over and self.resets and not self._status:
+            self._over = False
+            component = ctypes.c_void_p(self.slave.component)
+            self._is_new = succeeded(self.slave.dll["fmi2Reset"](component))
+        return self._is_new
 
     def begin_again(self, starts: Starts) -> None:
-        """Stand as a new instance with these start values, after a run without a fault. Raises
-        FmuFault where the FMU cannot be reset."""
-        if not self._reset(self.slave):
-            raise self.failed("fmi2Reset", ERROR)
-        self.starts, self._initialized, self._counted, self.held = starts, False, False, 0
+        """Stand as a new instance with these start values, behind `reset`."""
+        self.starts, self._is_new, self._counted, self.held = starts, False, False, 0
         self.good = None
         self._waiting.clear()
         self._saved_time.clear()
@@ -374,22 +384,20 @@ class InProcess(Instance):
 
     def close(self) -> FmuFault | None:
         """After fmi2Fatal the FMU is not called again."""
-        slave, self.slave = self.slave, None
-        fault, kept = None, False
+        fault = None
         try:
-            if slave is not None and self._status < FATAL:
+            if self.slave is not None and self._status < FATAL:
                 for saved in self._saved.values():
                     saved.free()
-                if self._status < ERROR and self._initialized:
-                    terminate = f"fmi{self.description.fmi}Terminate"
-                    status = slave.dll[terminate](ctypes.c_void_p(slave.component))
-                    fault = None if succeeded(status) else self.failed(terminate, status)
-                    self._initialized = False
-                    kept = self.resets and not self._status and self._reset(slave)
-                if self._status < FATAL and not (kept and self._leave_idle(slave)):
-                    slave.freeInstance()
+                fault = self.terminate()
+                idle = self.reset() and process_cache.keep_instance(
+                    self._folder, self.name, self.slave, self._key
+                )
+                if self._status < FATAL and not idle:
+                    self.slave.freeInstance()
             return fault
         finally:
+            self.slave = None
             messages.close_log(self._key)
             self._keep_arithmetic()
             if self.place.altered:

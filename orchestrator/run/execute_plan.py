@@ -146,7 +146,7 @@ def run(
             if real_time:
                 stack.enter_context(real_time.pace.undisturbed())
             _run_events(plan, loop, results, outcome, progress, real_time)
-            if kept:
+            if kept and kept.end():
                 ended = replace(kept, opened=opened.pop_all())
     except (Exception, KeyboardInterrupt) as error:
         outcome.set_reason(error, results)

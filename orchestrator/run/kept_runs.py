@@ -111,6 +111,15 @@ class KeptRun:
     memory: StartMemory
     opened: ExitStack
 
+    def end(self) -> bool:
+        """End the run of the FMUs; whether all can begin another. Raises FmuFault for one that
+        fails in this."""
+        instances = [i for i in self.simulation.instances.values() if isinstance(i, InProcess)]
+        for instance in instances:
+            if fault := instance.terminate():
+                raise fault
+        return all([instance.reset() for instance in instances])
+
     def begin_again(self, system: System, results: RunResults, stack: ExitStack) -> None:
         """Stand before the first event of a run of `system`. Raises as a start does."""
         self.memory.put_back()

@@ -161,16 +161,10 @@ def test_gains_and_hands_load_no_fmu_and_prepare_nothing(
     assert len(loads) == len({*loads})
 
 
-def test_an_instance_that_failed_is_not_used_again(
+def test_an_fmu_that_cannot_be_reset_is_loaded_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What returned an error is closed, and its run is kept no more."""
-    resets: list[str] = []
-    reset = InProcess._reset
-
-    def refuse(self: InProcess, slave: Any) -> bool:
-        resets.append(self.name)
-        return self.name != "controller" and reset(self, slave)
+    reset, made, loads = InProcess.reset, InProcess._instantiate, list[str]()
 
     def run() -> Any:
         return told(simulate("closed-loop-ideal", tmp_path / "run", BASE, in_memory=True))
@@ -178,11 +172,36 @@ def test_an_instance_that_failed_is_not_used_again(
     with nothing_kept():
         alone = run()
         with process_cache.keep_unpacked():
+            monkeypatch.setattr(
+                InProcess, "reset", lambda self: self.name != "controller" and reset(self)
+            )
             assert run() == alone
-            monkeypatch.setattr(InProcess, "_reset", refuse)
-            found = simulate("closed-loop-ideal", tmp_path / "run", BASE, in_memory=True)
-            assert "controller" in str(found.outcome.fault)
-            assert "fmi2Reset" in str(found.outcome.fault)
             assert kept_runs.count_kept() == 0
             monkeypatch.undo()
+            monkeypatch.setattr(
+                InProcess, "_instantiate", lambda self: (loads.append(self.name), made(self))[1]
+            )
             assert run() == alone
+    assert loads == ["controller"]
+
+
+def test_an_fmu_that_fails_at_its_end_fails_its_own_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run() -> Experiment:
+        return simulate("closed-loop-ideal", tmp_path / "run", BASE, in_memory=True)
+
+    terminate = InProcess.terminate
+    with nothing_kept(), process_cache.keep_unpacked():
+        before = told(run())
+        monkeypatch.setattr(
+            InProcess,
+            "terminate",
+            lambda self: (
+                self.failed("fmi2Terminate", 3) if self.name == "hand" else terminate(self)
+            ),
+        )
+        assert "fmi2Terminate" in str(run().outcome.fault)
+        assert kept_runs.count_kept() == 0
+        monkeypatch.undo()
+        assert told(run()) == before
