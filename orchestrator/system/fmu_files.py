@@ -15,6 +15,7 @@ from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts, find_block
 from hapticlink.fmus.cache import folder, remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
+from hapticlink.fmus.native.compiler import compiler_version
 from hapticlink.orchestrator.base import interrupt, plugins, shelf
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.ticks import Timeline
@@ -71,7 +72,8 @@ def fmu_files(
             "starts": given,
             "engine": block.engine,
         }
-        made_of = block.block, settings, how, folder()
+        compiled = scene.packaging == "native" and not block.engine
+        made_of = block.block, settings, how, folder(), compiler_version() if compiled else ""
         if path := _find_again(made_of):
             return path
         own = room / block.name  # two hands are two files of one name
