@@ -127,6 +127,12 @@ def source(module: str) -> str:
     return hashlib.sha256(Path(file).read_bytes() if file else os.urandom(32)).hexdigest()
 
 
+def find(key_material: Mapping[str, Any]) -> Path | None:
+    """The cached FMU for `key_material`, if there is one that is whole."""
+    root = folder()
+    return root and _whole_file(root / key(key_material))
+
+
 def get_or_build(
     key_material: Mapping[str, Any],
     build_function: Callable[[Path], Path],
@@ -149,12 +155,6 @@ def get_or_build(
         return cached_file
     with _exclusively(entry, str(key_material.get("block", "the same FMU")), poll):
         return _whole_file(entry) or _build(build_function, build_folder, root, entry)
-
-
-def has(key_material: Mapping[str, Any]) -> bool:
-    """Whether the FMU for `key_material` is in the cache."""
-    root = folder()
-    return root is not None and _whole_file(root / key(key_material)) is not None
 
 
 def _whole_file(entry: Path) -> Path | None:

@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5737,
-    "fmus": 2808,
-    "orchestrator": 12458,
-    "programs": 1116,
+    "components": 5786,
+    "fmus": 2811,
+    "orchestrator": 12918,
+    "programs": 1021,
     "analysis": 7077,
-    "visualization": 3283,
+    "visualization": 3284,
     "api": 430,
     "commands": 1375,
 }
