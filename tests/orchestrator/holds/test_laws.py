@@ -39,31 +39,45 @@ def through(stamps, samples, slopes=()):
     return KroghInterpolator(np.array([*times, *times][: len(each)])[order], np.array(each)[order])
 
 
-def polynomial(name, stamps, y, yd, t):
-    """A hold's value at tick t from all samples y, and what they have beside, yd."""
-    row = TABLE[name]
-    known = min(len(stamps), row.degree + 1)
-    if row.depth == row.degree + 1 and not row.needs:
-        return through(stamps[-known:], y[-known:])(float(t * BASE))
-    if name == "lead":
-        return y[-1] if len(y) < 2 else 1.5 * y[-1] - 0.5 * y[-2]
-    if name == "slope":
-        if len(y) < 2:
-            return 0.0 * y[-1]
-        return (yd[-1] - yd[-2]) / float((stamps[-1] - stamps[-2]) * BASE)
-    if name == "foh-derivative" or len(y) < 2:
-        return y[-1] + yd[-1] * float((t - stamps[-1]) * BASE)
-    assert name == "hermite"
+def newest(count):
+    """The polynomial through so many of the newest samples."""
+    return lambda stamps, y, yd, t: through(stamps[-count:], y[-count:])(float(t * BASE))
+
+
+def along_derivative(stamps, y, yd, t):
+    return y[-1] + yd[-1] * float((t - stamps[-1]) * BASE)
+
+
+def slope(stamps, y, yd, t):
+    if len(y) < 2:
+        return 0.0 * y[-1]
+    return (yd[-1] - yd[-2]) / float((stamps[-1] - stamps[-2]) * BASE)
+
+
+def hermite(stamps, y, yd, t):
+    if len(y) < 2:
+        return along_derivative(stamps, y, yd, t)
     return through(stamps[-2:], y[-2:], yd[-2:])(float(t * BASE))
 
 
-POLYNOMIALS = [name for name, row in TABLE.items() if row.push == "samples"]
+LAWS = {
+    "zoh": newest(1),
+    "latest": newest(1),
+    "foh": newest(2),
+    "second-order": newest(3),
+    "foh-derivative": along_derivative,
+    "slope": slope,
+    "hermite": hermite,
+}
+"""The value at tick t from all samples y, and what they have beside, yd."""
+OF_SAMPLES = [name for name, row in TABLE.items() if row.push == "samples"]
 
 
-@pytest.mark.parametrize("name", POLYNOMIALS)
+@pytest.mark.parametrize("name", OF_SAMPLES)
 @few
 @given(seeds)
-def test_polynomials_through_samples(name, seed):
+def test_values_are_those_of_the_law(name, seed):
+    assert name in LAWS, f"write the law of {name} in LAWS of this file"
     generator = np.random.default_rng(seed)
     hold = Bench(base=BASE).hold(name, N)
     stamps, y, yd, tick = [], [], [], 0
@@ -75,9 +89,31 @@ def test_polynomials_through_samples(name, seed):
         hold.push(int(tick), sample, int(tick) + 2)
         for ahead in (0.0, generator.uniform(0, 20), 7.5):
             later = int(tick) + 2
-            expected = polynomial(name, stamps, y, yd, later + Fraction(ahead))
+            expected = LAWS[name](stamps, y, yd, later + Fraction(ahead))
             close(hold.value(later, ahead), expected, 1e3)
         tick += generator.integers(3, 40)
+
+
+@pytest.mark.parametrize("name", [name for name in TABLE if TABLE[name].push != "set_position"])
+@few
+@given(seeds)
+def test_the_degree_is_that_of_the_value_within_a_step(name, seed):
+    """Of differences at equal distances those of this order are none, and one order lower some."""
+    generator = np.random.default_rng(seed)
+    row, bench = TABLE[name], Bench(2 * N, BASE)
+    width = 2 * N if row.needs in ("derivative", "integral") else N
+    readers = {"displacement": bench.reader(range(N)), "velocity": bench.reader(range(N, 2 * N))}
+    hold = bench.hold(name, N, **readers)
+    for tick in range(0, 160, 40):
+        hold.push(tick, generator.normal(size=width), tick)
+        hold.value(tick)
+    values = np.array([hold.value(120, ahead) for ahead in np.linspace(0.0, 30.0, 13)])
+    degree, scale = row.degree, np.abs(values).max()
+    if degree is None:
+        assert np.abs(np.diff(values, axis=0)).max() > 1e-6 * scale
+    else:
+        assert np.abs(np.diff(values, degree + 1, axis=0)).max() < 1e-9 * scale
+        assert np.abs(np.diff(values, degree, axis=0)).max() > 1e-6 * scale
 
 
 @few
