@@ -32,6 +32,7 @@ from hapticlink.analysis.stability.frozen_nonlinearities import discrete
 from hapticlink.analysis.stability.graph_slopes import GraphSlopes, graph_slopes
 from hapticlink.analysis.stability.polynomial_holds import (
     advanced_powers,
+    degree_of,
     is_linear,
     is_polynomial,
     sample_arrives,
@@ -216,7 +217,7 @@ class ForwardSensitivity:
     ) -> Applied:
         """What the evaluation of a hold does that is a polynomial in time, whose value is c_0."""
         hold, held = self._simulation.holds[operation.connection], reach.writes
-        n, further = len(held), len(held) * hold.row.degree
+        n, further = len(held), len(held) * degree_of(hold)
         name, powers = operation.connection, operation.connection + POWERS
         order = np.roll(np.arange(n + further), -n)  # the signals come last
         if isinstance(since, Fraction):

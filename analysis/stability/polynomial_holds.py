@@ -29,7 +29,13 @@ OF_SAMPLES = ("samples", "lead")
 
 def is_polynomial(hold: CompiledHold) -> bool:
     """Whether the value of a hold is a polynomial in time through its samples."""
-    return hold.row.push in OF_SAMPLES
+    return hold.row.push in OF_SAMPLES and hold.row.degree is not None
+
+
+def degree_of(hold: CompiledHold) -> int:
+    """The degree d of a hold that is a polynomial."""
+    assert hold.row.degree is not None
+    return hold.row.degree
 
 
 def is_linear(hold: CompiledHold) -> bool:
@@ -49,7 +55,7 @@ def slopes_of_powers(hold: CompiledHold, tick: int, ahead: float) -> Matrix:
     """The slopes of (c_0, ..., c_d), n numbers each, of a hold at a tick and so much `ahead` of it,
     by the numbers of its state."""
     block = StateBlock(hold.c)
-    state, degree, own = block.save(), hold.row.degree, hold.c
+    state, degree, own = block.save(), degree_of(hold), hold.c
     spacing = own.stamps[own.count - 1] - own.stamps[own.count - 2] if own.count > 1 else 1
     at = np.arange(degree + 1.0) * spacing
     size = len(state.numbers)
@@ -72,7 +78,7 @@ def slopes_of_powers(hold: CompiledHold, tick: int, ahead: float) -> Matrix:
 
 def advanced_powers(hold: CompiledHold, dt: float) -> Matrix:
     """The slopes of (c_0, ..., c_d) by themselves over dt (ticks)."""
-    every = range(hold.row.degree + 1)
+    every = range(degree_of(hold) + 1)
     own = [[comb(k, j) * dt ** max(0, k - j) for k in every] for j in every]
     result: Matrix = np.kron(np.array(own), np.eye(hold.c.n))
     return result

@@ -49,12 +49,12 @@ FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5
 SCENE = {"graphics.rate": 64, "hand": {**FIRM, "target": [[0.0, *POINT]]}}
 LEADING = 6
 COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
-    ("closed-loop-ideal", {}, (15, 89, 2118)),
-    ("closed-loop-ideal", {"hold": "foh"}, (15, 102, 4665)),
-    ("serial", {}, (27, 144, 1637)),
-    ("enclosure", {}, (14, 104, 1772)),
-    ("two-users", {}, (13, 161, 1958)),
-    ("closed-loop-direct", {}, (39, 345, 3846)),
+    ("closed-loop-ideal", {}, (18, 95, 2340)),
+    ("closed-loop-ideal", {"hold": "foh"}, (18, 108, 5206)),
+    ("serial", {}, (31, 150, 1828)),
+    ("enclosure", {}, (17, 110, 1874)),
+    ("two-users", {}, (16, 167, 2504)),
+    ("closed-loop-direct", {}, (45, 366, 4517)),
 ]
 
 
