@@ -114,13 +114,14 @@ assert np.isclose(generated + outside, gain, rtol=1e-9)
 
 
 # %%
-def oscillate(K, b=5.0, B=None, **options):
+def oscillate(K, b=5.0, B=0.0, **options):
     """The positions (m) of the handle, released 1 mm from the middle of a spring K (N/m) that is
-    sampled, with a sampled damper B (N.s/m) or none, on a device with damping b (N.s/m)."""
-    wall = {"stiffness": K, "unilateral": False} | ({} if B is None else {"damping": B})
+    sampled, with a sampled damper B (N.s/m), on a device with damping b (N.s/m)."""
     run = hl.run("virtual-wall", {
         "hand.wrench": [0, 0, 0], "linkage.joint.0.damping": b, "duration": 0.5,
-        "linkage.start": {"rail": 0.001}, "fmu.wall.settings": wall,
+        "linkage.start": {"rail": 0.001},
+        "fmu.wall.settings": {"stiffness": 0, "damping": 0, "unilateral": False},
+        "fmu.wall.start": {"stiffness": K, "damping": B},
     } | options)  # fmt: skip
     return run["virtual_mechanism.x"][:, 0]
 
