@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -72,10 +73,61 @@ def test_a_worksheet_asks_before_it_shows_and_gives_no_answer_away(path: Path) -
     assert len(blanks) >= 4
 
 
+RIGHT = {
+    "virtual-wall": {
+        "generated": "K / 2 * sum(np.diff(p) ** 2)",
+        "K_passive": "2 * 5 * 512",
+        "K_late": "5 / (1.5 * T)",
+        "B_best": "0.8284 * m / T",
+        "K_best": "0.6863 * m / T**2",
+        "b_needed": "25",
+    },
+    "discrete-equivalents": {
+        "T_forward": "b / K",
+        "omega_60": "120 * np.arctan(5 / 6)",
+        "rate_needed": "2.5e6",
+        "T_held": "2 * b / K",
+    },
+    "five-bar": {
+        "freedom": "2",
+        "constrained": "1",
+        "youngest": "1 / 30",
+        "oldest": "1 / 15",
+        "average": "0.05",
+        "factor": "6",
+        "held": "(F_held[:-1] * np.diff(x, axis=0)).sum()",
+        "ideal": "((F[:-1] + F[1:]) / 2 * np.diff(x_fast, axis=0)).sum()",
+        "B_now": "512 / mobility",
+        "B_late": "256 / mobility",
+    },
+}
+"""By worksheet, what fills its blanks."""
+
+
+def filled(path: Path, answers: dict[str, str]) -> str:
+    """A worksheet with its blanks filled in, those of its functions, too."""
+    text = path.read_text(encoding="utf-8")
+    for blank, answer in answers.items():
+        text, count = re.subn(rf'"{blank} = \.\.\.', f'"{blank} = {answer}', text)
+        assert count == 1, blank
+    for rule in ("1 / (1 - s * T)", "(2 + s * T) / (2 - s * T)"):
+        text = text.replace("return ...", f"return {rule}", 1)
+    return text
+
+
+@pytest.mark.parametrize("path", WORKSHEETS, ids=name)
+def test_right_answers_are_accepted(path: Path, tmp_path: Path) -> None:
+    text = filled(path, RIGHT[path.stem])
+    assert " = ..." not in text
+    said = "".join(
+        "".join(output.get("text", ()))
+        for cell in execute(text, tmp_path)
+        for output in cell["outputs"]
+    )
+    assert said.count("right") + said.count("growth rate") + said.count("below") >= 3
+
+
 def test_a_wrong_answer_is_refused(tmp_path: Path) -> None:
-    """The checks of a blank: one that is filled with another number fails its cell."""
-    text = (COURSE / "virtual-wall.ipynb").read_text(encoding="utf-8")
-    wrong = text.replace("K_passive = ...", "K_passive = 6000.0")
-    assert wrong != text
+    wrong = filled(COURSE / "virtual-wall.ipynb", {"K_passive": "6000.0"})
     with pytest.raises(AssertionError, match="neither grow nor decay"):
         execute(wrong, tmp_path)

@@ -6,9 +6,9 @@
 # system into an unstable one. Here you find out which, and from which sample rate on.
 #
 # You need complex numbers and the poles of a linear system. Each figure comes after a question
-# that begins with **Predict**: sketch your answer on paper before you run the cell. The blanks
-# `...` are for you. Run all cells from the top once; those with a blank say nothing until you fill
-# it.
+# that begins with **Predict**: sketch your answer on paper before you read the next cell and run
+# it. The blanks `...` are for you. Run all cells from the top once; the checks of a blank are
+# silent until you fill it.
 
 # %%
 import tempfile
@@ -210,6 +210,12 @@ assert np.isclose(1 - omega_60 / 100, 0.17, atol=5e-3)
 
 # %% blank
 rate_needed = ...  # Hz
+
+if rate_needed is not ...:
+    fast = np.roots([1, 1e4 / 0.002, 1e4 / 0.002]).min()  # 1/s
+    assert abs(1 + fast / (1.01 * rate_needed)) < 1, "not stable at a slightly faster rate"
+    assert abs(1 + fast / (0.99 * rate_needed)) > 1, "still stable at a slightly slower rate"
+    print("right")
 
 # %% [markdown] answer
 # $s^2 + (B_g/I) s + K_g/I = 0$ has the poles $-1.0$ and $-5 \cdot 10^6$ 1/s. A real pole is stable

@@ -7,8 +7,8 @@
 #
 # You need what mobility and a Jacobian are; the worksheet on the virtual wall comes before. Each
 # figure comes after a question that begins with **Predict**: sketch your answer on paper before
-# you run the cell. The blanks `...` are for you. Run all cells from the top once; those with a
-# blank say nothing until you fill it.
+# you read the next cell and run it. The blanks `...` are for you. Run all cells from the top once;
+# the checks of a blank are silent until you fill it.
 
 # %%
 import matplotlib.pyplot as plt
@@ -190,7 +190,7 @@ if factor is not ...:
         print(f"{bias}: {found[0] / found[-1]:.1f}, in proportion to the age {factor:.1f}")
 
 # %% [markdown] answer
-# The age is 1.5 frames: a factor of six. With velocity terms it is 5.3. Without them the distance
+# The age is 1.5 frames: a factor of six. With velocity terms it is 5.35. Without them the distance
 # is larger at every rate, and at 60 Hz larger than at 10 Hz: the error of the law is so much
 # larger than the error of the rate that it hides it. Who measures only that law will say that the
 # rate does not matter.
@@ -265,7 +265,7 @@ plt.show()
 
 # %% [markdown] answer
 # The zero-order hold generates up to 162 mJ, the passive one 0.44 mJ; the largest distance falls
-# from 13.4 to 8.7 mm. What is left is not the hold's: the matrices and the pose are old with both.
+# from 13.4 to 8.7 mm.
 
 # %% answer
 peak = {hold: 1e3 * r.run["energies"][coupling]["peak"] for hold, r in direct.items()}

@@ -6,9 +6,9 @@
 # much more, and find out how stiff a wall may be.
 #
 # You need Newton's law, energy, and the poles of a discrete system. Each figure comes after a
-# question that begins with **Predict**: sketch your answer on paper before you run the cell. The
-# blanks `...` are for you. Run all cells from the top once; those with a blank say nothing until
-# you fill it.
+# question that begins with **Predict**: sketch your answer on paper before you read the next cell
+# and run it. The blanks `...` are for you. Run all cells from the top once; the checks of a blank
+# are silent until you fill it.
 
 # %%
 import matplotlib.pyplot as plt
@@ -127,7 +127,8 @@ def oscillate(K, b=5.0, B=0.0, **options):
 
 
 def growth(x, order=2):
-    """sigma (1/s) of the slowest pole of the recurrence that the samples x follow."""
+    """sigma (1/s) of the slowest pole of the recurrence that the samples x follow; a delay or a
+    sampled damper remembers one more sample, which makes its order 3."""
     past = np.column_stack([x[order - 1 - i : len(x) - 1 - i] for i in range(order)])
     a = np.linalg.lstsq(past, x[order:], rcond=None)[0]
     return np.log(np.abs(np.roots([1, *-a])).max()) / T
