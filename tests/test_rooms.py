@@ -39,7 +39,7 @@ CODE_LINES = {
     "analysis": 6741,
     "visualization": 3273,
     "api": 410,
-    "commands": 1350,
+    "commands": 1364,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -174,7 +174,7 @@ plt.plot(rates, distance["full"], "o-", color=BLUE, label="with them")
 plt.ylim(0, None)
 plt.xlabel("graphics rate (Hz)")
 plt.ylabel("largest distance (mm)")
-plt.title("A faster rate helps only if the velocity terms are rendered")
+plt.title("Here a faster rate helps only if velocity terms are rendered")
 plt.legend()
 plt.show()
 
