@@ -36,10 +36,10 @@ CODE_LINES = {
     "fmus": 2814,
     "orchestrator": 12934,
     "programs": 1021,
-    "analysis": 7077,
+    "analysis": 7080,
     "visualization": 3284,
     "api": 430,
-    "commands": 1376,
+    "commands": 1390,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -51,10 +51,10 @@ LEADING = 6
 COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
     ("closed-loop-ideal", {}, (18, 95, 2340)),
     ("closed-loop-ideal", {"hold": "foh"}, (18, 108, 5206)),
-    ("serial", {}, (31, 150, 1828)),
+    ("serial", {}, (31, 147, 1828)),
     ("enclosure", {}, (17, 110, 1874)),
     ("two-users", {}, (16, 167, 2504)),
-    ("closed-loop-direct", {}, (45, 366, 4517)),
+    ("closed-loop-direct", {}, (45, 363, 4517)),
 ]
 
 

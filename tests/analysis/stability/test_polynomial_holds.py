@@ -16,14 +16,14 @@ from hapticlink.analysis.stability.polynomial_holds import advanced_powers, slop
 from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.orchestrator.run.compiled.state import StateBlock
 from tests.orchestrator.holds.bench import Bench
-from tests.orchestrator.holds.test_laws import POLYNOMIALS, polynomial
+from tests.orchestrator.holds.test_laws import LAWS
 
 POINT = (0.044493, 0.014823, -0.788148)
 FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5.0, 0.01]}
 SCENE = {"graphics.rate": 60, "hand": {**FIRM, "target": [[0.0, *POINT]]}}  # frames of 8 or 9 ticks
 
 
-@pytest.mark.parametrize("name", POLYNOMIALS)
+@pytest.mark.parametrize("name", LAWS)
 def test_a_hold_goes_on_from_its_powers_to_the_interpolating_polynomial(name: str) -> None:
     n, base, draw = 2, Fraction(3, 7680), np.random.default_rng(5)
     hold = Bench(n, base).hold(name, n)
@@ -36,7 +36,7 @@ def test_a_hold_goes_on_from_its_powers_to_the_interpolating_polynomial(name: st
         powers = slopes_of_powers(hold, tick, 0.5) @ StateBlock(hold.c).save().numbers
         for dt in (0.0, 0.5, 9.5, 100.0):
             value = (advanced_powers(hold, dt) @ powers)[:n]
-            expected = polynomial(name, stamps, y, beside, Fraction(tick) + Fraction(dt + 0.5))
+            expected = LAWS[name](stamps, y, beside, Fraction(tick) + Fraction(dt + 0.5))
             np.testing.assert_allclose(value, expected, rtol=1e-9, atol=1e-9)
 
 
