@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 from hapticlink.analysis.findings import summary
@@ -47,12 +49,14 @@ def run(
     arrivals: str | Path | None = None,
     remote: Mapping[str, str] | None = None,
     key: str | Path | None = None,
+    answer: Callable[[Run], object] | None = None,
 ) -> Run:
     """Run a scene, changed by `options` (see `scene`).
 
     The results are returned, and with `out` also written to that folder: a CSV per rate, run.json,
     plan.txt and, where `figures` is true, figures. They replace those of an earlier run there from
-    the first row on. `progress` is called with the simulated time (s) from time to time.
+    the first row on. `progress` is called with the simulated time (s) from time to time, `answer`
+    with the results as soon as they are there, before figures are drawn.
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
     (docs/real-time.md). `arrivals` is the folder of a run in real time, whose samples arrive here
     when they arrived there. `remote` has the addresses HOST:PORT of FMUs, or of all FMUs at a rate,
@@ -73,7 +77,7 @@ def run(
     if arrivals is not None:
         paced = RecordedArrivals(Path(arrivals), read)
     servers = Servers(remote or {}, Path(key) if key else key_file.DEFAULT)
-    return run_paced(read, out, paced, figures, progress, remote=servers)
+    return run_paced(read, out, paced, figures, progress, remote=servers, answer=answer)
 
 
 @interrupt.defer_signals()
@@ -85,14 +89,17 @@ def run_paced(
     progress: Callable[[float], None] | None = None,
     tables: bool = True,
     remote: Servers = NOWHERE,
+    answer: Callable[[Run], object] | None = None,
 ) -> Run:
     """As `run`; without `out` and `tables` the results have no tables."""
     simulated = partial(simulate, scene, progress=progress, real_time=real_time, remote=remote)
     if out is None:
         ended = _in_memory(simulated, tables)
+        if answer:
+            answer(ended)
     else:
         with folder_lock.lock_folder(Path(out)):
-            ended = _in_folder(simulated, Path(out), figures)
+            ended = _in_folder(simulated, Path(out), figures, answer)
     if interrupt.came() or ended.record.end.reason == "interrupted":
         raise RunInterrupted(ended)
     return ended
@@ -108,24 +115,44 @@ def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
     return Run(None, ended.run | found.record, without_rows(results), numbers=found.numbers)
 
 
-def _in_folder(simulated: Callable[..., Experiment], folder: Path, figures: bool) -> Run:
+def _in_folder(
+    simulated: Callable[..., Experiment],
+    folder: Path,
+    figures: bool,
+    answer: Callable[[Run], object] | None,
+) -> Run:
     ended = simulated(folder, keep_rows=True, locked=True)
     try:
-        return _describe_run(folder, ended, figures)
+        return _describe_run(folder, ended, figures, answer)
     finally:
         ended.remove_rows()
 
 
-def _describe_run(folder: Path, ended: Experiment, figures: bool) -> Run:
+def _describe_run(
+    folder: Path, ended: Experiment, figures: bool, answer: Callable[[Run], object] | None
+) -> Run:
     """What the rows of a run say of it, in its folder."""
     results = ended.results
     if not ended.outcome.published:
         return Run(None, results.run, results.tables)
     found = summary.find(results)
-    run = results.run | found.record
-    try:
-        for names in _write_files(ended, figures):
+    run, files = results.run | found.record, _write_files(ended, figures)
+    with _tell_of_missing_files(folder, ended):
+        for names in islice(files, 2):
             run = folders.add(folder, names, found.record)
+    if answer:
+        answer(Run(folder, run, without_rows(results), numbers=found.numbers))
+    with _tell_of_missing_files(folder, ended):
+        for names in files:
+            run = folders.add(folder, names, found.record)
+    return Run(folder, run, without_rows(results), numbers=found.numbers)
+
+
+@contextmanager
+def _tell_of_missing_files(folder: Path, ended: Experiment) -> Iterator[None]:
+    """Context in which files are added to the results of a run, which are there."""
+    try:
+        yield
     except Interrupted:
         message = f"interrupted: {folder} has the results of the run, not all of its figures"
         raise Fault(message) from None
@@ -134,12 +161,11 @@ def _describe_run(folder: Path, ended: Experiment, figures: bool) -> Run:
     except OSError as error:  # a full disk; the rows are there, and why the run ended is told
         message = "%s has the results of the run, not all of its figures: %s"
         logging.getLogger(__name__).warning(message, folder, describe_os_error(error, folder))
-    return Run(folder, run, without_rows(results), numbers=found.numbers)
 
 
 def _write_files(ended: Experiment, figures: bool) -> Iterator[list[str]]:
-    """Writes the plan of a run that had a step, and its figures; the names of the files, none at
-    first. Raises Interrupted and OSError."""
+    """Writes the plan of a run that had a step, and then its figures; the names of the files, none
+    at first. Raises Interrupted and OSError."""
     yield []
     if ended.outcome.end_time <= 0 or ended.outcome.reason == "interrupted":
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 
@@ -16,6 +16,7 @@ import hapticlink.fmus
 import hapticlink.fmus.native
 import hapticlink.orchestrator
 import hapticlink.programs
+import hapticlink.scenes
 from hapticlink.fmus.cache import sources
 from hapticlink.fmus.versions import find_versions
 
@@ -40,7 +41,7 @@ def begin(out: Path, rows: tuple[str, ...], *further: ModuleType) -> None:
 
 MEASURED = (
     hapticlink.components, hapticlink.fmus, hapticlink.orchestrator, hapticlink.programs,
-    hapticlink.analysis, benchmarks,
+    hapticlink.analysis, hapticlink.scenes, benchmarks,
 )  # fmt: skip
 MADE = re.compile(r"^Made from commit .*\n\n?", re.MULTILINE)
 MADE_FROM = "made_from.json"
@@ -68,15 +69,28 @@ def sign(results: Path, what: str, page: Path) -> None:
 def status(results: Path, pages: Mapping[str, Path]) -> Iterator[str]:
     """A line for each benchmark, by its page: whether its tables are those of the code that is
     there. Pages of others say so below their title."""
+    for what, commit, since in _find_changes(results, pages):
+        if pages[what].exists():
+            _mark(pages[what], f"commit {commit}{since}.")
+        yield f"{what}: made from commit {commit}{since or ', current'}"
+
+
+def stale(results: Path, pages: Mapping[str, Path]) -> Iterator[str]:
+    """The lines of `status` on benchmarks that have a page of tables of other code; writes
+    nothing."""
+    for what, commit, since in _find_changes(results, pages):
+        if since and pages[what].exists():
+            yield f"{what}: made from commit {commit}{since}"
+
+
+def _find_changes(results: Path, whats: Iterable[str]) -> Iterator[tuple[str, str, str]]:
+    """Each benchmark with the commit of its tables, and what changed since then, "" for nothing."""
     path, now = results / MADE_FROM, _hashes()
     record = json.loads(path.read_text()) if path.exists() else {}
-    for what, page in pages.items():
+    for what in whats:
         made = record.get(what, {"commit": "unknown", "sources": {}})
         changed = [name for name, sha in now.items() if made["sources"].get(name) != sha]
-        since = f"; changed since then: {', '.join(changed)}" if changed else ""
-        if page.exists():
-            _mark(page, f"commit {made['commit']}{since}.")
-        yield f"{what}: made from commit {made['commit']}{since or ', current'}"
+        yield what, made["commit"], f"; changed since then: {', '.join(changed)}" * bool(changed)
 
 
 def _mark(page: Path, made_from: str) -> None:

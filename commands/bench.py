@@ -11,6 +11,7 @@ from hapticlink.commands import checkout
 from hapticlink.commands.options import Out
 from hapticlink.commands.progress import bar, time_command
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.errors import InputFault
 
 Benchmark = Literal[
     "mechanism",
@@ -42,6 +43,9 @@ def bench(
     *,
     out: Out = None,
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
+    stale: Annotated[
+        bool, Parameter(negative="", help="List the tables of other code alone, without WHAT.")
+    ] = False,
 ) -> int:
     """Measure run time, error and limits. Without WHAT, list which tables in results/ were made
     from the code that is there, and say on the pages of others what changed since. WHAT is one of
@@ -67,10 +71,13 @@ def bench(
     results/stability). An interrupted benchmark is continued by the same command.
     """
     results = checkout.folder("bench") / "results"
+    if what and stale:
+        raise InputFault(f"--stale lists the tables of all benchmarks: leave {what} out")
     if what is None:
-        status = checkout.function("bench", "benchmarks.code_version:status")
+        of = "stale" if stale else "status"
+        told = checkout.function("bench", f"benchmarks.code_version:{of}")
         pages = {each: _page(results, each) for each in (*get_args(Benchmark), "study")}
-        print(*status(results, pages), sep="\n")
+        print(*[*told(results, pages)] or ["all tables are of the code that is there"], sep="\n")
         return 0
     make = checkout.function("bench", f"benchmarks.{what.replace('-', '_')}:bench")
     page = _page(results, what)

@@ -22,7 +22,6 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}
 _KEYWORDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 _FRACTION = r"^[0-9]+/[0-9]+$|^[0-9]*\.?[0-9]+([eE][+-]?[0-9]{1,3})?$"
-
 Json = dict[str, Any]
 
 
@@ -64,7 +63,8 @@ class _Definitions:
             found = self._any_of(hint, entry)
             if isinstance(default, str | bool | int | float | tuple) and default != ():
                 found["default"] = default
-            if key in NAMED or (record is ForeignFmu and key in ("start", "derivatives")):
+            dotted = {Scene: NAMED, ForeignFmu: ("start", "derivatives")}.get(record, ())
+            if key in dotted:
                 # A dotted name may also be written as nested tables.
                 values = {"anyOf": [found["additionalProperties"], {"type": "object"}]}
                 found["additionalProperties"] = values

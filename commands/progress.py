@@ -31,11 +31,23 @@ def runs(title: str, hidden: bool = False) -> Iterator[Callable[[int, int], None
 @contextmanager
 def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int], None]]:
     """Gives a function to be called with what is done, and the numbers of finished and of all
-    steps. Where stderr is no terminal, a line tells at the start how long it took before."""
+    steps. Where stderr is no terminal, a line tells at the start how long it took before. Raises
+    Interrupted with what was done."""
+    begun = ""
+
+    def tell(what: str, done: int, of: int) -> None:
+        nonlocal begun
+        begun = f"({what}; {done} of {of} steps were done)"
+        if show:
+            show(done, of, what)
+
     with record_duration(title) as took, bar(title, hidden) as show:
         if not (hidden or show):
             _tell(title, took)
-        yield lambda what, done, of: show(done, of, what) if show else None
+        try:
+            yield tell
+        except Interrupted:
+            raise Interrupted(when=begun) from None
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -93,14 +94,27 @@ def run(
         say(*hl.explain(scene, changes.options), sep="\n")
         return 0
     folder = output.out or changes.folder("runs", scene)
+    said: list[str] = []
     try:
         read = hl.scene(scene, changes.options)
-        with progress(read.title, read.duration, hidden=output.quiet) as report:
+        with ExitStack() as shown:
+            bar = progress(read.title, read.duration, hidden=output.quiet)
+
+            def answer(result: hl.Run) -> None:
+                """Says what it can before figures are drawn: all but the names of the files."""
+                shown.close()
+                if not (result.fault or output.quiet or output.json):
+                    said.extend(summary.print_lines(result, title(scene), result.numbers))
+                    del said[-1]
+                    say(*said, sep="\n")
+                    sys.stdout.flush()
+
             result = hl.run(
                 read,
                 out=folder,
                 figures=figures,
-                progress=report,
+                progress=shown.enter_context(bar),
+                answer=answer,
                 real_time=real_time,
                 arrivals=arrivals,
                 remote=dict(map(_place, remote or ())),
@@ -116,7 +130,7 @@ def run(
             say(f"hapticlink: {line}", file=sys.stderr)
     if not result.folder:
         lines.append(f"  {folder}/: nothing written, the run failed before the first sample")
-    print_result(lines, result.run, output.quiet, output.json)
+    print_result(lines[len(said) :], result.run, output.quiet, output.json)
     return Fault.exit_status if result.fault else 0
 
 

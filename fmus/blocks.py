@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
@@ -38,7 +39,13 @@ def component(name: str, settings: Settings, starts: Starts = MappingProxyType({
     return replace(result, parameters=parameters)
 
 
-def build_block(
+def build_block(name: str, settings: Settings, build_folder: Path, **how: Any) -> Path:
+    """The path of the block's FMU: in the cache, or built. As `find_block`."""
+    found = find_block(name, settings, build_folder, **how)
+    return found if isinstance(found, Path) else found()
+
+
+def find_block(
     name: str,
     settings: Settings,
     build_folder: Path,
@@ -50,8 +57,9 @@ def build_block(
     starts: Starts = MappingProxyType({}),
     engine: str | None = None,
     poll: Callable[[], object] = lambda: None,
-) -> Path:
-    """The path of the block's FMU: in the cache, or built in `build_folder` where the cache is off.
+) -> Path | Callable[[], Path]:
+    """The path of the block's FMU in the cache, or what builds it and gives its path: in
+    `build_folder` where the cache is off.
 
     settings: the block's own, by name; starts: start values that replace those of its parameters.
     experiment: stop_time and step_size (s) of the default experiment. platforms: those of a native
@@ -72,19 +80,30 @@ def build_block(
                 return build(block, folder, **experiment)
         return build_native(block, folder, platforms=platforms, fmi=fmi, **experiment)
 
-    material: dict[str, Any] = {
-        "block": name,
-        "settings": to_jsonable_python(dict(settings)),
-        **experiment,
-    }
+    material = _block_material(name, settings) | dict(experiment)
     if engine:
         material["engine"] = engine
     if starts:
         material["starts"] = dict(starts)
     if packaging == "native" and not engine:
-        from hapticlink.fmus.native.compiler import compiler_version, host_platform
+        material |= _native_material(platforms, fmi)
+    return cache.find(material) or partial(cache.get_or_build, material, make, build_folder, poll)
 
-        material["compiler"] = compiler_version()
-        material["platforms"] = list(platforms) or [host_platform(fmi)]
-        material["fmi"] = fmi
-    return cache.get_or_build(material, make, build_folder, poll)
+
+def has_compiled(name: str, settings: Settings) -> bool:
+    """Whether the cache has the native FMU of a block for this machine."""
+    try:
+        return bool(cache.find(_block_material(name, settings) | _native_material((), fmi=2)))
+    except FmuError:  # none can be made here
+        return False
+
+
+def _block_material(name: str, settings: Settings) -> dict[str, Any]:
+    return {"block": name, "settings": to_jsonable_python(dict(settings))}
+
+
+def _native_material(platforms: Sequence[str], fmi: int) -> dict[str, Any]:
+    from hapticlink.fmus.native.compiler import compiler_version, host_platform
+
+    chosen = list(platforms) or [host_platform(fmi)]
+    return {"compiler": compiler_version(), "platforms": chosen, "fmi": fmi}

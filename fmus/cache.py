@@ -28,6 +28,7 @@ from hapticlink.fmus.versions import find_versions
 MAX_BUILD_TIME = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
 VERSIONS = ("hapticlink", "casadi", "pythonfmu")
+SOURCES = (".py", ".c", ".h", ".toml", ".png")
 
 
 def folder() -> Path | None:
@@ -106,11 +107,11 @@ def sha(text: str) -> str:
 
 @cache
 def sources(*packages: ModuleType) -> str:
-    """SHA-256 of the Python files, C files and icons of `packages`."""
+    """SHA-256 of the Python files, C files, scenes and icons of `packages`."""
     sha = hashlib.sha256()
     for package in packages:
         root = Path(next(iter(package.__path__)))
-        for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".c", ".h", ".png")):
+        for path in sorted(p for p in root.rglob("*") if p.suffix in SOURCES):
             sha.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return sha.hexdigest()
 
@@ -124,6 +125,12 @@ def source(module: str) -> str:
         return sources(sys.modules[loaded.__package__])
     file = getattr(loaded, "__file__", None)
     return hashlib.sha256(Path(file).read_bytes() if file else os.urandom(32)).hexdigest()
+
+
+def find(key_material: Mapping[str, Any]) -> Path | None:
+    """The cached FMU for `key_material`, if there is one that is whole."""
+    root = folder()
+    return root and _whole_file(root / key(key_material))
 
 
 def get_or_build(

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 import hapticlink as hl
-from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.stability.hand_cases import Case, worst_case
 from hapticlink.analysis.stability.hands import OWN, standing
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.components.specs.hand import ArmHand, SpringHand
@@ -107,7 +107,7 @@ def judged(seed: int, poses: int = 3) -> dict[str, Any]:
     row["cpu"] = round(time.process_time() - begun, 2)
     row |= {"verdict": found.verdict, "finding": found.finding}
     in_hands = [case for case in found.cases if not case.free]
-    case = max(in_hands, key=lambda case: case.severity)
+    case = worst_case(in_hands)
     row |= {"case": case.record(), "own": OWN in found.hands}
     row["run"] = run_case(name, options, found, case)
     says = "unstable" if found.in_hands == "unstable" else "stable"

@@ -128,11 +128,11 @@ def _units(system: System) -> dict[str, str]:
 
 
 def _varies_within_a_step(system: System, c: Connection) -> bool:
-    """Whether the held input of a plant is a polynomial within its step, as projectors and
-    semidefinite matrices are not."""
+    """Whether the hold of a plant's input varies within its step. Projectors and semidefinite
+    matrices are not counted."""
     if not c.hold or c.initial or system.fmu[c.target].sampled or c.kind in MATRICES:
         return False
-    return HOLDS[c.hold].degree > 0
+    return HOLDS[c.hold].degree != 0
 
 
 def _within_a_step(substeps: int) -> str:

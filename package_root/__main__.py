@@ -1,7 +1,6 @@
 """The command `hapticlink`, and `python -m hapticlink`: signals are held before the
 imports, and from here to the end of the process."""
 
-import os
 import signal
 
 from hapticlink.orchestrator.base import interrupt, process
@@ -9,9 +8,6 @@ from hapticlink.orchestrator.base import interrupt, process
 
 def main() -> None:
     process.open_streams()
-    # Matrices of a hundred rows: threads of BLAS wait for each other, several times as long as one
-    # computes.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     process.raise_gc_threshold()
     with interrupt.defer_signals(interrupt.end_process, after=signal.SIG_IGN):
         from hapticlink.commands import main as command

@@ -16,7 +16,8 @@ from hapticlink.fmus.native.source import component_source, number, table
 from hapticlink.fmus.reproducible_zip import guid_of
 from hapticlink.orchestrator.fmi.description import SERIALISED, STATE
 from hapticlink.orchestrator.run.compiled import build as loop
-from hapticlink.programs.memory_as_c import Regions, TypedData
+from hapticlink.orchestrator.run.compiled.regions import Regions
+from hapticlink.programs.memory_as_c import TypedData
 from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
 

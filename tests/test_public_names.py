@@ -2,19 +2,17 @@
 
 import base64
 import inspect
-import json
 import os
 import pydoc
-import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import hapticlink as hl
-from docs import make_api
+from docs import make_api, make_course
+from tests.notebooks import execute
 
 SCRIPT = Path(__file__).parents[1] / "docs" / "first_steps.py"
 
@@ -75,39 +73,11 @@ def test_the_first_steps_run(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("hapticlink-*"))  # no temporary folder is left
 
 
-def notebook(folder: Path) -> list[dict[str, Any]]:
-    """The script's cells of code with their outputs, after `nbconvert --execute` in `folder`."""
-    made = {"cells": cells(SCRIPT.read_text()), "metadata": {}, "nbformat": 4, "nbformat_minor": 4}
-    path = folder / "first_steps.ipynb"
-    path.write_text(json.dumps(made))
-    command = ["-m", "nbconvert", "--to", "notebook", "--execute", "--inplace", path.name]
-    done = subprocess.run(
-        [sys.executable, *command], cwd=folder, capture_output=True, text=True, check=False,
-        env={**os.environ, "TMPDIR": str(folder), "IPYTHONDIR": str(folder / "ipython")},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return [c for c in json.loads(path.read_text())["cells"] if c["cell_type"] == "code"]
-
-
-def cells(script: str) -> list[dict[str, Any]]:
-    """The cells of a script, each from a line `# %%` on; text is commented."""
-    found = []
-    for title, text in re.findall(r"^# %%(.*)\n((?:(?!# %%).*\n?)*)", script, re.MULTILINE):
-        if "[markdown]" in title:
-            source = re.sub("^# ?", "", text.strip(), flags=re.MULTILINE)
-            found.append({"cell_type": "markdown", "metadata": {}, "source": source})
-        else:
-            code = {"cell_type": "code", "metadata": {}, "outputs": [], "execution_count": None}
-            found.append(code | {"source": text.strip()})
-    return found
-
-
 def test_the_first_steps_show_themselves_in_a_notebook(tmp_path: Path) -> None:
     """Each in the cell whose value it is: verdict, mechanism and three numbers of a run, the
     picture of a figure, the table of a comparison, a replay."""
-    pytest.importorskip("ipykernel", reason="ipykernel is not installed")
-    pytest.importorskip("nbconvert", reason="nbconvert is not installed")
-    shown = {cell["source"][-1]: cell["outputs"] for cell in notebook(tmp_path)}
+    text = make_course.as_text(make_course.cells(SCRIPT.read_text(encoding="utf-8")))
+    shown = {cell["source"][-1]: cell["outputs"] for cell in execute(text, tmp_path)}
     value = {
         last: found[-1]["data"] for last, found in shown.items() if "data" in (found or [{}])[-1]
     }

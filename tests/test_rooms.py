@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5737,
-    "fmus": 2800,
-    "orchestrator": 12381,
-    "programs": 1116,
-    "analysis": 6741,
-    "visualization": 3273,
-    "api": 410,
-    "commands": 1350,
+    "components": 5808,
+    "fmus": 2814,
+    "orchestrator": 12934,
+    "programs": 1021,
+    "analysis": 7080,
+    "visualization": 3284,
+    "api": 430,
+    "commands": 1390,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
@@ -158,8 +158,11 @@ def test_no_building_has_more_code_than_its_budget() -> None:
     found = Counter[str]()
     for (building, *_), path in FILES.items():
         found[building] += _code_lines(path.read_text(encoding="utf-8"))
-    over = {b: f"{n} of {CODE_LINES[b]}" for b, n in found.items() if n > CODE_LINES[b]}
-    assert not over, "take out as much as you add, or say in the commit why it has to grow"
+    over = [
+        f"{b} had {had} lines and has {found[b]}" for b, had in CODE_LINES.items() if found[b] > had
+    ]
+    said = "; ".join(over)
+    assert not over, f"{said}: take out as much as you add, or say in the commit why it has to grow"
 
 
 @pytest.mark.parametrize("word", CAPABILITIES)

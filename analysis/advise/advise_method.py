@@ -30,6 +30,7 @@ from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.run_sweep import sweep
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.numbers import short
@@ -143,6 +144,7 @@ class Advice:
         }
 
 
+@one_blas_thread()
 def advise(
     scene: str | Path | Scene,
     options: Sequence[str],

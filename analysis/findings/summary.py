@@ -174,8 +174,9 @@ def describe_generated(peak: float, end: float, when: str = "") -> str:
     """What was generated (J): at most, at the time `when`, and by the end."""
     most, last = short(1e3 * peak), short(1e3 * abs(end))
     dissipated = f"dissipated {last} mJ"
-    if peak <= 0:
-        return f"generated no energy and {dissipated}" if end < 0 else "generated no energy"
+    if peak < ROUNDING_J:
+        none = "generated no energy"
+        return f"{none} and {dissipated}" if end < -ROUNDING_J else none
     if end > 0 and most == last:
         return f"generated {last} mJ by the end, and at no time more"
     by_the_end = f"generated {last} mJ" if end > 0 else dissipated
@@ -344,6 +345,8 @@ APART, TURNED = 1e-3, 0.02
 """Distance (m) and angle (rad) of handle and operational point at the start that are told."""
 SMALLEST_J = 1e-9
 """Energies below it have no line."""
+ROUNDING_J = 1e-12
+"""Energies below it are of sums that cancel."""
 
 USED = {
     "tracking": (POINT_POSE, HANDLE_POSE),

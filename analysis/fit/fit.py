@@ -15,6 +15,7 @@ from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.overrides import Options, toml
 from hapticlink.orchestrator.scene.scene import Scene
@@ -93,6 +94,7 @@ class Fitted:
         return "\n".join(lines) + "\n"
 
 
+@one_blas_thread()
 def fit(
     log: Path | str,
     scene: str | Path | Scene = "closed-loop",

@@ -14,6 +14,7 @@ from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep.grid import Axis, Point
 from hapticlink.analysis.sweep.job import Job, job
 from hapticlink.analysis.sweep.row import DONE, REFUSED, Row
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -113,6 +114,7 @@ def judged(session: SceneVariants, at: str, options: Sequence[str]) -> Row:
     }
 
 
+@one_blas_thread()
 def judge(each: Line, _: Path) -> Row:
     """The row of a line, with those of its points."""
     assert each.scene is not None

@@ -17,6 +17,7 @@ from hapticlink.analysis.sweep.row import DONE, Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import JOINT_RATES, POINT_VELOCITY
 from hapticlink.orchestrator.experiment import simulate
@@ -65,6 +66,7 @@ def jobs(scene: str | Path | Scene, options: Sequence[str], points: Sequence[Poi
     return made
 
 
+@one_blas_thread()
 def judge(each: Line, _: Path) -> Row:
     """The row of a check: the map's verdict, and that of a run of the scene."""
     assert each.scene is not None

@@ -13,8 +13,6 @@ from hapticlink.orchestrator.base.errors import InputFault
 
 DOUBLINGS = 10
 """How often a scale is doubled or halved on the way to a limit."""
-FINEST = 2
-"""Of a count, the part to which it is found."""
 COARSE, FINE = 0.05, 0.01
 """Of the logarithm of a scale, how well the largest is found."""
 Candidate = TypeVar("Candidate")
@@ -44,11 +42,11 @@ def largest_scale(holds: Callable[[float], bool], fine: float) -> Largest:
 
 
 def largest_count(holds: Callable[[int], bool], first: int, most: int) -> Largest:
-    """The largest count up to `most` that holds, on the way from the `first`, to a part FINEST of
-    it."""
+    """The largest count up to `most` that holds, on the way from the `first`: where it is limited
+    the next count does not hold."""
 
     def between(low: int, high: int) -> int | None:
-        return (low + high) // 2 if high - low > max(1, low // FINEST) else None
+        return (low + high) // 2 if high - low > 1 else None
 
     return _largest(holds, first, most, lambda n: n // 2, between)
 

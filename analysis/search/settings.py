@@ -43,7 +43,9 @@ HOLDS: dict[str, tuple[str, ...]] = {
     "pspm, passive": ("hold=pspm", *_PASSIVE),
 }
 """Options of holds, from the simplest on: of equally good ones the first is advised. `a, b`: hold a
-from slow to fast, b from fast to slow (`slope`: of the velocity, from slow to fast)."""
+from slow to fast, b from fast to slow (`slope`: of the velocity, from slow to fast). A choice, not
+the table of holds: these are combinations that the study of the mismatch has measured
+(results/mismatch), and `advise` simulates every one."""
 REMEDIES = ("zoh", "foh", "lead", "mean")
 """Holds of all connections with which an unstable scene is tried, as a single change."""
 GAINS: dict[str, tuple[str, ...]] = {

@@ -29,6 +29,7 @@ STEPS, POINTS = 12, 6
 def equilibrium(map_: LiftedMap, near: Vector) -> LinearPeriod:
     """The period of the map at its equilibrium, searched from a state `near` it. Raises InputFault
     where there is none."""
+    map_.work.counts["equilibria"] += 1
     for _ in range(POINTS):
         period = linear_period(map_, near)
         if period.moved <= TOLERANCE:

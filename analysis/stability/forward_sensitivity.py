@@ -8,21 +8,19 @@ perturbations M, a column each, and their errors D follow (linear_period.py)
 
 J is that of central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
 difference of its slopes to both sides; copies and holds without a regime have one side and E = 0.
-Of the evaluations of a hold that is a polynomial in time, degree + 1 are differentiated, and the
-others follow from these; those of a hold that gives its samples are the same at every age.
+A hold that is a polynomial in time is carried by that (polynomial_holds.py).
 For a doStep and a get of an FMU with a graph, J
 is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
 have a slope in one way only, or another one to each side, keep those by differences. The graph is
 evaluated at all points of these at once, where at z it has the result of the FMU. Slopes at the
 same numbers, with the same age of samples, are the same, so that around a state of rest each
-operation is differentiated once.
+operation is differentiated once; those of a block of the package in all scenes with its file.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Container, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Container, Hashable, Iterable
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -32,6 +30,15 @@ from numpy.typing import NDArray
 from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete
 from hapticlink.analysis.stability.graph_slopes import GraphSlopes, graph_slopes
+from hapticlink.analysis.stability.polynomial_holds import (
+    advanced_powers,
+    degree_of,
+    is_linear,
+    is_polynomial,
+    sample_arrives,
+    slopes_of_powers,
+)
+from hapticlink.analysis.stability.shared_work import KnownSlopes, SharedWork, Slopes
 from hapticlink.analysis.stability.state_vector import (
     SIGNALS,
     StateEntry,
@@ -40,8 +47,10 @@ from hapticlink.analysis.stability.state_vector import (
     ages,
     blocks,
     doubles,
+    parameters_of,
 )
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.operations import (
     Blend,
@@ -58,7 +67,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     flat,
 )
-from hapticlink.orchestrator.run.instructions import Finish
+from hapticlink.orchestrator.run.compiled.state import StateBlock
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -75,21 +84,11 @@ SAME = 1e-8
 @dataclass(frozen=True)
 class Reach:
     """What an operation touches: the state of its FMUs and holds, and which signals it reads and
-    writes; and by the ages of samples what it does since `begin`."""
+    writes."""
 
     state: StateVector
     reads: NDArray[np.intp]
     writes: NDArray[np.intp]
-    applied: dict[Any, Applied] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """J and E of an operation where it reads the numbers `at`."""
-
-    at: Vector
-    J: Matrix
-    E: Matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,76 +106,174 @@ class Applied:
     E: Matrix
 
 
-class ForwardSensitivity:
-    """The slopes of the operations of a simulation, within the closures of the scene's linkage."""
+Since = Hashable
+Key = tuple[Instruction, Since]
+"""An operation, and what beside the numbers its slopes depend on."""
+POWERS = " in powers"
+"""Behind the name of a hold: what its polynomial has beside its value."""
 
-    def __init__(self, simulation: Simulation, scene: Scene | None) -> None:
+
+class ForwardSensitivity:
+    """The slopes of the operations of a simulation, within the closures of the scene's linkage.
+    work: what it shares with other simulations of scenes with the same linkage."""
+
+    def __init__(self, simulation: Simulation, scene: Scene | None, work: SharedWork) -> None:
         self._simulation, self._scene = simulation, scene
         self.closures = Closures(scene.linkage if scene else None)
         self._reach: dict[Instruction, Reach | None] = {}
-        self._known: dict[Any, list[Slopes]] = {}
+        self._own: KnownSlopes = {}
+        self.work = work
         self._graphs: dict[str, GraphSlopes | None] = {}
         self._named: dict[Any, list[StateEntry]] = {}
+        self._polynomials = {n for n, hold in simulation.holds.items() if is_polynomial(hold)}
+        self._evaluated: dict[str, tuple[Fraction, bytes]] = {}
+        self._applied: dict[Key, Applied] = {}
 
     def forget(self, fmus: Container[str]) -> None:
         """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
         what they are told is the same with any."""
-        for operation, *rest in list(self._known):
+        for key in list(self._own):
+            operation = key[0]
             own = isinstance(operation, OfFmu) and operation.fmu in fmus
             if (own and not isinstance(operation, Set)) or isinstance(operation, Repeat):
-                del self._known[operation, *rest]
+                del self._own[key]
 
     def begin(self) -> None:
         """A period begins."""
-        for reach in filter(None, self._reach.values()):
-            reach.applied.clear()
+        self._applied.clear()
+        self._evaluated.clear()
 
-    def applied(self, tick: int, operation: Instruction, call: Call) -> Applied | None:
+    def has_slopes(self, operation: Instruction) -> bool:
+        """Whether an operation changes a state."""
+        return self._of(operation) is not None
+
+    def is_regular(self, operation: Instruction) -> bool:
+        """Whether the key of an operation is the same around every state of rest: of all but loops
+        that are iterated and holds with whole numbers of their own."""
+        if isinstance(operation, OfHold):
+            own = self._simulation.holds[operation.connection].own
+            return own is None and self._is_linear(operation.connection)
+        return not isinstance(operation, Repeat)
+
+    def applied(
+        self, tick: int, operation: Instruction, call: Call, key: Key | None = None
+    ) -> tuple[Key, Applied]:
         """Carries out an operation of a co-simulation at rest, in which its slopes depend on the
-        ages of samples alone; one of an FMU only where these are not known yet."""
-        if isinstance(operation, Finish):
-            return None
+        ages of samples alone, with what these are the same for: the `key`, where it is known; one
+        of an FMU only where these are not known yet."""
         reach = self._of(operation)
-        if reach is None:
-            call(tick)
-            return None
-        of_fmu = isinstance(operation, OfFmu)
-        since = b"" if of_fmu else reach.state.ages(tick, self._gives_sample(operation))
-        found = reach.applied.get(since)
-        if found and of_fmu:  # at rest it would change nothing
-            return found
+        assert reach is not None
+        key = key or (operation, self._since(tick, operation, reach))
+        found = self._applied.get(key)
+        if found and isinstance(operation, OfFmu):  # at rest it would change nothing
+            return key, found
         call = self._alone(operation, call)
         if found:
             call(tick)
-            return found
-        owners = tuple(o for o in reach.state.owners if o != SIGNALS)
-        before = reach.state.sizes()
+            return key, found
         if isinstance(operation, Step):  # steps that were left out have not moved the FMU
             begin = tick + Fraction(operation.part * operation.dticks, operation.parts)
             reach.state.set_time(
                 operation.fmu, float(begin * self._simulation.system.timeline.base)
             )
+        if isinstance(operation, Evaluate) and operation.connection in self._polynomials:
+            made = self._of_polynomial(tick, operation, call, reach, key[1])
+        else:
+            made = self._of_any(tick, operation, call, reach)
+        self._applied[key] = made
+        return key, made
+
+    def _since(self, tick: int, operation: Instruction, reach: Reach) -> Since:
+        """What the slopes of an operation depend on beside the numbers: the ages of samples; of a
+        polynomial that goes on, the time since it was evaluated."""
+        if isinstance(operation, OfFmu):
+            return b""
+        integers = reach.state.integers()
+        if isinstance(operation, Repeat):
+            self._evaluated.clear()
+        elif isinstance(operation, Push | Blend):
+            self._evaluated.pop(operation.connection, None)
+        elif isinstance(operation, Evaluate) and operation.connection in self._polynomials:
+            now, content = tick + operation.ahead, integers.tobytes()
+            before, same = self._evaluated.get(operation.connection, (now, b""))
+            self._evaluated[operation.connection] = now, content
+            hold = self._simulation.holds[operation.connection]
+            if same == content and not sample_arrives(hold, tick):
+                return Fraction(now - before)
+        return ages(integers, tick)
+
+    def _of_any(self, tick: int, operation: Instruction, call: Call, reach: Reach) -> Applied:
+        """What an operation does that is differentiated."""
+        owners = tuple(o for o in reach.state.owners if o != SIGNALS)
+        before = reach.state.sizes()
         slopes, after = self._slopes(tick, operation, call, reach)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
-        reach.applied[since] = made = Applied(
+        return Applied(
             operation, owners, counts, tuple(after), reach.reads, reach.writes, slopes.J, slopes.E
         )
-        return made
+
+    def _of_polynomial(
+        self, tick: int, operation: Evaluate, call: Call, reach: Reach, since: Since
+    ) -> Applied:
+        """What the evaluation of a hold does that is a polynomial in time, whose value is c_0."""
+        hold, held = self._simulation.holds[operation.connection], reach.writes
+        n, further = len(held), len(held) * degree_of(hold)
+        name, powers = operation.connection, operation.connection + POWERS
+        order = np.roll(np.arange(n + further), -n)  # the signals come last
+        if isinstance(since, Fraction):
+            call(tick)
+            J = advanced_powers(hold, float(since))[np.ix_(order, order)]
+            E = np.zeros_like(J)
+            return Applied(operation, (powers,), (further,), (further,), held, held, J, E)
+        if hold.link:  # in which samples arrive
+            arrived = self._of_any(tick, operation, call, reach)
+            J = arrived.J[: arrived.after[0], : arrived.before[0]]
+        else:
+            call(tick)
+            J = np.eye(reach.state.sizes()[name])
+        after, before = J.shape
+        J = np.vstack([J, self._powers(tick, operation, since)[order] @ J])
+        return Applied(
+            operation,
+            (name, powers),
+            (before, 0),
+            (after, further),
+            np.zeros(0, np.intp),
+            held,
+            J,
+            np.zeros_like(J),
+        )
+
+    def _powers(self, tick: int, operation: Evaluate, since: Since) -> Matrix:
+        """The slopes of c_0 to c_d by the numbers of the state of a hold."""
+        hold = self._simulation.holds[operation.connection]
+        at, base = StateBlock(hold.c).save().numbers, self._simulation.system.timeline.base
+        about = hold.row, hold.parts.matrix, hold.c.n, len(at), operation.ahead, base
+        known = self.work.slopes.setdefault((POWERS, *about, since), [])
+        wide = SAME * np.maximum(1.0, np.abs(at))
+        for slopes in known:
+            if is_linear(hold) or (np.abs(at - slopes.at) <= wide).all():
+                return slopes.J
+        J = slopes_of_powers(hold, tick, float(operation.ahead))
+        known.insert(0, Slopes(at, J, np.zeros_like(J)))
+        return J
 
     def _linear(self, operation: Instruction) -> bool:
         """Whether it copies numbers, or is one of a hold without a regime."""
-        if not isinstance(operation, Evaluate | Blend):
-            return isinstance(operation, Set | Push)
-        hold = self._simulation.system.connection[operation.connection].hold
-        return HOLDS[hold or ""].needs not in ("power", "spring")
+        if isinstance(operation, Evaluate | Blend):
+            return self._is_linear(operation.connection)
+        return isinstance(operation, Set | Push)
 
-    def _gives_sample(self, operation: Instruction) -> bool:
-        """Whether it is the evaluation of a hold whose value is one of its samples, unchanged: its
-        slopes depend on neither their ages nor their numbers."""
-        if not isinstance(operation, Evaluate):
-            return False
-        hold = HOLDS[self._simulation.system.connection[operation.connection].hold or ""]
-        return hold.gives_samples and hold.needs is None
+    def _copies(self, operation: Instruction) -> bool:
+        """Whether it only passes numbers on, so that its slopes are the same at all."""
+        if isinstance(operation, Push) and operation.connection in self._polynomials:
+            return is_linear(self._simulation.holds[operation.connection])
+        return isinstance(operation, Set)
+
+    def _is_linear(self, connection: str) -> bool:
+        """Whether the hold of a connection has no regime, as those that observe energy have."""
+        hold = self._simulation.system.connection[connection].hold
+        return HOLDS[hold or ""].needs not in ("power", "spring")
 
     def _alone(self, operation: Instruction, call: Call) -> Call:
         """The call of an operation that can be repeated from a state that was restored."""
@@ -219,25 +316,12 @@ class ForwardSensitivity:
         image, (_, written) = state.numbers(after), self._places(reach, after)
         own = zip(state.owners, state.parts(after), strict=True)
         sizes = [len(part) for owner, part in own if owner != SIGNALS]
-        since = ages(template.holds, tick, self._gives_sample(operation))
-        key = operation, len(z), len(image), since
-        known = self._known.setdefault(key, [])
+        key, known = self._find_known(tick, operation, template, (len(z), len(image)))
         wide = SAME * np.maximum(1.0, np.abs(z[read]))
-        anywhere = isinstance(operation, Set) or self._gives_sample(operation)
         for slopes in known:
-            if anywhere or (np.abs(z[read] - slopes.at) <= wide).all():
+            if self._copies(operation) or (np.abs(z[read] - slopes.at) <= wide).all():
                 return slopes, sizes
-        if nodes := self._nodes(operation, tick):
-            J, E = np.zeros((2, len(written), len(read)))
-            for node in nodes:
-                others = [other for other in nodes if other != node]
-                weight = math.prod((tick - other) / (node - other) for other in others)
-                state.restore(template)
-                there, _ = self._slopes(node, operation, call, reach)
-                J, E = J + weight * there.J, E + abs(weight) * np.abs(there.E)
-            state.restore(after)
-            known.insert(0, Slopes(z[read], J, E))
-            return known[0], sizes
+        self.work.counts["differentiated"] += 1
         inert = np.zeros(len(read), bool)
         if known:  # what nothing reads, as outputs, has the slopes that it has anywhere
             coordinates = self._coordinates(key, state, template)
@@ -274,21 +358,40 @@ class ForwardSensitivity:
         known.insert(0, Slopes(z[read], J, E))
         return known[0], sizes
 
-    def _nodes(self, operation: Instruction, tick: int) -> Sequence[int]:
-        """The ticks from whose slopes those of an evaluation at `tick` follow, by Lagrange's
-        formula: where all samples are equal, those of a hold that is a polynomial in time are
-        polynomials of its degree. None where they are found at the tick itself."""
-        if not isinstance(operation, Evaluate):
-            return ()
-        hold = self._simulation.holds[operation.connection]
-        row, own = hold.row, hold.c
-        if row.push != "samples" or row.needs or hold.link:
-            return ()
-        if not row.degree or own.count < 2:
-            return ()
-        before, newest = own.stamps[own.count - 2 : own.count]
-        nodes = [newest + k * (newest - before) for k in range(row.degree + 1)]
-        return nodes if tick not in nodes else ()
+    def _find_known(
+        self, tick: int, operation: Instruction, template: Template, sizes: tuple[int, int]
+    ) -> tuple[tuple[Any, ...], list[Slopes]]:
+        """The slopes of an operation that are known, of so many numbers before and after it, and by
+        what."""
+        key: tuple[Any, ...]
+        if isinstance(operation, Step | Get):
+            fmu = self._simulation.system.fmu[operation.fmu]
+            parameters = parameters_of(fmu, template.fmus[operation.fmu])
+            if parameters is not None:
+                seconds = 0.0
+                if isinstance(operation, Step):
+                    time = self._simulation.system.timeline
+                    seconds = time.seconds(operation.dticks) / operation.parts
+                file = fmu.name, fmu.description.guid
+                key = (type(operation), *file, seconds, parameters.tobytes(), *sizes)
+                return key, self.work.slopes.setdefault(key, [])
+        integers = [np.zeros(0, np.int64), *(each.integers for each in template.holds)]
+        since = ages(np.concatenate(integers), tick)
+        if isinstance(operation, Set):
+            setter = self._simulation.setters[operation.fmu, operation.now]
+            if isinstance(setter, Setter):
+                factors = None if setter.factors is None else setter.factors.tobytes()
+                guid = self._simulation.system.fmu[operation.fmu].description.guid
+                key = operation, guid, setter.where.tobytes(), factors, *sizes
+                return key, self.work.slopes.setdefault(key, [])
+        if isinstance(operation, Push) and self._is_linear(operation.connection):
+            hold = self._simulation.holds[operation.connection]
+            if not hold.own:
+                parts, order = hold.parts, np.argsort(hold.places).tobytes()
+                key = Push, hold.row, parts.matrix, (*parts.turns.items(),), order, *sizes, since
+                return key, self.work.slopes.setdefault(key, [])
+        key = operation, *sizes, since
+        return key, self._own.setdefault(key, [])
 
     def _in_graph(
         self, operation: Instruction, before: Template, own: Matrix
@@ -356,10 +459,14 @@ class ForwardSensitivity:
             case Repeat(body=body):
                 fmus = {op.fmu for op in flat(body) if isinstance(op, Step)}
                 return Reach(StateVector(simulation, fmus, set(blocks(simulation))), every, every)
-            case OfHold(connection) if HOLDS[system.connection[connection].hold or ""].needs:
+            case OfHold(connection) if not self._is_linear(connection):
                 shared = set(blocks(simulation)) - set(simulation.holds)
                 state = StateVector(simulation, set(), {connection} | shared)
                 return Reach(state, every, every)
+            case Push(connection):  # with derivatives or integrals behind what is held
+                state = StateVector(simulation, set(), {connection})
+                places = simulation.holds[connection].places
+                return Reach(state, np.unique(places), np.zeros(0, np.intp))
         touched = operation.signals(system)
         if touched is None:
             return None

@@ -3,9 +3,9 @@ spring hand that stands still there, and held by every hand."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from hapticlink.analysis.stability.modes import (
 )
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, user_of_block
@@ -32,6 +33,9 @@ from hapticlink.orchestrator.scene.scene import Scene
 SHARES = 3
 SLIGHT = 0.01
 """Growth rate (1/s) of a marginal case, which takes more than a minute to double."""
+TIE = 1e-6
+"""Difference of growth rates, relative to the larger and SLIGHT at least, up to which they are the
+same: which of them rounding makes the larger decides nothing."""
 DAMPINGS = 2.0 ** np.arange(-4, 7)
 """Of a free handle (N.s/m), that are tried."""
 CALMED = 0.1
@@ -68,11 +72,10 @@ class Case:
         return self.verdict == "unstable" and self.kind == "drift"
 
     @property
-    def severity(self) -> tuple[bool, bool, float]:
-        """What is worse is larger: in a hand rather than free, fast rather than drifting; the same
-        for growth rates that differ by rounding."""
-        growth = float(f"{self.growth:.9g}")
-        return self.verdict == "unstable" and not self.drifts, not self.free, growth
+    def rank(self) -> tuple[bool, bool]:
+        """What is worse is larger whatever its growth rate: fast rather than drifting, in a hand
+        rather than free."""
+        return self.verdict == "unstable" and not self.drifts, not self.free
 
     def record(self) -> dict[str, Any]:
         return {
@@ -86,6 +89,25 @@ class Case:
             "participation": dict(self.participation),
             "damping_needed": self.damping,
         }
+
+
+Item = TypeVar("Item")
+
+
+def first_of_largest(items: Iterable[Item], growth: Callable[[Item], float]) -> Item:
+    """The item with the largest growth rate (1/s), the first one of those that TIE."""
+    every = [*items]
+    largest = max(map(growth, every))
+    least = largest - TIE * max(SLIGHT, abs(largest)) if np.isfinite(largest) else largest
+    return next(item for item in every if growth(item) >= least)
+
+
+def worst_case(cases: Iterable[Case]) -> Case:
+    """The worst of some cases; of those that tie the first pose, in its first hand, which are
+    sorted from soft to firm."""
+    every = [*cases]
+    rank = max(case.rank for case in every)
+    return first_of_largest((c for c in every if c.rank == rank), lambda case: case.growth)
 
 
 class InHands:
@@ -156,16 +178,18 @@ def in_poses(
     poses: Sequence[Pose],
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
-    progress: Callable[[int, int], object] = lambda done, of: None,
+    begin: Callable[[str], object] = lambda pose: None,
+    work: SharedWork | None = None,
 ) -> tuple[list[Case], dict[str, str]]:
-    """The cases in all poses, and by pose why it has none."""
+    """The cases in all poses, each of which `begin` is told, and by pose why it has none."""
     cases: list[Case] = []
     without: dict[str, str] = {}
-    for i, pose in enumerate(poses):
+    for pose in poses:
         if any(case.pose == pose.name for case in cases):
             continue
+        begin(pose.name)
         try:
-            with at_pose(read, pose, held=hands.keys() != {UNHELD}) as (place, _):
+            with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, _):
                 # A constant wrench slides off what it presses on, whatever the loop does.
                 lasting = {
                     name: hand
@@ -177,5 +201,4 @@ def in_poses(
             without[pose.name] = str(fault)
         else:
             without.pop(pose.name, None)
-        progress(i + 1, len(poses))
     return cases, without

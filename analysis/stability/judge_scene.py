@@ -9,7 +9,7 @@ judged as it is, where its run comes to rest.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +19,7 @@ import numpy as np
 
 from hapticlink.analysis.search.acceptance import broken_limit
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.hand_cases import in_poses
+from hapticlink.analysis.stability.hand_cases import in_poses, worst_case
 from hapticlink.analysis.stability.hands import (
     FREE,
     HANDS,
@@ -29,7 +29,7 @@ from hapticlink.analysis.stability.hands import (
     holds,
     linearise_hand,
 )
-from hapticlink.analysis.stability.margin_and_remedy import Visited, improvements
+from hapticlink.analysis.stability.margin_and_remedy import MARGINS, Visited, improvements
 from hapticlink.analysis.stability.modes import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import (
     Pose,
@@ -41,8 +41,10 @@ from hapticlink.analysis.stability.poses import (
     rest,
     simulate_scene,
 )
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.short_hyperperiod import short
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
+from hapticlink.analysis.stability.told_steps import Progress, Steps
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.stability.workspace_grid import grid_poses
@@ -50,21 +52,23 @@ from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.fmu_files import prefer_compiled
 
 POSES, SPAN = 3, 3.0
 """Poses, evenly spaced in the first seconds of the scene's run."""
 GRID = 32
 """Most places along each side of a grid."""
-Progress = Callable[[str, int, int], object]
 Hands = Mapping[str, Hand | None]
 
 
+@one_blas_thread()
 def stability(
     scene: str | Path | Scene,
     options: Options = (),
@@ -97,8 +101,9 @@ def stability(
         raise InputFault("no linkage: nothing that a hand could hold")
     hands = hands_of(read.hand)
     read, rounded = short(with_quicker_fmus(read))
-    with interrupt.defer_signals(), process_cache.keep_unpacked():
-        (progress or _silent)("the scene's own run", 0, poses + 2)
+    with interrupt.defer_signals(), process_cache.keep_unpacked(), prefer_compiled():
+        steps = Steps(progress, 1)
+        steps.begin("the scene's own run")
         own, own_run = _visit_poses(read, poses, grid)
         own_fault = fault_of(own_run)
 
@@ -110,10 +115,11 @@ def stability(
                 raise InputFault(fault)
             return found, broken_limit(changed, run)
 
-        judged = _judge(read, visits, hands, bounds, progress, rounded)
+        judged = _judge(read, visits, hands, bounds, steps, rounded)
     return replace(judged, run_fault=own_fault)
 
 
+@one_blas_thread()
 def equilibrium_stability(
     scene: str | Path | Scene,
     options: Options = (),
@@ -144,10 +150,6 @@ def _require_bounds(bounds: Bounds) -> None:
         )
 
 
-def _silent(what: str, done: int, of: int) -> None:
-    """Tells nobody."""
-
-
 def hands_of(hand: Hand) -> dict[str, Hand]:
     """The family, with the hand of a scene, and no hand where that has no stiffness."""
     if holds(hand):
@@ -175,8 +177,10 @@ def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> St
     if read.hand is not None and not is_hand_replaced(read):
         hands = {OWN: linearise_hand(read.hand)}
     read, rounded = short(with_quicker_fmus(read))
+    steps = Steps(progress, 1)
+    steps.begin("the run until it rests")
     try:
-        return _judge(read, _at_rest, hands, bounds, progress, rounded)
+        return _judge(read, _at_rest, hands, bounds, steps, rounded)
     except InputFault as fault:
         if read.hand or read.device or read.controller or read.fmu:
             raise
@@ -199,31 +203,32 @@ def _judge(
     visits: Visited,
     hands: Hands,
     bounds: Bounds,
-    progress: Progress | None,
+    steps: Steps,
     rounded: str,
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
-    step, (visited, _) = progress or _silent, visits(read)
+    (visited, _), work = visits(read), SharedWork()
+    steps.expected += len(visited) + len(MARGINS)
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(
-            read, visited, hands, bounds, lambda done, of: step("poses", done + 1, of + 2)
+            read, visited, hands, bounds, lambda pose: steps.begin(f"pose at {pose}"), work
         )
         if not cases:
             name, why = next(iter(without.items()))
             raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
-        worst = max(cases, key=lambda case: case.severity)
+        worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
             pose = next(pose for pose in visited if pose.name == worst.pose)
             if pose.leaves(read, hands[worst.hand]):
                 break
             cases[cases.index(worst)] = replace(worst, verdict="marginal")
-            worst = max(cases, key=lambda case: case.severity)
+            worst = worst_case(cases)
         there = [case for case in cases if case.pose == worst.pose]
         near = {c.hand for c in there if c.kind == "divergence" and c.verdict == "marginal"}
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
-        step("margins", len(visited) + 1, len(visited) + 2)
+        steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
         judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
-        margin, remedies = improvements(read, judged, held, bounds, worst, visits)
+        margin, remedies = improvements(read, judged, held, bounds, worst, visits, work, steps)
         with linearisable(read) as (_, system, removed):
             frozen = (*removed, *frozen_nonlinearities.describe_switches(system))
     return Stability(

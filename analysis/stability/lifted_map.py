@@ -5,28 +5,29 @@ the state before, z_{k+1} = F(z_k), carried out by the FMUs, holds and operation
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity
+from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity, Key
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.state_vector import StateEntry, StateVector
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.plan.operations import Event, Instruction, OfFmu, Repeat
+from hapticlink.orchestrator.plan.operations import Event, Instruction, OfFmu, OfHold, Repeat
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
-from hapticlink.orchestrator.run.instructions import instructions
+from hapticlink.orchestrator.run.instructions import Finish, instructions
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
@@ -57,6 +58,26 @@ def _repetition(clock: Clock) -> int:
     return clock.period
 
 
+@dataclass(frozen=True, eq=False)
+class EventCalls:
+    """The operations of a kind of event, and the calls of the loop that carry them out."""
+
+    operations: tuple[Instruction, ...]
+    machine: Machine
+
+    @cached_property
+    def each(self) -> list[Call]:
+        return [self.machine.joined([operation]) for operation in self.operations]
+
+    @cached_property
+    def whole(self) -> Call:
+        return self.machine.joined(self.operations)
+
+    @cached_property
+    def of_holds(self) -> Call:
+        return self.machine.joined([each for each in self.operations if isinstance(each, OfHold)])
+
+
 class LiftedMap:
     """F of a system, from the first multiple of the hyperperiod on that is behind its start.
 
@@ -74,25 +95,28 @@ class LiftedMap:
         window: tuple[int, int] | None = None,
     ) -> None:
         self._simulation, time = simulation, plan.system.timeline
-        self._known: dict[Event, list[Instruction]] = {}
+        self._known: dict[Event, EventCalls] = {}
         self._plan, self.system = plan, plan.system
-        self._machine, self._calls = machine, dict[Instruction, Call]()
+        self._machine = machine
         self._sensitivity = sensitivity
         self._state = StateVector(simulation)
         length = window[1] if window else hyperperiod(time)
         self.period, self._begin = time.seconds(length), self._state.save()
         first = window[0] if window else length * math.ceil(behind_start(plan.system) / length)
-        moments = list(takewhile(lambda moment: moment.tick < first + length, plan))
+        within = takewhile(lambda moment: moment.tick < first + length, plan)
+        moments = [(tick, self._calls(event)) for tick, event in within]
         rest = None
-        for k, (tick, event) in enumerate(moment for moment in moments if moment.tick < first):
-            self._run(tick, event)
+        for k, (tick, event) in enumerate(each for each in moments if each[0] < first):
+            event.whole(tick)
             if not window and k % PINNED == 0:
                 rest = self._pin(rest)
-        self._moments = [m for m in moments if first <= m.tick < first + length]
+        self._moments = [each for each in moments if first <= each[0]]
         self.events = len(self._moments)
         self._template = self._state.save()
         self.coordinates: Sequence[StateEntry] = self._state.coordinates(self._template)
         self.start = self._state.numbers(self._template)
+        self._equal_keys: dict[tuple[Key, ...], tuple[Key, ...]] = {}
+        self._keys: dict[int, tuple[Key, ...]] = self.work.keys.setdefault(self._course(), {})
         free = [i for i, c in enumerate(self.coordinates) if not discrete(c)]
         self._free = np.array(free, dtype=np.intp)
 
@@ -106,7 +130,7 @@ class LiftedMap:
         """F(state)."""
         self._state.put(self._template, state)
         for tick, event in self._moments:
-            self._run(tick, event)
+            event.whole(tick)
         interrupt.raise_if_interrupted()
         return self._numbers()
 
@@ -119,15 +143,20 @@ class LiftedMap:
         self._sensitivity.begin()
         moving, moved, ran = self.moving, 0.0, False
         events, known = [], dict[tuple[int, ...], tuple[Applied, ...]]()
+        found: dict[int, tuple[Applied, ...]] = {}
         for k, (tick, event) in enumerate(self._moments):
-            each = (
-                self._sensitivity.applied(tick, operation, self._call(operation))
-                for operation in self._instructions(event)
-            )
-            acting = tuple(applied for applied in each if applied)
-            key = tuple(map(id, acting))
-            ran = ran or key not in known or any(isinstance(a.operation, Repeat) for a in acting)
-            events.append(known.setdefault(key, acting))
+            keys = id(self._keys.get(k))  # equal ones are the same object
+            if keys in found:  # at rest FMUs would change nothing
+                event.of_holds(tick)
+                events.append(found[keys])
+            else:
+                acting = self._record(k, tick, event)
+                same = tuple(map(id, acting))
+                repeats = any(isinstance(a.operation, Repeat) for a in acting)
+                ran = ran or same not in known or repeats
+                events.append(known.setdefault(same, acting))
+                if k in self._keys:
+                    found[id(self._keys[k])] = events[-1]
             if (k % PINNED == PINNED - 1 and ran) or k == self.events - 1:
                 ran = False
                 numbers = self._state.now()
@@ -137,6 +166,33 @@ class LiftedMap:
         self._numbers()
         interrupt.raise_if_interrupted()
         return float(moved), events
+
+    def _record(self, k: int, tick: int, event: EventCalls) -> tuple[Applied, ...]:
+        """What the k-th event of the period does, operation by operation."""
+        sensitivity, known = self._sensitivity, iter(self._keys.get(k, ()))
+        found = []
+        for operation, call in zip(event.operations, event.each, strict=True):
+            if isinstance(operation, Finish):  # steps are waited for one by one
+                continue
+            if not sensitivity.has_slopes(operation):
+                call(tick)
+            elif applied := sensitivity.applied(tick, operation, call, next(known, None)):
+                found.append(applied)
+        if k not in self._keys and all(map(sensitivity.is_regular, event.operations)):
+            keys = tuple(key for key, _ in found)
+            self._keys[k] = self._equal_keys.setdefault(keys, keys)
+        return tuple(applied for _, applied in found)
+
+    def _course(self) -> Hashable:
+        """What the keys of all operations of a period depend on."""
+        kinds = list(dict.fromkeys(event for _, event in self._moments))
+        moments = tuple((tick, kinds.index(event)) for tick, event in self._moments)
+        begin = self._state.integers().tobytes()
+        return moments, tuple(event.operations for event in kinds), begin
+
+    @property
+    def work(self) -> SharedWork:
+        return self._sensitivity.work
 
     def _pin(self, rest: Vector | None) -> Vector:
         """Puts FMUs and signals, not holds, back to what they are in `rest`, a state, and gives it;
@@ -167,7 +223,7 @@ class LiftedMap:
         return sum(
             isinstance(operation, kind) and operation.fmu == fmu
             for _, event in self._moments
-            for operation in self._instructions(event)
+            for operation in event.operations
         )
 
     def outputs(self, fmu: str) -> slice:
@@ -196,26 +252,16 @@ class LiftedMap:
             )
         return found
 
-    def _run(self, tick: int, event: Event) -> None:
-        for instruction in self._instructions(event):
-            self._call(instruction)(tick)
+    def _calls(self, event: Event) -> EventCalls:
+        if event not in self._known:
+            self._known[event] = EventCalls(self._instructions(event), self._machine)
+        return self._known[event]
 
-    def _call(self, instruction: Instruction) -> Call:
-        """One call of the loop that carries out an instruction alone."""
-        if instruction not in self._calls:
-            self._calls[instruction] = self._machine.joined([instruction])
-        return self._calls[instruction]
-
-    def _instructions(self, kind: Event) -> list[Instruction]:
+    def _instructions(self, kind: Event) -> tuple[Instruction, ...]:
         """The instructions of a kind of event, without those that write rows, measure energy or end
         a run."""
-        if kind not in self._known:
-            self._known[kind] = [
-                instruction
-                for instruction in instructions(self._plan.block(kind), self._simulation)
-                if not instruction.observes
-            ]
-        return self._known[kind]
+        every = instructions(self._plan.block(kind), self._simulation)
+        return tuple(instruction for instruction in every if not instruction.observes)
 
 
 def behind_start(system: System) -> int:
@@ -234,9 +280,11 @@ def long_enough(scene: Scene, system: System) -> System:
 
 
 @contextmanager
-def open_lifted_map(system: System, scene: Scene | None = None) -> Iterator[LiftedMap]:
+def open_lifted_map(
+    system: System, scene: Scene | None = None, work: SharedWork | None = None
+) -> Iterator[LiftedMap]:
     """The lifted map of `system`, with its FMUs loaded; the state is perturbed within the loop
-    closures of `scene`.
+    closures of `scene`. work: what it shares with other maps of the same linkage.
 
     Raises InputFault where there is none: rates and latencies that vary, an
     FMU whose state cannot be read.
@@ -255,5 +303,5 @@ def open_lifted_map(system: System, scene: Scene | None = None) -> Iterator[Lift
         simulation.step_checks.clear()
         simulation.start()
         without_friction(simulation.holds.values())
-        sensitivity = ForwardSensitivity(simulation, scene)
+        sensitivity = ForwardSensitivity(simulation, scene, work or SharedWork())
         yield LiftedMap(Plan(system), simulation, sensitivity, Machine(simulation))

@@ -182,7 +182,7 @@ class LinearPeriod:
     @cached_property
     def linear(self) -> Linearisation:
         """The linearisation over the coordinates that act on themselves."""
-        whole = _product(self._steps)
+        whole = _product(self._steps, self.map_.work.counts)
         taken, A, D = whole.before, whole.C, whole.E
         kept = ~constant(A, np.ones(len(A), dtype=bool))
         V = np.zeros((self.rows, np.count_nonzero(kept)))
@@ -245,6 +245,7 @@ class LinearPeriod:
         return steps
 
     def _step(self, event: Sequence[Act], start: Rows, end: Rows) -> _Step:
+        self.map_.work.counts["products"] += 1
         X, D = np.zeros((2, self.rows, len(start)))
         X[start, np.arange(len(start))] = 1.0
         for act in event:
@@ -272,12 +273,13 @@ class LinearPeriod:
             live &= np.frombuffer(starts[-1], bool)
 
 
-def _product(steps: Sequence[_Step]) -> _Step:
+def _product(steps: Sequence[_Step], counts: Counter[str]) -> _Step:
     """All steps as one. The pair that follows each other most often is multiplied once for all its
     places, again and again, so that equal frames share their products, and equal steps powers."""
     while len(steps) > 1:
         (first, later), _ = Counter(pairwise(steps)).most_common(1)[0]
         both, merged = first.then(later), list[_Step]()
+        counts["products"] += 1
         for step in steps:
             # A product cannot be the first of this pair: each is new.
             if merged and merged[-1] is first and step is later:
@@ -307,7 +309,7 @@ def linear_period(map_: LiftedMap, point: Vector) -> LinearPeriod:
     kinds = {id(event): event for event in events}
     for applied in chain.from_iterable(kinds.values()):
         for owner, *both in zip(applied.owners, applied.before, applied.after, strict=True):
-            sizes[owner] = max(sizes[owner], *both)
+            sizes[owner] = max(sizes.get(owner, 0), *both)
     places = np.concatenate([[0], np.cumsum(list(sizes.values()))])
     first = dict(zip(sizes, places.tolist(), strict=False))
     made: dict[int, Act] = {}

@@ -8,7 +8,7 @@ A mode that only drifts counts as stable.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 
 from hapticlink.analysis.search.search import (
@@ -18,12 +18,15 @@ from hapticlink.analysis.search.search import (
     largest_scale,
 )
 from hapticlink.analysis.search.settings import LAWS, REMEDIES, set_rate
-from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses
+from hapticlink.analysis.stability.hand_cases import Case, InHands, first_of_largest, in_poses
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
+from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames
+from hapticlink.analysis.stability.told_steps import Steps
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
@@ -32,7 +35,7 @@ from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
 
-FINE = 0.1
+FINE = 0.02
 """Of the logarithm of the factor on all stiffnesses."""
 LATEST, SLOWEST = 8, 64
 """Haptic periods up to which a further delay, and a frame, are tried."""
@@ -42,6 +45,7 @@ DAMPINGS = (0.5, 2.0)
 """Factors on the damping of the coupling that are tried."""
 FASTER = (2, 4)
 """Factors on rates that are tried."""
+MARGINS = "stiffness", "delay", "rate"
 TRIED = 3
 """Remedies that are judged in all poses."""
 DECAY = 0.05
@@ -58,14 +62,19 @@ class Margin:
     """How far the worst pose is from the limit in all hands; None where it has no such quantity."""
 
     stiffness: float | None
-    """The factor on all stiffnesses, dampings by its root, up to which it is stable; 0 where it is
-    unstable with any."""
+    """The factor on all stiffnesses, dampings by its root, up to which it is stable, to FINE of its
+    logarithm; 0 where it is unstable with all that were tried."""
     delay: float | None
-    """The further delay (s) of all that the controller reads."""
+    """The further delay (s) of all that the controller reads, in whole haptic periods: with one
+    more it is unstable. None, too, where it is unstable with none."""
     rate: float | None
-    """The lowest graphics rate (Hz) down to which it is stable; infinite where it is with none."""
+    """The lowest graphics rate (Hz) down to which it is stable with frames of whole haptic periods:
+    with frames a period longer it is unstable. Infinite where it is with all that were tried."""
     not_searched_further: tuple[str, ...] = ()
     """The quantities that are stable as far as they were searched: at least these."""
+    alone: float = 0.0
+    """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
+    where it is no more than a drift."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +98,15 @@ def improvements(
     bounds: Bounds,
     worst: Case,
     visited: Visited,
+    work: SharedWork | None = None,
+    steps: Steps | None = None,
 ) -> tuple[Margin, tuple[Remedy, ...]]:
     """The margin in the `worst` pose, and what ends its instability, as `remedies`; nothing where
     it is stable. visited: gives the poses in which the scene with other options is judged."""
     pose = next(pose for pose in poses if pose.name == worst.pose)
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
-    search = _Search(read, pose, held, bounds)
+    search = _Search(read, pose, held, bounds, work or SharedWork(), steps or Steps(None, 0))
     stable = worst.free or worst.verdict != "unstable" or worst.drifts
     with search.place() as (place, _):
         margin = search.margin(place)
@@ -111,8 +122,12 @@ class _Search:
         pose: Pose,
         hands: Mapping[str, Hand | None],
         bounds: Bounds,
+        work: SharedWork,
+        steps: Steps,
     ) -> None:
         self._read, self._pose, self._hands, self._bounds = read, pose, hands, bounds
+        self._work, self._steps = work, steps
+        self._known: dict[tuple[str, ...], float] = {}
         self._haptic = exact(self._read.haptics.rate)
 
     def place(
@@ -120,47 +135,68 @@ class _Search:
     ) -> AbstractContextManager[tuple[RestingScene, Pose]]:
         """The scene at rest in the pose; with a change, in frames of whole haptic periods."""
         read = whole_frames(open_scene.load(self._read, change)) if change else self._read
-        return at_pose(read, self._pose, held=self._hands.keys() != {UNHELD})
+        return at_pose(read, self._pose, self._hands.keys() != {UNHELD}, work=self._work)
 
     def margin(self, place: RestingScene) -> Margin:
         found: dict[str, Largest] = {}
+        self._steps.tell(f"margins at {self._pose.name}")
         if place.gains.laws:
+            self._steps.begin("margin of stiffness")
             found["stiffness"] = largest_scale(lambda s: self._stable(place, s), FINE)
         stable = ("stiffness" in found and found["stiffness"].value >= 1.0) or self._stable(place)
         if CONTROLLER in place.map.system.fmu:
-            found["delay"] = Largest(0.0)
+            self._steps.begin("margin of delay")
             if stable:
                 found["delay"] = largest_count(lambda n: self._stable(place, late=n), 1, LATEST)
         if self._read.graphics is not None:
+            self._steps.begin("margin of the graphics rate")
             found["rate"] = self._slowest_frame(stable)
         beyond = tuple(name for name, limit in found.items() if not limit.limited)
         stiffness, delay, frame = (found.get(name) for name in ("stiffness", "delay", "rate"))
         return Margin(
             stiffness=stiffness.value if stiffness else None,
             delay=float(int(delay.value) / self._haptic) if delay else None,
-            rate=self._frame_rate(int(frame.value)) if frame else None,
+            rate=self._frame_rate(int(frame.value), stable) if frame else None,
             not_searched_further=beyond,
+            alone=self._alone(place),
         )
 
-    def _frame_rate(self, periods: int) -> float:
-        """The graphics rate (Hz) whose frames are so many haptic periods."""
-        return float(self._haptic / periods) if periods else float("inf")
+    def _alone(self, place: RestingScene) -> float:
+        with suppress(InputFault, FmuFault):  # no equilibrium with the scene's gains
+            return growth_alone(place.period({}), self._bounds)
+        return 0.0
+
+    def _frame_rate(self, periods: int, stable: bool) -> float:
+        """The graphics rate (Hz) whose frames are so many haptic periods; of the scene's own frames
+        its own rate, where that is stable: it need not be a whole number of periods."""
+        if not periods:
+            return float("inf")
+        own = self._read.graphics.rate if self._read.graphics else None
+        if stable and periods == frame_length(self._read) and isinstance(own, int | float | str):
+            return float(exact(own))
+        return float(self._haptic / periods)
 
     def _slowest_frame(self, stable: bool) -> Largest:
-        """The longest frame, in haptic periods, that is stable, with all shorter ones that were
-        tried, from the scene's own on, at which it is `stable` or not."""
+        """The longest frame, in haptic periods, that is stable, searched from the scene's own on,
+        with which it is `stable` or not where it is not rounded."""
         own = frame_length(self._read)
 
         def holds(n: int) -> bool:
-            return (
-                stable if n == own else self._growth([set_rate("graphics", self._haptic / n)]) < 0.0
-            )
+            if n == own and stable:
+                return True
+            self._steps.tell(f"margin of the graphics rate: {self._frame_rate(n, stable):.3g} Hz")
+            return self._growth([set_rate("graphics", self._haptic / n)]) < 0.0
 
         return largest_count(holds, own, SLOWEST)
 
     def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
         """Whether all hands are stable with gains scaled, and all that the controller reads some
         haptic periods later."""
+        self._steps.tell(
+            f"margin of delay: {late} haptic periods"
+            if late
+            else f"margin of stiffness: times {scale:.3g}"
+        )
         try:
             scales = {} if scale == 1.0 else dict.fromkeys(place.gains.laws, scale)
             return InHands(place, scales, late).worst(self._hands, self._bounds) < 0.0
@@ -170,11 +206,13 @@ class _Search:
     def _growth(self, change: Sequence[str]) -> float:
         """With a change, the growth rate of a hand in the pose that is unstable, or of the worst
         one where none is; infinite where there is no equilibrium."""
-        try:
-            with self.place(change) as (place, _):
-                return InHands(place).worst(self._hands, self._bounds)
-        except (InputFault, FmuFault):
-            return float("inf")
+        if (change := tuple(change)) not in self._known:
+            try:
+                with self.place(change) as (place, _):
+                    self._known[change] = InHands(place).worst(self._hands, self._bounds)
+            except (InputFault, FmuFault):
+                self._known[change] = float("inf")
+        return self._known[change]
 
     def softer(self, place: RestingScene, margin: Margin) -> tuple[str, ...]:
         """Gains below the limit; nothing where no gains are stable."""
@@ -202,6 +240,8 @@ class _Search:
         if read.graphics is not None:
             assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
             rate = exact(read.graphics.rate)
+            if (whole := self._haptic / frame_length(read)) != rate:
+                yield (set_rate("graphics", whole),)
             if margin.rate is not None and margin.rate > rate:
                 rate = self._haptic / max(1, round(self._haptic / margin.rate))
             for factor in (1, *FASTER):
@@ -220,33 +260,57 @@ class _Search:
         """The first of those that are best in the worst pose with which the scene is stable, judged
         as it will be with them, in the poses of its changed run; the best of TRIED where none is.
         And softer gains with which all decays."""
-        growth = {change: self._growth(change) for change in candidates}
-        # What leaves the same mode of an arm differs by rounding: fewer options, which come first.
-        best = sorted(growth, key=lambda change: float(f"{growth[change]:.9g}"))[:TRIED]
+        self._steps.expected += len(candidates) + min(TRIED, len(candidates))
+        growth = {}
+        for change in candidates:
+            self._steps.begin(_name(change, softer))
+            growth[change] = self._growth(change)
+        # What leaves the same mode of an arm ties: fewer options, which come first.
+        left, best = [*growth], list[tuple[str, ...]]()
+        while left and len(best) < TRIED:
+            best.append(first_of_largest(left, lambda change: -growth[change]))
+            left.remove(best[-1])
         judged = list(
             judge_best_first(
                 best[:1] + [change for change in best[1:] if growth[change] < 0.0],
-                lambda changes: [self._in_all(change, visited) for change in changes],
+                lambda changes: [self._in_all(change, softer, visited) for change in changes],
                 lambda remedy: remedy.stable and not remedy.marginal and not remedy.breaks,
             )
         )
         if growth.get(softer, 0.0) < 0.0 and softer not in (remedy.options for remedy in judged):
-            judged.append(self._in_all(softer, visited))
+            judged.append(self._in_all(softer, softer, visited))
+        judged = [remedy for remedy in judged if remedy.growth < float("inf")]
         every = sorted(
             judged, key=lambda r: (r.growth >= 0.0, bool(r.breaks), len(r.marginal), r.growth)
         )
         return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
 
-    def _in_all(self, change: tuple[str, ...], visited: Visited) -> Remedy:
+    def _in_all(self, change: tuple[str, ...], softer: tuple[str, ...], visited: Visited) -> Remedy:
+        name = _name(change, softer)
+        self._steps.begin(f"{name}: its own run")
         changed, _ = short(open_scene.load(self._read, change))
         try:
             poses, broken = visited(changed)
         except (InputFault, FmuFault):  # its run fails
             return Remedy(change, float("inf"), False)
-        cases, without = in_poses(changed, poses, self._hands, self._bounds)
+        cases, without = in_poses(
+            changed,
+            poses,
+            self._hands,
+            self._bounds,
+            lambda pose: self._steps.tell(f"{name}: pose at {pose}"),
+            self._work,
+        )
         worst = _worst(cases) if cases and not without else float("inf")
         marginal = dict.fromkeys(case.hand for case in cases if case.verdict == "marginal")
         return Remedy(change, worst, worst < -DECAY, tuple(marginal), broken)
+
+
+def _name(change: tuple[str, ...], softer: tuple[str, ...]) -> str:
+    others = [option for option in change if option not in softer]
+    return "remedy " + " and ".join(
+        [*others, *(["softer gains"] if len(others) < len(change) else [])]
+    )
 
 
 def _worst(cases: Sequence[Case]) -> float:

@@ -35,11 +35,14 @@ from numpy.typing import NDArray
 from scipy.linalg import eig, matrix_balance
 
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
+from hapticlink.orchestrator.base.errors import InputFault
 
 ONE = 1e-7
 """Largest deviation from 1 of the diagonal entry of a parameter."""
 FLOOR = 1e-9
 """Relative error of the entries of A by rounding."""
+DOUBLED = 2.0
+"""Spectral radius up to which a growing mode may be marginal."""
 NEAR = 1e-4
 """Largest |z - 1| of a neutral mode, however uncertain z is: one further off may grow."""
 
@@ -123,8 +126,10 @@ class Mode:
 
 
 def verdict(radius: float, uncertainty: float) -> str:
-    """stable, unstable, or marginal where a spectral radius is 1 within its uncertainty."""
-    if abs(radius - 1.0) <= uncertainty:
+    """stable, unstable, or marginal where a spectral radius is 1 within its uncertainty. What grows
+    beyond DOUBLED is unstable: over the many operations of a period the relative error of a large
+    number becomes larger than 1, which does not make it 1."""
+    if abs(radius - 1.0) <= uncertainty and radius <= DOUBLED:
         return "marginal"
     return "unstable" if radius > 1.0 else "stable"
 
@@ -135,7 +140,10 @@ def judged_modes(modes: Sequence[Mode]) -> Sequence[Mode]:
 
 
 def modes(linear: Linearisation, period: float) -> list[Mode]:
-    """The modes, that of the largest |z| first; of a complex pair the one with omega > 0."""
+    """The modes, that of the largest |z| first; of a complex pair the one with omega > 0. Raises
+    InputFault where A is not finite."""
+    if not np.isfinite(linear.A).all():
+        raise InputFault("its small motions grow beyond all numbers within a period")
     scale = linear.scales
     A, E = linear.A * scale / scale[:, None], np.abs(linear.E * scale / scale[:, None])
     E = np.maximum(E, FLOOR * np.abs(A))

@@ -54,6 +54,7 @@ from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Vector
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact, write_exact
 from hapticlink.orchestrator.scene.overrides import Options
@@ -126,6 +127,7 @@ class Passivity:
             yield from self.two_port.lines()
 
 
+@one_blas_thread()
 def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     """The passivity of the user's port of a scene, around its equilibrium, and the absolute
     stability of the rendering between the hand and the virtual mechanism behind a device. Of

@@ -14,6 +14,7 @@ from hapticlink.analysis.findings.tracking import table_of
 from hapticlink.analysis.stability.hands import FIRM, linearise_hand, spring, standing
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
@@ -237,11 +238,11 @@ def _average(run: Results, linkage: Linkage, since: float) -> Pose:
 
 def _read_poses(run: Results) -> Table:
     table = table_of(run, POINT_POSE)
-    if table is None or JOINT_COORDINATES not in table or not len(table["time"]):
-        raise InputFault(
-            f"{POINT_POSE} and {JOINT_COORDINATES} are not recorded: no poses of a run"
-        )
-    return table
+    if table is not None and JOINT_COORDINATES in table and len(table["time"]):
+        return table
+    if fault := fault_of(run):
+        raise InputFault(f"the scene's own run fails before its first pose: {fault}")
+    raise InputFault(f"{POINT_POSE} and {JOINT_COORDINATES} are not recorded: no poses of a run")
 
 
 def _force(table: Table) -> Matrix:
@@ -263,21 +264,26 @@ def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
 
 @contextmanager
 def at_pose(
-    read: Scene, pose: Pose, held: bool = True, start: Vector | None = None
+    read: Scene,
+    pose: Pose,
+    held: bool = True,
+    start: Vector | None = None,
+    work: SharedWork | None = None,
 ) -> Iterator[tuple[RestingScene, Pose]]:
     """The scene at rest in a pose, `held` there by a firm spring or as it is, and the pose as it is
     pressed: a hand that slides off what it touches presses lightly. The equilibrium is searched
-    from the state `start`. Raises InputFault or FmuFault where there is none."""
+    from the state `start`; `work` as of `open_lifted_map`. Raises InputFault or FmuFault where
+    there is none."""
     with ExitStack() as stack:
         try:
             options = pose.held if held else {}
-            place = stack.enter_context(resting(read, options, start, pose.joints))
+            place = stack.enter_context(resting(read, options, start, pose.joints, work))
             _require_touch(pose, place)
         except (InputFault, FmuFault):
             if not pose.touches:
                 raise
             pose = pose.lighter
-            place = stack.enter_context(resting(read, pose.held, start, pose.joints))
+            place = stack.enter_context(resting(read, pose.held, start, pose.joints, work))
         yield place, pose
 
 
@@ -299,8 +305,9 @@ def at_equilibrium(
     with ExitStack() as stack:
         at_rest: list[Pose] = []
         held_at: dict[str, RestingScene] = {}
+        work = SharedWork()
         for pose in candidates:
-            found = at_pose(read, pose, start=starts.get(pose.name))
+            found = at_pose(read, pose, start=starts.get(pose.name), work=work)
             try:
                 place, pressed = stack.enter_context(found)
                 _require_touch(pose, place)

@@ -18,6 +18,7 @@ from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, ope
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints, linearisable
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
@@ -133,19 +134,21 @@ def resting(
     options: Options = (),
     start: Vector | None = None,
     joints: Joints | None = None,
+    work: SharedWork | None = None,
 ) -> Iterator[RestingScene]:
     """A scene with `options` at its equilibrium next to its start, to the pose `joints` or to the
-    state `start`, in the hand that it has. Raises InputFault or FmuFault where it has none."""
+    state `start`, in the hand that it has; `work` as of `open_lifted_map`. Raises InputFault or
+    FmuFault where it has none."""
     with (
         linearisable(scene, options, joints) as (read, system, _),
-        resting_system(read, system, start) as place,
+        resting_system(read, system, start, work) as place,
     ):
         yield place
 
 
 @contextmanager
 def resting_system(
-    read: Scene, system: System, start: Vector | None = None
+    read: Scene, system: System, start: Vector | None = None, work: SharedWork | None = None
 ) -> Iterator[RestingScene]:
     """`resting` of a system that is built."""
     with ExitStack() as stack:
@@ -154,7 +157,7 @@ def resting_system(
 
         def rested(scale: float) -> RestingScene:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
-            map_ = stack.enter_context(open_lifted_map(softer, read))
+            map_ = stack.enter_context(open_lifted_map(softer, read, work))
             return RestingScene(map_, gains, T, start, scale)
 
         try:

@@ -7,7 +7,7 @@ floating-point number stay those of a template, an instant of the simulation its
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
 
@@ -125,9 +125,10 @@ class StateVector:
         parts += (block.save().numbers for block in self._holds.values())
         return np.concatenate(parts)
 
-    def ages(self, tick: int, arrived_only: bool) -> bytes:
-        """The `ages` of the samples of each hold as it is."""
-        return ages([block.save() for block in self._holds.values()], tick, arrived_only)
+    def integers(self) -> NDArray[np.int64]:
+        """The whole numbers of holds and energy tanks as they are."""
+        every = [block.integers() for block in self._holds.values()]
+        return np.concatenate([np.zeros(0, np.int64), *every])
 
     def sizes(self) -> dict[str, int]:
         """How many numbers each owner has now."""
@@ -172,13 +173,23 @@ def blocks(simulation: Simulation) -> dict[str, StateBlock]:
     return found | {name: StateBlock(tank) for name, tank in tanks.items()}
 
 
-def ages(saved: Iterable[Saved], tick: int, arrived_only: bool) -> bytes:
-    """The whole numbers of saved states: stamps of samples relative to a tick, counts, which are
-    far smaller, as they are; of either, with `arrived_only`, whether they are behind it."""
-    integers = np.concatenate([np.zeros(0, np.int64), *(each.integers for each in saved)])
-    if arrived_only:
-        return (integers <= tick).tobytes()
+def ages(integers: NDArray[np.int64], tick: int) -> bytes:
+    """The whole numbers of holds: stamps of samples relative to a tick, counts, which are far
+    smaller, as they are."""
     return np.where(8 * integers > tick, tick - integers, integers).tobytes()
+
+
+def parameters_of(fmu: Fmu, state: bytes) -> Vector | None:
+    """The parameters in the serialised state of a block of the package, which ends with its time,
+    its other numbers in the order of their references, and its states; None of others."""
+    about = fmu.description
+    if about.block is None or about.states is None:
+        return None
+    scalars = [s for s in about.scalars if s.causality != "independent"]
+    scalars.sort(key=lambda s: s.reference)
+    kept = doubles(state)[-len(scalars) - len(about.states) :]
+    fixed = [i for i, s in enumerate(scalars) if s.causality not in ("input", "output")]
+    return kept[fixed]
 
 
 def size(system: System) -> int:

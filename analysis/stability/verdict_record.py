@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.search.search import DOUBLINGS
+from hapticlink.analysis.stability.hand_cases import Case, worst_case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
 from hapticlink.analysis.stability.modes import Bounds
@@ -117,7 +118,7 @@ class Stability:
             where = f"in {hands} and {in_poses}"
             return f"drifts slowly, and does not vibrate, {where}: {_name_case(worst)}"
         if self.verdict == "not held":
-            loose = max((c for c in self.cases if c.free), key=lambda c: c.severity)
+            loose = worst_case(c for c in self.cases if c.free)
             if loose.verdict != "unstable":
                 return f"not held: in free air it does not grow, nor come to rest; {calm}"
             does = "drifts" if loose.drifts else f"shows a growing {loose.kind}"
@@ -141,12 +142,17 @@ class Stability:
             )
         yield f"{'hand':28s} {'worst pose':24s} {'growth 1/s':>11s} {'Hz':>7s}  what"
         for hand in _hands(self.cases):
-            worst = max((c for c in self.cases if c.hand == hand.hand), key=lambda c: c.severity)
+            worst = worst_case(c for c in self.cases if c.hand == hand.hand)
             what = worst.kind if worst.verdict == "unstable" else worst.verdict
             yield (
                 f"{worst.hand:28s} {worst.pose:24s} {worst.growth:11.3g} {worst.hertz:7.3g}  {what}"
             )
         yield f"margin at {self.worst.pose}: {', '.join(self._margins())}"
+        if self.margin.alone:
+            yield (
+                f"at {self.worst.pose} the mechanism leaves its pose by itself: without hand and "
+                f"rendering small motions grow at {self.margin.alone:.3g} 1/s"
+            )
         for remedy in self.remedies:
             options = " ".join(f"--set '{option}'" for option in remedy.options)
             how = f"decays at {'' if remedy.stable else 'only '}{-remedy.growth:.2g} 1/s"
@@ -160,7 +166,7 @@ class Stability:
                 how += f"; but in its run {remedy.breaks}"
             yield f"{'remedy' if remedy is self.remedies[0] else 'or'}: {options}: {how}"
         if not self.remedies and self.verdict == "unstable":
-            yield "remedy: no single change of hold, rate, gain or damping that was tried"
+            yield "remedy: none of the changes of hold, rate, gain and damping that were tried"
         if self.worst.participation and self.verdict != "stable":
             parts = ", ".join(f"{name} {share:.2f}" for name, share in self.worst.participation)
             yield f"who moves: {parts}"
@@ -178,16 +184,27 @@ class Stability:
             return f"{what}{value}"
 
         if margin.stiffness is not None:
-            some = told("stiffness", "stiffnesses ", f"times {margin.stiffness:.2g}")
-            yield some if margin.stiffness else "unstable with any stiffness"
+            some = told("stiffness", "stiffnesses ", f"times {_within(margin.stiffness)}")
+            least = f"{2.0**-DOUBLINGS:.1g}"
+            yield some if margin.stiffness else f"unstable with stiffnesses down to times {least}"
         if margin.delay is not None:
-            some = told("delay", "", f"{1e3 * margin.delay:.3g} ms of further delay")
+            some = told("delay", "", f"{_within(1e3 * margin.delay, 3)} ms of further delay")
             yield some if margin.delay else "less than a haptic period of further delay"
         if margin.rate is not None:
-            some = told("rate", "graphics ", f"down to {margin.rate:.3g} Hz")
-            yield some if math.isfinite(margin.rate) else "no graphics rate"
+            down = f"down to {-float(_within(-margin.rate, 3)):g} Hz in whole haptic periods"
+            some = told("rate", "graphics ", down)
+            yield some if math.isfinite(margin.rate) else "unstable at each graphics rate tried"
         if margin.stiffness is None and margin.delay is None and margin.rate is None:
             yield "no coupling and no second rate"
+
+
+def _within(value: float, digits: int = 2) -> str:
+    """A limit in a number of digits, rounded to its safe side, down."""
+    if not value or not math.isfinite(value):
+        return f"{value:g}"
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1)
+    # what is a number of units but for rounding stays
+    return f"{math.floor(value / unit + 1e-9) * unit:g}"
 
 
 def _hands(cases: tuple[Case, ...]) -> list[Case]:

@@ -26,6 +26,7 @@ from typing import Any
 from hapticlink.analysis.sweep.job import Job
 from hapticlink.analysis.sweep.row import DIED, Row, failed
 from hapticlink.orchestrator.base import interrupt, process, temporary_folders
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.fmi import process_cache
 
 Work = Callable[[Job], Row]
@@ -83,7 +84,7 @@ class _Worker(SpawnProcess):
     def run(self) -> None:
         process.raise_gc_threshold()
         process.freeze_gc()  # what is loaded by now
-        with process_cache.keep_unpacked():
+        with process_cache.keep_unpacked(), one_blas_thread():
             super().run()
         process.freeze_gc()
         process.leave_threads(0)

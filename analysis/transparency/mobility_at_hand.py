@@ -12,19 +12,25 @@ of S Lambda^-1 S, E = (e_i) the free directions, p_j the constrained ones, whose
 
 A force is right where its error is below the differential threshold of a person. Springs, dampers
 and gravity of the mechanism are not in the ideal.
+
+X is met by a hand that keeps the loop steady. So its eigenvalues are judged first, let go and in
+the hands of `stability`, and where some grow that is said before all numbers.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hapticlink.analysis.search.settings import Scales
+from hapticlink.analysis.stability.hand_cases import Case, InHands
+from hapticlink.analysis.stability.hands import FREE, HANDS, free
+from hapticlink.analysis.stability.modes import DRIFT
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import Pose, choose_evenly_spaced, fault_of, simulate_scene
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
@@ -36,6 +42,7 @@ from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.base.terminal_output import align_columns
 from hapticlink.orchestrator.base.ticks import exact
@@ -87,12 +94,16 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Transparency:
-    """How a scene feels at a pose of its run."""
+    """How a scene feels at a pose of its run. growing: the cases, of a handle that is let go and of
+    the hands of `stability`, in which something grows by more than a drift; steady_in: the hands in
+    which nothing does."""
 
     title: str
     pose: str
     free: tuple[Direction, ...]
     constrained: tuple[Constraint, ...]
+    growing: tuple[Case, ...] = ()
+    steady_in: tuple[str, ...] = ()
 
     @property
     def right_up_to(self) -> float:
@@ -109,6 +120,9 @@ class Transparency:
     def lines(self) -> Iterator[str]:
         """The result as text."""
         yield f"at {self.pose}:"
+        yield from self._unstable()
+        if self.growing and not self.steady_in:
+            return
         for d in self.free:
             felt, w = complex(at_slow(d.felt)), 2 * np.pi * SLOW
             inert = f"{short(felt.real)} kg"
@@ -128,10 +142,23 @@ class Transparency:
                 f"  Z-width (constrained over free impedance at {SLOW:g} Hz): {_width(self.width)}"
             )
 
+    def _unstable(self) -> Iterator[str]:
+        """In which hands the loop is unstable, and in which what is felt is felt."""
+        for case in self.growing:
+            where = "when let go" if case.free else f"in {case.hand}"
+            grows = f"a {case.kind} of {short(case.hertz)} Hz grows at {short(case.growth)} 1/s"
+            yield f"  unstable {where}: {grows}"
+        if self.growing:
+            hands = ", ".join(self.steady_in)
+            steady = f"what follows is felt in a hand that keeps it steady: {hands}"
+            yield f"  {steady if hands else 'no hand that was tried feels it steadily'}"
+
     def record(self) -> dict[str, Any]:
         """The part of transparency.json on this pose."""
         return {
             "pose": self.pose,
+            "unstable": [case.record() for case in self.growing],
+            "steady_in": list(self.steady_in),
             "right_up_to": self.right_up_to,
             "frequencies": HERTZ.tolist(),
             "free": [
@@ -153,6 +180,7 @@ class Transparency:
         }
 
 
+@one_blas_thread()
 def transparency(
     scene: str | Path | Scene, options: Sequence[str] = (), *, count: int = 2
 ) -> list[Transparency]:
@@ -186,7 +214,16 @@ def _visit_poses(read: Scene, count: int) -> list[Pose]:
 def _measure_felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
     cut = response(place.period(scales), hand_port(place.map.system))
     X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
-    return of(read.title, name, X, mobility(place), mean_link_length(_linkage(read)))
+    found = of(read.title, name, X, mobility(place), mean_link_length(_linkage(read)))
+    judged = InHands(place, scales)
+    cases = judged.cases(name, {FREE: free(), **HANDS}, DRIFT)
+    growing = tuple(case for case in cases if _grows(case))
+    steady = tuple(case.hand for case in cases if not (case.free or case in growing))
+    return replace(found, growing=growing, steady_in=steady)
+
+
+def _grows(case: Case) -> bool:
+    return case.verdict == "unstable" and not case.drifts
 
 
 def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Transparency:
@@ -231,6 +268,9 @@ class ChangeCost:
     def cells(self) -> tuple[str, ...]:
         """The row of a table, without the change."""
         kg = ", ".join(short(float(at_slow(d.felt).real)) for d in self.felt.free)
+        if self.felt.growing:
+            where = "when let go" if self.felt.growing[0].free else "in some hands"
+            kg = f"{kg}; unstable {where}" if self.felt.steady_in else "unstable in all hands"
         stiff, most = (_stiffness(f) if f else "-" for f in (self.felt, self.stiffest))
         times = f"{short(self.times)} times" if self.times else "-"
         width = _width(self.felt.width) if self.felt.constrained else "-"
@@ -243,6 +283,7 @@ class ChangeCost:
         return self.felt.record() | {"stable_up_to": self.times, "stiffest": most}
 
 
+@one_blas_thread()
 def costs(
     scene: str | Path | Scene, options: Sequence[str], tell: Callable[[str], object]
 ) -> list[ChangeCost]:

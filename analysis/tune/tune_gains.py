@@ -47,6 +47,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene.overrides import Options
@@ -60,6 +61,7 @@ REMEDY = "take a higher graphics.rate or haptics.rate, or a smaller --margin"
 STEADY = "begin with smaller gains of controller.teleoperation and controller.topology"
 
 
+@one_blas_thread()
 def tune(
     scene: str | Path,
     options: Options = (),

@@ -18,6 +18,7 @@ from pydrake.multibody import tree
 from pydrake.multibody.math import SpatialForce
 from pydrake.systems.analysis import Simulator
 
+from benchmarks.peers.comparable import require_comparable
 from hapticlink.components.specs.linkage import Joint, Linkage
 from hapticlink.components.specs.quantities import Point
 
@@ -31,8 +32,7 @@ def _place(point: Point | None) -> np.ndarray:
 
 def _plant(linkage: Linkage, h: float) -> Any:
     """The linkage as a plant. Raises ValueError for what is not compared."""
-    if linkage.sprung or linkage.driven or linkage.rubbing or linkage.limited:
-        raise ValueError("forces of joints and springs are not compared")
+    require_comparable(linkage)
     plant = plants.MultibodyPlant(h)
     plant.set_discrete_contact_approximation(plants.DiscreteContactApproximation.kSap)
     plant.mutable_gravity_field().set_gravity_vector(_place(linkage.gravity))

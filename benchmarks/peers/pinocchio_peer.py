@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pinocchio as pin
 
+from benchmarks.peers.comparable import require_comparable
 from hapticlink.components.specs.linkage import Joint, Linkage
 from hapticlink.components.specs.quantities import Point
 
@@ -43,8 +44,7 @@ class Terms:
     """D, W, J_h, biases of a linkage at (q, qd), in the order of our coordinates."""
 
     def __init__(self, linkage: Linkage) -> None:
-        if linkage.sprung or linkage.driven or linkage.rubbing or linkage.limited:
-            raise ValueError("forces of joints and springs have no counterpart in this converter")
+        require_comparable(linkage)
         self.linkage, self.model = linkage, pin.Model()
         gx, gy = linkage.gravity or (0.0, 0.0)
         self.model.gravity.linear = np.array([gx, gy, 0.0])

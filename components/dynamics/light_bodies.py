@@ -66,6 +66,8 @@ def smallest_inertia(joint: Joint, body: Body) -> list[float]:
     sliding = body.mass
     if joint.kind.turns:  # the body may turn out of the way of its mass
         sliding = body.mass * body.inertia / turning if turning else 0.0
+    if joint.kind.slides:  # or turn about its centre of mass
+        turning = body.inertia
     return [turning if freedom.turns else sliding for freedom in joint.kind.freedoms]
 
 

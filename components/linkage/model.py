@@ -140,9 +140,12 @@ class LinkageModel:
         """The joint's point in the world (m), and the twist (omega, v_x, v_y) there for a unit rate
         of each of its coordinates."""
         pivot, along = self._guided(joint, self.frames[joint.parent])
-        turn, slides = ca.sparsify(ca.SX([1, 0, 0])), iter(ca.horzsplit(along))
+        slides = iter(ca.horzsplit(along))
         return pivot, [
-            turn if freedom.turns else ca.vertcat(ca.SX(1, 1), next(slides))
+            ca.vertcat(
+                ca.SX(1) if freedom.turns else ca.SX(1, 1),
+                next(slides) if freedom.slides else ca.SX(2, 1),
+            )
             for freedom in joint.kind.freedoms
         ]
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from hapticlink.components.component import Variable
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.joint_types import OwnKey
+from hapticlink.components.specs.linkage import Joint, Linkage, Loop
 from hapticlink.components.specs.quantities import Point
 
 
@@ -20,6 +21,10 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
         shape = () if isinstance(value, int | float) else (2,)
         return Variable(name, shape, unit, value, text, variability="fixed")
 
+    def of_type(name: str, joint: Joint | Loop, key: OwnKey) -> Variable:
+        value = getattr(joint, key.name) or 0.0
+        return fixed(f"{name}.{key.name}", key.unit, value, f"{key.what} of {name}")
+
     rows = []
     for b in linkage.body:
         text = f"inertia of {b.name} about its centre"
@@ -32,17 +37,12 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
             rows.append(fixed(f"{j.name}.at_parent", "m", j.at_parent, f"{j.name} on {j.parent}"))
         if j.at_child is not None:
             rows.append(fixed(f"{j.name}.at_child", "m", j.at_child, f"{j.name} on {j.child}"))
-        if j.kind.has_axis:
-            rows.append(fixed(f"{j.name}.axis", "rad", j.axis or 0.0, f"direction of {j.name}"))
+        rows += [of_type(j.name, j, key) for key in j.kind.own_keys(cut=False)]
     for i, loop in enumerate(linkage.loop):
         name = loop_name(linkage, i)
         for k, (body, at) in enumerate(zip(loop.bodies, loop.at, strict=True)):
             rows.append(fixed(f"{name}.at{k + 1}", "m", at, f"{name} on {body}"))
-        if loop.kind.has_axis:
-            rows.append(fixed(f"{name}.axis", "rad", loop.axis or 0.0, f"direction of {name}"))
-        if not loop.kind.turns:
-            text = f"angle of {loop.bodies[0]} from {loop.bodies[1]}"
-            rows.append(fixed(f"{name}.angle", "rad", loop.angle or 0.0, text))
+        rows += [of_type(name, loop, key) for key in loop.kind.own_keys(cut=True)]
     named = {name: (linkage.points[name], name) for name in linkage.choices}
     own = {"operational_point": (linkage.held, "operational point")}
     further = {point.name: (point, point.name) for point in linkage.point}

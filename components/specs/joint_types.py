@@ -16,9 +16,10 @@ CutType = Literal["revolute", "slot", "prismatic"]
 
 @dataclass(frozen=True)
 class Freedom:
-    """A relative motion, a turn or a slide, with its coordinate in `unit`."""
+    """A relative motion by one coordinate: of it one body turns, slides, or does both at once."""
 
-    unit: Literal["rad", "m"]
+    turns: bool
+    """Whether the coordinate is the angle by which one body turns relative to the other."""
     along: tuple[int, int] | Literal["axis"] | None = None
     """Direction of a slide in the frame that guides it, the parent's or that of a cut joint's
     second body: a unit vector, or the joint's own `axis`."""
@@ -26,8 +27,18 @@ class Freedom:
     """Of the coordinate, in a joint of several."""
 
     @property
-    def turns(self) -> bool:
-        return self.along is None
+    def slides(self) -> bool:
+        """Whether one body's point leaves that of the other."""
+        return self.along is not None
+
+    @property
+    def pure(self) -> bool:
+        """Whether it is a turn or a slide alone, which is all that MuJoCo and others know."""
+        return self.turns != self.slides
+
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        return "rad" if self.turns else "m"
 
     @property
     def rate_unit(self) -> str:
@@ -39,12 +50,34 @@ class Freedom:
 
 
 @dataclass(frozen=True)
+class OwnKey:
+    """A key that joints of some types have, as the scene names it: a parameter of the FMU. One that
+    is not `required` is 0 by default."""
+
+    name: str
+    unit: str
+    what: str
+    required: bool = True
+
+
+AXIS = OwnKey("axis", "rad", "direction")
+ANGLE = OwnKey("angle", "rad", "angle", required=False)
+
+
+@dataclass(frozen=True)
 class JointType:
     """What all that deals with joints has to know of one."""
 
     freedoms: tuple[Freedom, ...]
     mark: Literal["pin", "slider", ""]
     """How a joint of the tree is drawn."""
+    keys: tuple[OwnKey, ...] = ()
+    """Those that it has beside the keys of all joints."""
+    cut_keys: tuple[OwnKey, ...] = ()
+    """Further ones that it has as a cut joint."""
+
+    def own_keys(self, cut: bool) -> tuple[OwnKey, ...]:
+        return self.keys + self.cut_keys * cut
 
     @property
     def freedom(self) -> Freedom:
@@ -75,7 +108,7 @@ class JointType:
     @property
     def has_axis(self) -> bool:
         """Whether it slides along an `axis` of its own."""
-        return any(freedom.along == "axis" for freedom in self.freedoms)
+        return AXIS in self.keys
 
     @property
     def turns(self) -> bool:
@@ -85,7 +118,7 @@ class JointType:
     @property
     def slides(self) -> bool:
         """Whether one body's point leaves that of the other."""
-        return not all(freedom.turns for freedom in self.freedoms)
+        return any(freedom.slides for freedom in self.freedoms)
 
     @property
     def count(self) -> str:
@@ -93,10 +126,11 @@ class JointType:
         return ("one", "two", "three")[self.size - 1]
 
 
-_TURN, _SLIDE = Freedom("rad", name="theta"), Freedom("m", "axis", "s")
+_TURN, _SLIDE = Freedom(turns=True, name="theta"), Freedom(turns=False, along="axis", name="s")
+_X, _Y = (Freedom(turns=False, along=e, name=n) for e, n in (((1, 0), "x"), ((0, 1), "y")))
 JOINT_TYPES = {
     "revolute": JointType((_TURN,), "pin"),
-    "prismatic": JointType((_SLIDE,), "slider"),
-    "slot": JointType((_SLIDE, _TURN), "pin"),
-    "free": JointType((Freedom("m", (1, 0), "x"), Freedom("m", (0, 1), "y"), _TURN), ""),
+    "prismatic": JointType((_SLIDE,), "slider", (AXIS,), cut_keys=(ANGLE,)),
+    "slot": JointType((_SLIDE, _TURN), "pin", (AXIS,)),
+    "free": JointType((_X, _Y, _TURN), ""),
 }

@@ -86,8 +86,8 @@ class Limits:
 class Joint:
     """A joint of the tree.
 
-    Stiffness, damping, friction and a drive act on the one coordinate of a revolute or prismatic
-    joint: -stiffness (q - rest) - damping q' - friction + drive.
+    Stiffness, damping, friction and a drive act on the coordinate of a joint that has one:
+    -stiffness (q - rest) - damping q' - friction + drive.
     """
 
     name: str
@@ -120,7 +120,7 @@ class Joint:
     """Deflection at which a joint begins to slide: sets the stiffness of one that sticks,
     friction / friction_deflection; by default as large as an integration step resolves."""
     limits: Limits | None = None
-    """Ends of the range of a revolute or prismatic joint."""
+    """Ends of the range of a joint of one coordinate."""
     drive: Drive | None = None
     """A motor."""
     ports: tuple[Literal["effort", "position", "velocity"], ...] = ()
@@ -189,7 +189,7 @@ class Gear:
     """A rigid coupling of two joint coordinates, q_0 = ratio q_1 + offset: gears, belt or rack."""
 
     joints: tuple[str, str]
-    """The two joints, revolute or prismatic."""
+    """The two joints, of one coordinate each."""
     ratio: Annotated[float, Quantity("1, m/rad or rad/m")]
     """Change of the first coordinate for a unit change of the second; negative for outer gears."""
     offset: Coordinate | None = None

@@ -131,6 +131,9 @@ def _misfits(linkage: Linkage) -> Iterator[str]:
         yield f"forces of plugins are not passed on: {ours}"
     if any(j.ports for j in linkage.joint):
         yield f"`ports` of joints are not passed on: {ours}"
+    for joint in linkage.joint:
+        if not all(freedom.pure for freedom in joint.kind.freedoms):
+            yield f"joint {joint.name!r} turns and slides at once: {ours}"
     for i, loop in enumerate(linkage.loop):
         if loop.kind.has_axis:
             yield f"loop {i + 1} is a {loop.type} joint, and only revolute ones are closed: {ours}"

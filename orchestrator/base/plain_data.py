@@ -7,10 +7,14 @@ from typing import Any
 _LEAVES = frozenset({float, int, str, bool, type(None)})
 
 
+class Plain(dict[str, Any]):
+    """Plain data, which need not be made so again."""
+
+
 def plain(value: Any) -> Any:
     """As `dataclasses.asdict`, which copies a scene number by number and takes ten times as
     long."""
-    if type(value) in _LEAVES:
+    if type(value) in _LEAVES or type(value) is Plain:
         return value
     if (names := getattr(value, "__dataclass_fields__", None)) is not None:
         return {name: plain(getattr(value, name)) for name in names}

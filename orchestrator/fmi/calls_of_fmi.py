@@ -14,16 +14,16 @@ import sys
 import time as clock
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy import fmi2
 
-from hapticlink.orchestrator.base.arrays import Matrix
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi import load_library, messages, process_cache
 from hapticlink.orchestrator.fmi.directional_derivatives import derivatives
-from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.instance import Instance, StepState
 from hapticlink.orchestrator.fmi.load_library import load_slave
 from hapticlink.orchestrator.fmi.saved_state import SavedFmuState
 from hapticlink.orchestrator.fmi.setter import Setter, Setting
@@ -41,6 +41,9 @@ from hapticlink.orchestrator.fmi.transfer import Transfer, Unfit, as_signal, tra
 from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
 from hapticlink.orchestrator.host import host_state
 
+if TYPE_CHECKING:  # a worker process need not load what reads scenes
+    from hapticlink.orchestrator.fmi.start_values import Starts
+
 
 class InProcess(Instance):
     """An FMU of FMI 2.0 whose library is loaded into this process. `slave` (of FMPy, None where it
@@ -54,21 +57,27 @@ class InProcess(Instance):
         self._status = 0
         self._saved: dict[int, SavedFmuState] = {}
         self._saved_time: dict[int, float] = {}
-        self._initialized = False
+        self._initialized = self._over = self._is_new = False
+        self._some: dict[tuple[int, ...], tuple[Vector, list[Transfer]]] = {}
         self._setters = 0
         """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
         self.holds_python = False
         self.texts = any(s.type in WRITTEN for s in self.description.scalars)
         self.in_c = not self.texts
-        self._key = messages.open_log()
+        self._key = 0
 
     def _load(self) -> None:
-        if self.log_path:
-            messages.write_to(self._key, self.log_path, self.name, lambda: self.time)
         try:
             self._folder = process_cache.unpack(self.description, self._folder)
-            with host_state.restore_directory(self.name):
-                self.slave = self._instantiate()
+            idle = process_cache.take_instance(self._folder, self.name)
+            self._key = messages.open_log(idle.key if idle else None)
+            if self.log_path:
+                messages.write_to(self._key, self.log_path, self.name, lambda: self.time)
+            if idle:
+                self.slave = idle.slave
+            else:
+                with host_state.restore_directory(self.name):
+                    self.slave = self._instantiate()
             self._keep_arithmetic()
         except Exception as error:  # FMPy raises bare Exception
             reason = str(error)
@@ -231,9 +240,12 @@ class InProcess(Instance):
         self._convert()
 
     def read_some(self, places: Sequence[int]) -> None:
-        values = np.zeros(len(places))
-        scalars = [self.description.outputs[i] for i in places]
-        self._carry_out(self._transfers("Get", scalars, values), "gets")
+        if (key := tuple(places)) not in self._some:
+            values = np.zeros(len(places))
+            scalars = [self.description.outputs[i] for i in places]
+            self._some[key] = values, self._transfers("Get", scalars, values)
+        values, transfers = self._some[key]
+        self._carry_out(transfers, "gets")
         self.outputs[list(places)] = values
         self._convert(list(places))
 
@@ -330,25 +342,62 @@ class InProcess(Instance):
     def abandon(self) -> None:
         self._status = FATAL
 
+    @property
+    def resets(self) -> bool:
+        """Whether it can be reset for the next run: a native one of this project."""
+        own = self.description.block is not None and self.description.fmi == "2"
+        return own and not self.holds_python
+
+    def terminate(self) -> FmuFault | None:
+        """End the run, where it has begun and FMI allows it; the fault of an FMU that fails in
+        this."""
+        if self.slave is None or self._status >= ERROR or not self._initialized:
+            return None
+        self._initialized, self._over = False, True
+        terminate = f"fmi{self.description.fmi}Terminate"
+        status = self.slave.dll[terminate](ctypes.c_void_p(self.slave.component))
+        return None if succeeded(status) else self.failed(terminate, status)
+
+    def reset(self) -> bool:
+        """Whether it stands as a new instance, behind `terminate`: one that `resets` does, all of
+        whose calls have succeeded."""
+        if self._over and self.resets and not self._status:
+            self._over = False
+            component = ctypes.c_void_p(self.slave.component)
+            self._is_new = succeeded(self.slave.dll["fmi2Reset"](component))
+        return self._is_new
+
+    def begin_again(self, starts: Starts) -> None:
+        """Stand as a new instance with these start values, behind `reset`."""
+        self.starts, self._is_new, self._counted, self.held = starts, False, False, 0
+        self.good = None
+        self._waiting.clear()
+        self._saved_time.clear()
+        self.bounds.forget()
+        new, size = StepState(), ctypes.sizeof(StepState)
+        ctypes.memmove(ctypes.addressof(self.place), ctypes.addressof(new), size)
+        self.row_due = ctypes.c_int64(1)
+        messages.open_log(self._key)
+
     def _logged(self) -> list[str]:
         return messages.newest_messages(self._key)
 
     def close(self) -> FmuFault | None:
         """After fmi2Fatal the FMU is not called again."""
-        slave, self.slave = self.slave, None
         fault = None
         try:
-            if slave is not None and self._status < FATAL:
+            if self.slave is not None and self._status < FATAL:
                 for saved in self._saved.values():
                     saved.free()
-                if self._status < ERROR and self._initialized:
-                    terminate = f"fmi{self.description.fmi}Terminate"
-                    status = slave.dll[terminate](ctypes.c_void_p(slave.component))
-                    fault = None if succeeded(status) else self.failed(terminate, status)
-                if self._status < FATAL:
-                    slave.freeInstance()
+                fault = self.terminate()
+                idle = self.reset() and process_cache.keep_instance(
+                    self._folder, self.name, self.slave, self._key
+                )
+                if self._status < FATAL and not idle:
+                    self.slave.freeInstance()
             return fault
         finally:
+            self.slave = None
             messages.close_log(self._key)
             self._keep_arithmetic()
             if self.place.altered:

@@ -138,6 +138,28 @@ class Description:
             return inputs[0].causality != "input" or self.follows(output, inputs)
         return any(s.name in names or s.port in names for s in inputs)
 
+    def group_at_start(
+        self, brought: Sequence[Sequence[Scalar]]
+    ) -> Mapping[tuple[int, ...], list[int]]:
+        """The outputs, by their index, by the connections on which they depend in initialisation
+        mode: by index among those that bring these inputs each."""
+        key = tuple(tuple(s.name for s in inputs) for inputs in brought)
+        if key not in self._groups_at_start:
+            found = self._groups_at_start[key] = {}
+            for i, output in enumerate(self.outputs):
+                on = (
+                    k for k, inputs in enumerate(brought) if self.follows_at_start(output, inputs)
+                )
+                found.setdefault(tuple(on), []).append(i)
+        return self._groups_at_start[key]
+
+    @cached_property
+    def _groups_at_start(
+        self,
+    ) -> dict[tuple[tuple[str, ...], ...], dict[tuple[int, ...], list[int]]]:
+        """What was found so far: it takes a third of an initialisation."""
+        return {}
+
     def derivative(self, outputs: Iterable[Scalar]) -> tuple[Scalar, ...] | None:
         """The outputs that are the derivatives of `outputs`, all or none."""
         return self._related(outputs, self.derivatives)

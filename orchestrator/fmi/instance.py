@@ -84,6 +84,10 @@ class OutputBounds:
                 self._before[i] = np.inf
         self.inverse[:] = 1.0 / bounds
 
+    def forget(self) -> None:
+        """Stand as before `start`."""
+        self.inverse[:] = self._shares[:] = self._before[:] = 0.0
+
     def hold(self) -> bool:
         """Whether all outputs are certainly finite and within their bounds: one pass over the
         vector, since this is asked at every read."""

@@ -63,9 +63,10 @@ class LogFile:
             file.write(content)
 
 
-def open_log() -> int:
-    """A key for a new instance; its messages are kept from now on."""
-    key = next(_keys)
+def open_log(key: int | None = None) -> int:
+    """A key for a new instance, or the one that it had before; its messages are kept from now
+    on."""
+    key = next(_keys) if key is None else key
     _messages[key] = deque(maxlen=MAX_MESSAGES)
     return key
 

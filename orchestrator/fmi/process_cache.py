@@ -1,21 +1,24 @@
-"""What a process keeps of FMUs: model descriptions, and the unpacked files of FMUs of this project,
-once for all instances. Foreign FMUs, which may write next to their resources, are unpacked afresh
-for every instance."""
+"""What a process keeps of FMUs: model descriptions, and of those of this project the unpacked
+files, once for all instances, and instances that were reset. Foreign FMUs, which may write next to
+their resources, are unpacked afresh for every instance."""
 
 from __future__ import annotations
 
 import shutil
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 from fmpy import extract
 
 from hapticlink.fmus.atomic_file import name_in_errors
-from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base import shelf, temporary_folders
 from hapticlink.orchestrator.fmi.description import PLATFORMS, Description, describe
 
 MAX_UNPACKED = 32
@@ -24,10 +27,20 @@ File = tuple[Path, int, int]
 """A path with time of change (ns) and size of what is there."""
 
 
+@dataclass(frozen=True)
+class Idle:
+    """An instance that nobody uses: its slave of FMPy, and the key of its messages."""
+
+    slave: Any
+    key: int
+
+
 _unpacked: dict[File, str] = {}
 """The folders in which FMUs of this project are unpacked, the newest last."""
 _instances: Counter[str] = Counter()
 """By folder: how many instances are open in it."""
+_reset: dict[tuple[str, str], Idle] = {}
+"""By folder and name: an instance that was reset after a run without a fault."""
 _lock = Lock()
 _stay = False
 
@@ -55,11 +68,13 @@ def file_at(path: Path) -> File:
 
 @contextmanager
 def keep_unpacked() -> Iterator[None]:
-    """Within the outermost context, FMUs of this project stay unpacked until `trim` drops them."""
+    """Within the outermost context, FMUs of this project stay unpacked until `trim` drops them, and
+    native ones instantiated."""
     global _stay
     before, _stay = _stay, True
     try:
-        yield
+        with shelf.keep():
+            yield
     finally:
         _stay = before
         trim(MAX_UNPACKED if before else 0)
@@ -97,9 +112,41 @@ def _extract(path: Path, folder: str, own: bool) -> str:
 
 def _is_needed(entry: str) -> bool:
     """Whether a run needs an entry of an FMU of this project: no binary of another platform, which
-    is a third of a Python FMU."""
+    is a third of a Python FMU, and no pythonfmu where one is imported, which Python takes in the
+    place of any other."""
+    if entry.startswith("resources/pythonfmu/") and "pythonfmu" in sys.modules:
+        return False
     here = (f"binaries/{platform}/" for platform in PLATFORMS.values())
     return entry.startswith(("modelDescription.xml", "resources/", *here))
+
+
+def keep_instance(folder: str, name: str, slave: Any, key: int) -> bool:
+    """Keep an instance as it is after fmi2Reset, for the next of that name; False where none are
+    kept."""
+    with _lock:
+        if not _stay or (folder, name) in _reset:
+            return False
+        _reset[folder, name] = Idle(slave, key)
+        return True
+
+
+def take_instance(folder: str, name: str) -> Idle | None:
+    """An instance that was kept, which is the caller's from now on."""
+    with _lock:
+        return _reset.pop((folder, name), None) if _stay else None
+
+
+def count_instances() -> int:
+    """The instances of FMUs of this project that there are in this process, in use or kept."""
+    return sum(_instances.values()) + len(_reset)
+
+
+def _remove(file: File) -> None:
+    """Removes an unpacked FMU in which no instance is in use."""
+    folder = _unpacked.pop(file)
+    for place in [place for place in _reset if place[0] == folder]:
+        _reset.pop(place).slave.freeInstance()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def leave(folder: str) -> bool:
@@ -112,7 +159,7 @@ def leave(folder: str) -> bool:
             return False
         _instances[folder] -= 1
         if not _instances[folder] and not _stay:
-            shutil.rmtree(_unpacked.pop(file), ignore_errors=True)
+            _remove(file)
         return _instances[folder] > 0
 
 
@@ -122,4 +169,4 @@ def trim(most: int = MAX_UNPACKED) -> None:
     with _lock:
         closed = [file for file, folder in _unpacked.items() if not _instances[folder]]
         for file in closed[: max(len(_unpacked) - most, 0)]:
-            shutil.rmtree(_unpacked.pop(file), ignore_errors=True)
+            _remove(file)

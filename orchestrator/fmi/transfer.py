@@ -10,6 +10,7 @@ import ctypes
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import groupby
 from types import MappingProxyType
 from typing import Any
 
@@ -18,7 +19,7 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.start_values import WIDE, Given
 from hapticlink.orchestrator.fmi.status import succeeded
-from hapticlink.orchestrator.fmi.variables import TYPES, WRITTEN, Scalar
+from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 
 _IN_C: dict[str, type[np.generic]] = {
     "Real": np.float64, "Integer": np.int32,
@@ -181,14 +182,14 @@ def transfers(
     """One transfer per FMI type. `scalars` are sorted by type, those of a type side by side at
     their `places` in `values`, by default from the first on."""
     several: list[Any] = []
-    for type_ in TYPES:
-        chosen = [i for i, s in enumerate(scalars) if s.type == type_]
-        if chosen:
-            first, last = (i if places is None else places[i] for i in (chosen[0], chosen[-1]))
-            of_type = [scalars[i] for i in chosen]
-            own = values[first : last + 1]
-            if type_ in WRITTEN:
-                several.append(TextTransfer(slave, fmi, verb, of_type, own))
-            else:
-                several.append(Transfer(slave, fmi, verb, of_type, own, exact))
+    end = 0
+    for type_, same in groupby(scalars, lambda s: s.type):
+        of_type = [*same]
+        begin, end = end, end + len(of_type)
+        first, last = (i if places is None else places[i] for i in (begin, end - 1))
+        own = values[first : last + 1]
+        if type_ in WRITTEN:
+            several.append(TextTransfer(slave, fmi, verb, of_type, own))
+        else:
+            several.append(Transfer(slave, fmi, verb, of_type, own, exact))
     return several

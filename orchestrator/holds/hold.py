@@ -60,8 +60,11 @@ class Hold(ABC):
     connection carries power, and the context reads the conjugate displacement."""
     gives_samples: ClassVar[bool] = False
     """Whether every value is one of the samples, unchanged, so that a matrix keeps its kind."""
-    degree: ClassVar[int] = 0
-    """Degree of the value as a polynomial in time within a step of the target; 0 if constant."""
+    degree: ClassVar[int | None] = 0
+    """Degree of the value as a polynomial in time within a step of the target; 0 if it is constant,
+    None if it varies as no polynomial. Read twice: where it is not 0, `run.json` tells that the
+    value varies within a step; and of a row of the table whose `push` keeps samples and nothing
+    else, a stability analysis takes the value for that polynomial between two samples."""
     interpolates: ClassVar[bool] = False
     """Whether it interpolates once the sample of the step's end is known (coupling "iterated")."""
     downsamples: ClassVar[bool] = False

@@ -22,7 +22,7 @@ class HoldRow(NamedTuple):
     remembers: int = 0
     needs: str | None = None
     gives_samples: bool = False
-    degree: int = 0
+    degree: int | None = 0
     interpolates: bool = False
     downsamples: bool = False
 

@@ -121,11 +121,7 @@ def whole_fmus(system: System) -> list[StartOutputs]:
 def _parts(system: System, whole: StartOutputs) -> Iterator[StartOutputs]:
     """The outputs of an FMU by the connections that they depend on."""
     about = system.fmu[whole.fmu].description
-    by_needs: dict[tuple[int, ...], list[int]] = {}
-    for i, output in enumerate(about.outputs):
-        on = (k for k, c in enumerate(whole.needs) if about.follows_at_start(output, c.inputs))
-        by_needs.setdefault(tuple(on), []).append(i)
-    for needs, outputs in by_needs.items():
+    for needs, outputs in about.group_at_start([c.inputs for c in whole.needs]).items():
         yield StartOutputs(whole.fmu, tuple(outputs), tuple(whole.needs[k] for k in needs))
 
 

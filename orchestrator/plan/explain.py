@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from itertools import groupby
+from typing import get_args
 
 from hapticlink.orchestrator.base.ticks import Clock
 from hapticlink.orchestrator.plan.operations import Event, Operation, Repeat
@@ -13,13 +14,14 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import pattern_end, uses
 from hapticlink.orchestrator.system.system import System
 
-LEGEND = """\
-Time is counted in ticks. The operations of an event form a block; events of one kind share it:
-  get        read an FMU's outputs              set      write an FMU's inputs
-  push       give a hold the newest sample      step     an FMU's doStep, over `dticks` ticks
-  evaluate   ask a hold for its value           record   write a row of a rate's table
-`ahead n`: for a time n ticks after the event. More: docs/holds.md, docs/coupling.md.
-"""
+LEGEND = "\n".join(
+    (
+        "Time is counted in ticks. The operations of an event form a block; events of one kind "
+        "share it:",
+        *(f"  {kind.__name__.lower():<10}{kind.does}" for kind in get_args(Operation)),
+        "`ahead n`: for a time n ticks after the event. More: docs/holds.md, docs/coupling.md.\n",
+    )
+)
 PRINTED = 600
 """Number of events in a table that is printed."""
 

@@ -2,8 +2,9 @@
 
 An operation is a class, in which everybody who reads plans finds what it is: its code in C with its
 numbers (`run`), the stamps that it passes on (`sample_ages`), the signals between which it has
-slopes (`analysis.stability`); its name and fields are what is printed (`explain`). A further one
-that works on an FMU or a hold needs a class here, a number in loop.h and a case in operations.c.
+slopes (`analysis.stability`); its name, fields and `does` are what is printed (`explain`). A
+further one that works on an FMU or a hold needs a class here, which `Operation` names, a number in
+loop.h and a case in operations.c.
 """
 
 from __future__ import annotations
@@ -51,12 +52,14 @@ class SignalUse(NamedTuple):
 class Instruction:
     """What is declared of every operation.
 
-    code: its number in loop.h, PYTHON where it has none, with the reason `why_in_python`. b, x: the
-    fields that are these numbers of its record there, if any. concurrent: whether FMUs in processes
-    of their own may be stepping meanwhile. observes: whether it leaves FMUs, holds and signals as
-    they are, and writes rows, measures, or ends the run.
+    does: what it does, in the legend of printed plans. code: its number in loop.h, PYTHON where it
+    has none, with the reason `why_in_python`. b, x: the fields that are these numbers of its record
+    there, if any. concurrent: whether FMUs in processes of their own may be stepping meanwhile.
+    observes: whether it leaves FMUs, holds and signals as they are, and writes rows, measures, or
+    ends the run.
     """
 
+    does: ClassVar[str]
     code: ClassVar[str] = "PYTHON"
     b: ClassVar[str] = ""
     x: ClassVar[str] = ""
@@ -98,6 +101,7 @@ class Get(OfFmu):
 
     ahead: int = 0
     judged: bool = True
+    does = "read an FMU's outputs"
     code, b = "GET", "judged"
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
@@ -113,6 +117,7 @@ class Push(OfHold):
     """Push the newest sample of its source into a hold; its stamp is `ahead` of this tick."""
 
     ahead: int = 0
+    does = "give a hold the newest sample"
     code, b = "PUSH", "ahead"
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
@@ -144,6 +149,7 @@ class Evaluate(_Evaluation):
     of the step for a plant, 0 for a sampled block."""
 
     ahead: Fraction = Fraction(0)
+    does = "ask a hold for its value"
     code, x = "EVALUATE", "ahead"
 
 
@@ -152,6 +158,7 @@ class Blend(_Evaluation):
     """Evaluate a weighted sum of a hold's values, given by pairs (weight, `ahead` of this tick)."""
 
     points: tuple[tuple[float, Fraction], ...]
+    does = "ask a hold for a weighted sum of its values"
     code = "BLEND"
 
 
@@ -161,6 +168,7 @@ class Set(OfFmu):
     outputs without holds."""
 
     now: bool = False
+    does = "write an FMU's inputs"
     code = "SET"
 
     def stamps(self, system: System) -> Iterator[tuple[Place, Stamp]]:
@@ -181,6 +189,7 @@ class Step(OfFmu):
     dticks: int
     part: int = 0
     parts: int = 1
+    does = "an FMU's doStep, over `dticks` ticks"
     code = "STEP"
 
     def numbers(self, system: System) -> dict[str, float]:
@@ -201,6 +210,7 @@ class Record(Instruction):
     """Write a row of a clock's table: the outputs of all its FMUs."""
 
     clock: str
+    does = "write a row of a rate's table"
     code = "RECORD"
     observes = True
 
@@ -209,6 +219,7 @@ class Record(Instruction):
 class StopWhen(Instruction):
     """End the run, without a fault, if the system's stop condition holds."""
 
+    does = "end the run where its stop condition holds"
     code = "STOP_WHEN"
     observes = True
 
@@ -225,6 +236,7 @@ _REPEATED = "Python repeats steps, whose operations are in C"
 class Save(OfFmu):
     """Save the state of an FMU (fmi2GetFMUstate)."""
 
+    does = "save an FMU's state"
     why_in_python = _REPEATED
 
 
@@ -232,6 +244,7 @@ class Save(OfFmu):
 class Rollback(OfFmu):
     """Restore the saved state of an FMU (fmi2SetFMUstate)."""
 
+    does = "restore the saved state"
     why_in_python = _REPEATED
 
 
@@ -249,6 +262,7 @@ class Repeat(Instruction):
     guess: tuple[Push, ...]
     body: tuple[Operation, ...]
     again: tuple[Operation, ...]
+    does = "repeat a step until what its connections pass on agrees"
     why_in_python = _REPEATED
 
 

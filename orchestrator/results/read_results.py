@@ -6,7 +6,7 @@ import csv
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from textwrap import fill
@@ -28,6 +28,10 @@ IN_MEMORY = 1 << 24
 """Bytes of the rows of a table, above which they stay in their file."""
 BLOCK = 1 << 12
 """Rows of a long run that are in memory at a time."""
+
+
+Entries = tuple[tuple[int, ...], tuple[int, ...]]
+"""The columns of the entries of a vector or matrix, and its shape."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -93,18 +97,11 @@ class Table(Mapping[str, Vector]):
 
     @cached_property
     def _places(self) -> dict[str, int]:
-        return {column: place for place, column in reversed([*enumerate(self.columns)])}
+        return _find_columns(self.columns)[0]
 
     @cached_property
-    def _arrays(self) -> dict[str, tuple[tuple[int, ...], tuple[int, ...]]]:
-        """The columns of the entries of each vector and matrix, and its shape."""
-        entries: dict[str, list[tuple[tuple[int, ...], int]]] = {}
-        for place, column in enumerate(self.columns):
-            name, indices = entry_of(column)
-            if indices:
-                entries.setdefault(name, []).append((indices, place))
-        ordered = {name: zip(*sorted(each), strict=True) for name, each in entries.items()}
-        return {name: (places, _shape(indices)) for name, (indices, places) in ordered.items()}
+    def _arrays(self) -> dict[str, Entries]:
+        return _find_columns(self.columns)[1]
 
     def __contains__(self, name: object) -> bool:
         return name in self._places or name in self._arrays
@@ -122,6 +119,20 @@ class Table(Mapping[str, Vector]):
     def signals(self) -> tuple[str, ...]:
         """The names of scalars, vectors and matrices, `time` the first."""
         return tuple(dict.fromkeys(entry_of(column)[0] for column in self.columns))
+
+
+@lru_cache(16)
+def _find_columns(columns: tuple[str, ...]) -> tuple[dict[str, int], dict[str, Entries]]:
+    """The place of each column; and those of the entries of each vector and matrix, with its shape:
+    the same in every point of a sweep."""
+    entries: dict[str, list[tuple[tuple[int, ...], int]]] = {}
+    for place, column in enumerate(columns):
+        name, indices = entry_of(column)
+        if indices:
+            entries.setdefault(name, []).append((indices, place))
+    ordered = {name: zip(*sorted(each), strict=True) for name, each in entries.items()}
+    arrays = {name: (places, _shape(indices)) for name, (indices, places) in ordered.items()}
+    return {column: place for place, column in reversed([*enumerate(columns)])}, arrays
 
 
 def _shape(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...]:

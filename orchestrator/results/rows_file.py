@@ -82,8 +82,14 @@ class RowsFile:
         shape = max(last - first, 0), len(self.columns)
         if not shape[0]:
             return np.zeros(shape)
-        begin = self._begin + 8 * first * shape[1]
-        return np.memmap(self._path, np.float64, "r", begin, shape)
+        begin, size = self._begin + 8 * first * shape[1], 8 * shape[0] * shape[1]
+        before = begin % mmap.ALLOCATIONGRANULARITY
+        with self._path.open("rb") as file:
+            memory = mmap.mmap(
+                file.fileno(), before + size, access=mmap.ACCESS_READ, offset=begin - before
+            )
+        # Not numpy.memmap, which looks at each slice and result whether it is of the file.
+        return np.frombuffer(memory, np.float64, size // 8, before).reshape(shape)
 
     def read(self) -> Rows:
         """All rows, in memory."""
@@ -181,8 +187,7 @@ def text(rows: Rows) -> bytes:
     """Rows as CSV, each number as the shortest text that reads back to the same float."""
     # pydantic's JSON, [[1.0,2.0],[3.0,4.0]], writes floats ten times faster than repr, and
     # round-trips too.
-    lines = to_json(rows.tolist(), inf_nan_mode="constants").split(b"]")[:-2]
-    return b"\n".join([line[2:] for line in lines]) + b"\n"
+    return to_json(rows.tolist(), inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
 
 
 def header(columns: tuple[str, ...]) -> bytes:

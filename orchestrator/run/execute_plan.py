@@ -21,11 +21,13 @@ from hapticlink.orchestrator.base.errors import (
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
 from hapticlink.orchestrator.host import host_state
 from hapticlink.orchestrator.plan.plan import Plan
-from hapticlink.orchestrator.plan.sample_ages import causal, delays
+from hapticlink.orchestrator.plan.sample_ages import causal
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.run import kept_runs
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
+from hapticlink.orchestrator.run.kept_runs import KeptRun, StartMemory
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
@@ -113,6 +115,7 @@ def run(
     outcome = Outcome()
     simulation: Simulation | None = None
     loop: CompiledLoop | None = None
+    ended: KeptRun | None = None
     try:
         # Non-finite values are detected by 0 x NaN, for which numpy would warn.
         with (
@@ -121,16 +124,30 @@ def run(
             np.errstate(invalid="ignore", over="ignore"),
         ):
             interrupt.raise_if_interrupted()
-            simulation = Simulation(plan.system, results, stack)
-            if real_time:
-                stack.enter_context(real_time.of(plan, simulation))
-            loop = CompiledLoop(plan, simulation)
-            simulation.start()
-            coming = loop.events.coming()
-            loop.events.prepare(with_ends(coming) if real_time else coming)
+            kept = None if real_time or results.log_path else kept_runs.take(plan.system)
+            opened = stack.enter_context(kept.opened if kept else ExitStack())
+            if kept:
+                simulation, loop = kept.simulation, kept.loop
+                system, plan = plan.system, kept.plan
+                kept.begin_again(system, results, stack)
+            else:
+                simulation = Simulation(plan.system, results, stack, opened)
+                if real_time:
+                    stack.enter_context(real_time.of(plan, simulation))
+                loop = CompiledLoop(plan, simulation)
+                keeps = kept_runs.may_be_kept(simulation, results)
+                memory = StartMemory(simulation) if keeps else None
+                simulation.start()
+                coming = loop.events.coming()
+                loop.events.prepare(with_ends(coming) if real_time else coming)
+                if memory:
+                    memory.take_pointers()
+                    kept = KeptRun(plan, simulation, loop, memory, opened)
             if real_time:
                 stack.enter_context(real_time.pace.undisturbed())
             _run_events(plan, loop, results, outcome, progress, real_time)
+            if kept and kept.end():
+                ended = replace(kept, opened=opened.pop_all())
     except (Exception, KeyboardInterrupt) as error:
         outcome.set_reason(error, results)
     outcome.published = results.published
@@ -138,6 +155,8 @@ def run(
         outcome.end_time = results.last
     if simulation and loop:
         outcome.details = _details(plan, simulation, loop, real_time)
+        if ended:
+            kept_runs.keep(ended)
         if outcome.fault is None and (diverged := _judge_energy(outcome, simulation)):
             outcome.reason, outcome.fault = "diverged", diverged
     if progress:
@@ -182,7 +201,7 @@ def _details(
 ) -> RunEnding:
     """What the objects of a run have counted and measured."""
     system, instances = plan.system, simulation.instances
-    ages, energies = delays(plan, loop.complete), simulation.meters.energies()
+    ages, energies = loop.delays(), simulation.meters.energies()
     errors = {name: check.errors() for name, check in simulation.step_checks.items()}
     across = power_across_rates(system)
     return RunEnding(

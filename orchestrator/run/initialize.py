@@ -39,11 +39,14 @@ LONGEST = 2 / SLOWEST
 to half of a period early and late."""
 
 
-def initialize(fmus: LoadedFmus, rates_change: bool = False) -> bool:
+def initialize(
+    fmus: LoadedFmus, rates_change: bool = False, order: Callable[[], StartOrder] | None = None
+) -> bool:
     """Initialise every instance; the outputs of t = 0 are in the signal vector afterwards, as they
     are when initialisation mode has ended. Returns whether there was an algebraic loop.
 
-    rates_change: whether those of slower clocks may, during the run.
+    rates_change: whether those of slower clocks may, during the run. order: gives that of
+    these FMUs, once all are in initialisation mode.
 
     Values cross connections, those to parameters among them, before initialisation mode ends. An
     output that its FMU changes in ending it is passed on with the first step: FMI allows no output
@@ -56,16 +59,14 @@ def initialize(fmus: LoadedFmus, rates_change: bool = False) -> bool:
     for fmu in system.fmus:
         interrupt.raise_if_interrupted()
         instances[fmu.name].enter_initialization(find_stop(system, fmu, rates_change))
-    start = StartValues(fmus)
-    loops = False
-    for group in order_start(system):
-        evaluations = start.evaluations(group.members)
-        if group.is_loop:
+    found = order() if order else StartOrder.of(fmus)
+    start, every, loops = StartValues(fmus), found.every, False
+    for is_loop, evaluations in found.groups:
+        if is_loop:
             start.solve(evaluations, start.guess(evaluations))
             loops = True
         else:
             start.evaluate(evaluations)
-    every = start.evaluations(whole_fmus(system))
     sources = start.find_sources(every)
     before = values[sources]
     start.evaluate(every)
@@ -103,6 +104,21 @@ class Evaluation:
     places: Sequence[int]
     set_inputs: Callable[[Vector], object]
     read: Callable[[], object]
+
+
+@dataclass(frozen=True)
+class StartOrder:
+    """The evaluations of the outputs of loaded FMUs at t = 0: in groups, each with whether its
+    outputs depend on each other, and whole FMUs."""
+
+    groups: Sequence[tuple[bool, Sequence[Evaluation]]]
+    every: Sequence[Evaluation]
+
+    @classmethod
+    def of(cls, fmus: LoadedFmus) -> StartOrder:
+        start, system = StartValues(fmus), fmus.system
+        groups = [(g.is_loop, start.evaluations(g.members)) for g in order_start(system)]
+        return cls(groups, start.evaluations(whole_fmus(system)))
 
 
 def _set_nothing(signals: Vector) -> None:

@@ -15,9 +15,10 @@ import sys
 import zlib
 from collections.abc import Iterable
 from functools import cache, lru_cache
-from importlib.util import find_spec
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import hapticlink.fmus
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.archive import open_archive
@@ -29,6 +30,7 @@ Modules = dict[str, dict[str, int]]
 OURS = re.compile("hapticlink_[0-9a-f]{16}(_slave)?")
 """Names that contain a hash of the whole FMU: equal names are equal modules, also where the folder
 that one was imported from is gone."""
+SLAVE = Path(str(hapticlink.fmus.__file__)).with_name("python_slave.py")
 _loaded: Modules = {}
 """Modules of all FMUs that this process has loaded; they stay imported when FMUs are freed."""
 
@@ -67,6 +69,8 @@ def clashes(fmus: Iterable[Fmu]) -> dict[str, str]:
             if "pythonfmu" in modules:
                 _import_installed(modules["pythonfmu"])
             for name, files in modules.items():
+                if OURS.fullmatch(name) and name not in sys.modules:
+                    _import_slave(name, files)
                 _loaded.setdefault(name, files)
         else:
             reasons[fmu.name] = f"another module {other!r} is loaded in this process"
@@ -79,6 +83,20 @@ def _import_installed(files: dict[str, int]) -> None:
     spec = find_spec("pythonfmu")
     if spec and _on_disk("pythonfmu", spec.origin or "") == files:
         import pythonfmu as pythonfmu
+
+
+def _import_slave(name: str, files: dict[str, int]) -> None:
+    """Imports the slave of an FMU under its `name` from this package, where its text is the same,
+    and is compiled already."""
+    spec = spec_from_file_location(name, SLAVE)
+    if files == {f"{name}.py": _crc_of_slave()} and spec and spec.loader:
+        sys.modules[name] = module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+
+
+@cache
+def _crc_of_slave() -> int:
+    return _crc(SLAVE)
 
 
 def _is_mine(name: str, files: dict[str, int]) -> bool:

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
 from hapticlink.orchestrator.results.run_results import Recorder, RunResults
@@ -24,7 +25,7 @@ from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, Side
 from hapticlink.orchestrator.run.energy.balance import Balance
 from hapticlink.orchestrator.run.energy.meter import Meters
 from hapticlink.orchestrator.run.hold_parts import describe_hold
-from hapticlink.orchestrator.run.initialize import initialize
+from hapticlink.orchestrator.run.initialize import StartOrder, initialize
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.step_check import StepCheck
@@ -35,7 +36,8 @@ Set = Callable[[Vector], object]
 
 
 class Simulation(LoadedFmus):
-    """The objects of a run, which `stack` closes; rows are written to `results`.
+    """The objects of a run, which `stack` closes, the FMUs `opened` if that is given; rows are
+    written to `results`.
 
     setters set the inputs of an FMU from the signals: with held values, or `now` with the newest
     outputs of the sources.
@@ -48,10 +50,12 @@ class Simulation(LoadedFmus):
     depend on each other.
     """
 
-    def __init__(self, system: System, results: RunResults, stack: ExitStack) -> None:
+    def __init__(
+        self, system: System, results: RunResults, stack: ExitStack, opened: ExitStack | None = None
+    ) -> None:
         self.library = library = load()
-        super().__init__(system, stack, results.log_path)
-        stack.callback(self._dismiss)
+        super().__init__(system, opened or stack, results.log_path)
+        (opened or stack).callback(self._dismiss)
         self.pace: Pace | None = None
         self.beside: Mapping[str, str] = {}
         self.sides: dict[str, Side] = {}
@@ -59,6 +63,7 @@ class Simulation(LoadedFmus):
         self.frames: dict[str, Recorder] = {}
         self.late = 0
         self.loops_at_start = False
+        self._order: StartOrder | None = None
         self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
         repeated = system.coupling.scheme == "iterated"
@@ -83,7 +88,7 @@ class Simulation(LoadedFmus):
     def start(self) -> None:
         """Initialise the FMUs, push the samples of t = 0 into the holds, bind the setters, and
         create the recorders."""
-        self.loops_at_start = initialize(self, rates_change=self.pace is not None)
+        self.loops_at_start = initialize(self, self.pace is not None, self._find_order)
         values = self.signals.values
         for hold in self.holds.values():
             hold.push(0, values[hold.places], 0)
@@ -92,6 +97,24 @@ class Simulation(LoadedFmus):
         for change in self.system.changes:
             if change.fmu:
                 InputSetter(change, self).wait(change.begin)
+        if not self.setters:
+            self._bind_setters()
+        self._open_recorders()
+
+    def _find_order(self) -> StartOrder:
+        self._order = self._order or StartOrder.of(self)
+        return self._order
+
+    def begin_again(self, system: System, results: RunResults, stack: ExitStack) -> None:
+        """Stand as before `start`, for a `system` that differs in start values alone. The memory of
+        the loop is put back by whoever keeps it."""
+        self.system, self._results, self._stack = system, results, stack
+        for fmu in system.fmus:
+            instance = self.instances[fmu.name]
+            assert isinstance(instance, InProcess)
+            instance.begin_again(fmu.starts)
+
+    def _bind_setters(self) -> None:
         for fmu in self.system.fmus:
             incoming = self.system.into(fmu.name)
             if not incoming:
@@ -99,12 +122,15 @@ class Simulation(LoadedFmus):
             self.setters[fmu.name, False] = self.setter(incoming, self.signals.places)
             if fmu.name in self.system.coupling.get_after_set:
                 self.setters[fmu.name, True] = self.setter(incoming, self.signals.sources)
+
+    def _open_recorders(self) -> None:
         # A run in real time may give a slower clock any rate up to the haptic one.
         time = self.system.timeline
         most = time.points(time.clocks[0]) if self.pace else 0
         for clock in time.clocks:
             recorded, every = self.signals.recorded(clock.name), self.system.recording.every
             end = time.points(clock) - 1
+            values = self.signals.values
             recorder = self._results.recorder(clock.name, recorded, values, every, end, most)
             self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:

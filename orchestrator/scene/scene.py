@@ -26,7 +26,7 @@ from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand,
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.errors import Finding
-from hapticlink.orchestrator.base.plain_data import plain
+from hapticlink.orchestrator.base.plain_data import Plain, plain
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN, by_user
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
@@ -241,8 +241,7 @@ class Scene:
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""
-        tables: dict[str, Any] = plain(self.plain())
-        return tables
+        return Plain(plain(self.plain()))
 
     def plain(self) -> Scene:
         """A copy of the scene without its origin."""

@@ -1,11 +1,11 @@
 """Assigns a hold to each connection, and says why a default was refused.
 
-[holds], [delays] and [kinds] name a connection as `source -> target`, by its target's port or by
-its source's port (all connections from there); the most precise name wins. By default a connection
-from a slower clock has the scene's `hold`, one from a faster clock its `downsampling`, and one
-between clocks that differ only in phase `zoh`, since every sample is read there. A connection
-within a rate has no hold unless it is named or has a latency. A default hold that needs power is
-assigned to every connection across clocks that carries power, in either direction.
+The tables of `NAMED` (scene/toml_keys.py) name a connection as `source -> target`, by its target's
+port or by its source's port (all connections from there); the most precise name wins. By default a
+connection from a slower clock has the scene's `hold`, one from a faster clock its `downsampling`,
+and one between clocks that differ only in phase `zoh`, since every sample is read there. A
+connection within a rate has no hold unless it is named or has a latency. A default hold that needs
+power is assigned to every connection across clocks that carries power, in either direction.
 """
 
 from __future__ import annotations

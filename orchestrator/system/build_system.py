@@ -3,18 +3,21 @@ holds, and their checks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts
-from hapticlink.orchestrator.base import temporary_folders
+from hapticlink.orchestrator.base import plugins, shelf, temporary_folders
 from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.base.signal_names import HAND
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.process_cache import describe_once
-from hapticlink.orchestrator.scene.blocks import Blocks, blocks
+from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks, blocks
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
@@ -54,11 +57,77 @@ def build_system(scene: Scene, starts: Mapping[str, Starts] | None = None) -> It
         planned = blocks(scene)
         time = timeline(scene, planned)
         files = fmu_files(scene, planned, time, room, starts=starts)
-        yield _assemble(scene, planned, time, files)
+        if starts is not None:
+            yield _assemble(scene, planned, time, files, exported=True)
+        else:
+            yield _assemble_once(scene, planned, time, files)
 
 
-def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str, Path]) -> System:
-    """The system of `scene`; `files` are the FMU files of its blocks, by name.
+@dataclass(frozen=True)
+class Assembled:
+    """A system with all that it follows from but start values: the scene without these, the common
+    settings of its blocks, and what their FMU files contain."""
+
+    scene: Scene
+    settings: Sequence[tuple[str, Mapping[str, Any]]]
+    described: Sequence[Description]
+    system: System
+
+
+_SYSTEMS: shelf.Shelf[Assembled] = shelf.Shelf(8)
+
+
+def _assemble_once(
+    scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str, Path]
+) -> System:
+    """As `_assemble`; of scenes that differ in start values alone, which this process assembles one
+    after the other, only these are set anew."""
+    if not shelf.is_keeping() or scene.fmu or scene.connection or plugins.list_plugins():
+        return _assemble(scene, planned, time, files)
+    common = replace(
+        scene.plain(),
+        title="",
+        description="",
+        hand=None,
+        hands={},
+        controller=None,
+        controllers={},
+    )
+    settings = [(b.name, without_start_values(b.block, b.settings)[0]) for b in planned.own]
+    described = [describe_once(files[b.name]) for b in planned.own]
+
+    def is_same(known: Assembled) -> bool:
+        return (known.described, known.settings, known.scene) == (described, settings, common)
+
+    if known := _SYSTEMS.take(is_same):
+        system = _with_starts(scene, planned, known.system)
+    else:
+        system = _assemble(scene, planned, time, files)
+    _SYSTEMS.put(known or Assembled(common, settings, described, system))
+    return system
+
+
+def _with_starts(scene: Scene, planned: Blocks, system: System) -> System:
+    """A system with the start values that a scene gives its blocks."""
+    by_name = {b.name: b for b in planned.own}
+    fmus = tuple(_restarted(fmu, by_name[fmu.name]) for fmu in system.fmus)
+    return replace(system, fmus=fmus, energy=find_energy_ports(scene, fmus, system.connections))
+
+
+def _restarted(fmu: Fmu, block: BlockPlan) -> Fmu:
+    given = dict(_started(fmu, block).starts)
+    return replace(fmu, starts=tuple((s, given.get(s, value)) for s, value in fmu.starts))
+
+
+def _assemble(
+    scene: Scene,
+    planned: Blocks,
+    time: Timeline,
+    files: Mapping[str, Path],
+    exported: bool = False,
+) -> System:
+    """The system of `scene`; `files` are the FMU files of its blocks, by name, which already start
+    as in the scene where they are `exported`.
 
     Raises SceneFault with every finding: FMUs that cannot be read or used, connections and holds
     that do not fit, and, if all FMUs can be read, names in the scene that they do not have.
@@ -67,6 +136,8 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
     replaced, rows = replacements.find_replaced_blocks(planned.replaced), haptic_loop.rows(scene)
     of, order = time.of, {b.name: i for i, b in enumerate(planned.loop)}
     ours = [Fmu(b.name, describe_once(files[b.name]), of[b.name]) for b in planned.own]
+    if not exported:
+        ours = [_started(fmu, block) for fmu, block in zip(ours, planned.own, strict=True)]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (Fmu(t.name, about, of[t.name], starts, t.isolate) for t, about, starts, _ in tables)
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
@@ -108,6 +179,17 @@ def _assemble(scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str,
         replacements=replacements.replacements(replaced, rows, system, mapped),
         changes=changes,
     )
+
+
+def _started(fmu: Fmu, block: BlockPlan) -> Fmu:
+    """A block's FMU with the start values that its settings give parameters."""
+    _, starts = without_start_values(block.block, block.settings)
+    given = (
+        (s, value)
+        for parameter, values in starts.items()
+        for s, value in zip(fmu.description.port(parameter, "parameter"), values, strict=True)
+    )
+    return replace(fmu, starts=tuple(given))
 
 
 def _faults(scene: Scene, problems: Iterable[Problem]) -> SceneFault:

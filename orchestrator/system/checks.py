@@ -1,5 +1,5 @@
-"""Checks a scene's [holds], [delays], [kinds], [substeps], [[power]] and [[spring]] against the
-ports of its FMUs, and its rates and coupling against their capabilities."""
+"""Checks a scene's tables of connections, [substeps], [[power]] and [[spring]] against the ports of
+its FMUs, and its rates and coupling against their capabilities."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hapticlink.orchestrator.fmi.units import why_unsuitable
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import PowerPort
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+from hapticlink.orchestrator.scene.toml_keys import NAMED, Path, Problem
 from hapticlink.orchestrator.system import springs
 from hapticlink.orchestrator.system.ports import between_plants, names, size
 from hapticlink.orchestrator.system.system import Fmu, System
@@ -21,7 +21,7 @@ def check_system(scene: Scene, system: System) -> Iterator[Problem]:
     """A finding for each name in these tables that the system does not have, and for each entry
     that does not fit it."""
     held = [c for c in system.connections if not c.initial]
-    for table in ("holds", "delays", "kinds"):
+    for table in NAMED:
         for key in getattr(scene, table):
             known = list(dict.fromkeys(name for c in held for name in names(c)))
             if key not in known:

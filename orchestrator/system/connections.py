@@ -109,5 +109,6 @@ def _convert(
                     f"{a.name} is in {a.unit}, {b.name} in {b.unit}: {error}; connect quantities "
                     "of one dimension, or write convert = false"
                 ) from None
-        converted.append(replace(b, conversion=Linear(wire.factor, wire.offset).after(units)))
+        given = Linear(wire.factor, wire.offset).after(units)
+        converted.append(b if b.conversion == given else replace(b, conversion=given))
     return tuple(converted)

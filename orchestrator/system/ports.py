@@ -53,10 +53,15 @@ def find_power_port(c: Connection, entry: Scalar, power: Iterable[PowerPort]) ->
     return next((p for p in power if p.effort in names), None)
 
 
+def power_ports(c: Connection, power: Iterable[PowerPort]) -> list[PowerPort | None]:
+    """The power port of each input of a connection."""
+    own = [p for p in power if p.effort.startswith(f"{c.target}.")]
+    return [find_power_port(c, entry, own) if own else None for entry in c.inputs]
+
+
 def carries_power(c: Connection, power: Iterable[PowerPort]) -> bool:
     """Whether an entry of a connection has a power port."""
-    own = [p for p in power if p.effort.startswith(f"{c.target}.")]
-    return any(find_power_port(c, entry, own) for entry in c.inputs)
+    return any(power_ports(c, power))
 
 
 def power_across_rates(system: System) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import Description
@@ -194,11 +195,26 @@ class System:
         called."""
         return fmu if fmu in self.replacements else self.fmu[fmu].description.block
 
+    def is_alike(self, other: System) -> bool:
+        """Whether `other` differs in start values of FMUs alone, and no hold depends on these."""
+        if any(c.needs in ("spring", "power") for c in self.connections):
+            return self == other
+        return _without_starts(self) == _without_starts(other)
+
     def into(self, name: str) -> tuple[Connection, ...]:
         return tuple(c for c in self.connections if c.target == name and not c.initial)
 
     def out_of(self, name: str) -> tuple[Connection, ...]:
         return tuple(c for c in self.connections if c.source == name and not c.initial)
+
+
+def _without_starts(system: System) -> tuple[System, list[Any]]:
+    """The system without start values and gains of springs, the names of those, and the number of
+    springs."""
+    fmus = tuple(replace(fmu, starts=()) for fmu in system.fmus)
+    energy = replace(system.energy, springs=())
+    names = [[scalar.name for scalar, _ in fmu.starts] for fmu in system.fmus]
+    return replace(system, fmus=fmus, energy=energy), [*names, [len(system.energy.springs)]]
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,13 @@ import pytest
 from matplotlib.image import imread
 
 import hapticlink as hl
+from hapticlink.analysis.findings import summary
 from hapticlink.commands.progress import progress, time_command
 from hapticlink.fmus import durations
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
 from hapticlink.orchestrator.results import read_results
+from hapticlink.visualization.figures import run_figures
 from tests.shared_fixtures import status
 
 
@@ -217,3 +220,40 @@ def test_an_interrupted_command_keeps_no_duration(
     with pytest.raises(Fault, match="finished runs are kept"), time_command("bench it"):
         raise Interrupted
     assert not [*tmp_path.iterdir()]
+
+
+def test_a_run_is_told_before_its_figures_are_drawn(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All but the names of its files, which are told when they are there; once each, as without
+    figures. What is read by a program comes at once."""
+    before: list[str] = []
+    drawn = run_figures.pngs
+
+    def pngs(results: read_results.Results) -> Iterator[tuple[str, bytes]]:
+        before.append(capsys.readouterr().out)
+        return drawn(results)
+
+    monkeypatch.setattr(run_figures, "pngs", pngs)
+    assert status("run", bar, "--out", tmp_path / "a") == 0
+    after = capsys.readouterr().out
+    *told, files = summary.print_lines(made := hl.load(tmp_path / "a"), bar.stem)
+    assert before.pop().splitlines() == told
+    assert after.splitlines() == [files]
+    assert {"plan.txt", "mechanism.png"} <= {*made.record.files}
+    for quiet in ("--quiet", "--json"):
+        assert status("run", bar, quiet, "--out", tmp_path / "a") == 0
+        assert before.pop() == ""
+        assert bool(capsys.readouterr().out) == (quiet == "--json")
+    assert status("run", bar, "--no-figures", "--out", tmp_path / "b") == 0
+    every = capsys.readouterr().out.splitlines()
+    assert every == [*summary.print_lines(hl.load(tmp_path / "b"), bar.stem)]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX pipes")
+def test_nobody_reads_what_a_run_says_before_its_figures(bar: Path, tmp_path: Path) -> None:
+    """The reader has closed the pipe: the command ends in good order, and blames no disk."""
+    command = f"{sys.executable} -m hapticlink run {bar} --out {tmp_path / 'out'} | true"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert hl.load(tmp_path / "out").fault is None

@@ -10,12 +10,14 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from hapticlink.commands import json_schema as schema_module
 from hapticlink.commands import scene_reference
 from hapticlink.commands.json_schema import json_schema
 from hapticlink.orchestrator.scene import (
     find_scene,
     read_and_check,
 )
+from hapticlink.orchestrator.scene.toml_keys import NAMED
 from tests.orchestrator.scene.test_scene import GOOD
 from tests.shared_fixtures import status
 
@@ -32,6 +34,16 @@ def test_the_command_prints_a_valid_schema(capsys: pytest.CaptureFixture[str]) -
     printed = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(printed)
     assert printed == json.loads(json.dumps(json_schema()))
+
+
+def test_a_key_of_another_record_keeps_its_type_beside_a_table_of_that_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`substeps` of the scene is a table by FMU, that of [mechanism] a number."""
+    monkeypatch.setattr(schema_module, "NAMED", (*NAMED, "substeps"))
+    found = json_schema()
+    assert found["properties"]["substeps"]["additionalProperties"]["anyOf"][1] == {"type": "object"}
+    assert found["$defs"]["Mechanism"]["properties"]["substeps"]["type"] == "integer"
 
 
 @pytest.mark.parametrize("name", find_scene.list_shipped())

@@ -148,6 +148,9 @@ def test_a_disc_bounces_as_its_spring_and_damper_say(tmp_path):
     rebound = math.exp(-delta / omega * 2 * math.atan2(omega, delta))
     assert found["virtual_mechanism.v[1]"][0] == 1.0
     assert found["virtual_mechanism.v[1]"][-1] == pytest.approx(-rebound, abs=0.02)
+    x, gap = found["virtual_mechanism.x[1]"], found["virtual_mechanism.contact_gap"]
+    assert gap[x > 0.0901] == pytest.approx(0.09 - x[x > 0.0901], abs=1e-9)
+    assert gap.min() < -0.005
 
 
 def test_the_fmu_keeps_the_contract_of_our_fmus(tmp_path):

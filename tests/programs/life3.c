@@ -58,6 +58,7 @@ int main(int argc, char **argv) {
     if (fmi3InstantiateModelExchange("one", argv[1], NULL, false, false, NULL, logger) || said != 5) return 13;
     if (fmi3InstantiateCoSimulation("one", "other", NULL, 0, 0, 0, 0, NULL, 0, NULL, NULL, NULL)) return 14;
     if (fmi3Reset(NULL) != fmi3Error || fmi3GetFMUState(NULL, &state) != fmi3Error) return 15;
+    if (fmi3SetDebugLogging(one, false, 0, NULL)) return 17;
     fmi3FreeFMUState(one, &state);
     fmi3FreeFMUState(two, &read);
     if (fmi3Reset(one) || fmi3Terminate(two)) return 16;

@@ -17,6 +17,7 @@ from hapticlink.fmus.check import check_fmu, initialize, session
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.holds.table import TABLE
 from hapticlink.programs.build import build_program, program_files
 from tests.fmus.named_fmu import Named
 from tests.programs import life
@@ -96,7 +97,7 @@ def _measured(measured: dict[str, float], experiment) -> None:
         assert measured[f"step_error.{fmu}"] == pytest.approx(error.sum, rel=1e-9, abs=1e-15)
 
 
-HOLDS = ("zoh", "lead", "foh", "second-order", "delayed", "smooth")
+HOLDS = [name for name, row in TABLE.items() if not row.needs and not row.downsamples]
 
 
 @pytest.mark.parametrize("seed", range(4))

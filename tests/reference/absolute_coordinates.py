@@ -20,9 +20,16 @@ def _turn(angle, at):
 
 
 class Absolute:
-    """The linkage's equations, its joints' coordinates at `q0` and rates `qd0` (n,)."""
+    """The linkage's equations, its joints' coordinates at `q0` and rates `qd0` (n,). Raises
+    ValueError for joints of another type."""
 
     def __init__(self, linkage: Linkage, q0, qd0) -> None:
+        for joint, known in (
+            *((joint, ("revolute", "prismatic")) for joint in linkage.joint),
+            *((loop, ("revolute", "slot", "prismatic")) for loop in linkage.loop),
+        ):
+            if joint.type not in known:
+                raise ValueError(f"write the equations of a {joint.type} joint here")
         self.linkage, self.n = linkage, 3 * len(linkage.body)
         self._at = {b.name: 3 * i for i, b in enumerate(linkage.body)}
         self._centers = {b.name: b.center or (0.0, 0.0) for b in linkage.body}

@@ -2,10 +2,13 @@
 
 import json
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+import hapticlink.scenes
 from benchmarks import code_version
+from hapticlink.fmus.cache import sources
 
 
 def test_tables_are_current_until_a_package_changes(
@@ -26,5 +29,17 @@ def test_tables_are_current_until_a_package_changes(
     for _ in range(2):
         (told,) = code_version.status(tmp_path, {"master": page})
         assert told == f"master: made from commit {commit}; changed since then: orchestrator"
+        assert [*code_version.stale(tmp_path, pages)] == [told]
     made = f"Made from commit {commit}; changed since then: orchestrator."
     assert page.read_text() == f"# Masters\n\n{made}\n\nThe finding.\n"
+
+
+def test_a_scene_is_a_source_of_tables(tmp_path: Path) -> None:
+    scenes = ModuleType("scenes")
+    scenes.__path__ = [str(tmp_path)]
+    hashes = []
+    for rate in (512, 512, 1000):
+        (tmp_path / "scene.toml").write_text(f"haptics.rate = {rate}\n")
+        hashes.append(sources.__wrapped__(scenes))
+    assert hashes[0] == hashes[1] != hashes[2]
+    assert hapticlink.scenes in code_version.MEASURED

@@ -7,7 +7,7 @@ const size = (v) => v && Math.hypot(v[0], v[1]);
 // `each`: series of every user, from that user's part of a frame; `series`: from the whole frame.
 const CHARTS = [
   { title: "tracking error", unit: "mm", each: { error: (u) => u.arms && 1e3 * Math.hypot(u.x[0] - u.handle[0], u.x[1] - u.handle[1]) } },
-  { title: "force", unit: "N", colors: ["#b85c00", "#aa3377", "#cc3311"], each: { hand: (u) => size(u.F_hand), topology: (u) => size(u.F_constraint), contacts: (u) => size(u.F_env) } },
+  { title: "force", unit: "N", colors: ["#b85c00", "#4477aa", "#aa3377", "#cc3311"], each: { hand: (u) => size(u.F_hand), motors: (u) => size(u.F_motor), "of them topology": (u) => size(u.F_constraint), contacts: (u) => size(u.F_env) } },
   { title: "constrained directions", unit: "count", each: { number: (u) => u.n?.[0] } },
   { title: "energy generated since the start", unit: "mJ", energies: true },
   { title: "closure error", unit: "m", series: { gap: (f) => f.closure_error?.[0] }, expert: true },

@@ -11,6 +11,8 @@ const NAMES = {
   "virtual_mechanism.beta": "Loop closure: damping of Baumgarte",
   "virtual_mechanism.hysteresis": "Constrained directions: hysteresis", "virtual_environment.hysteresis": "Constrained directions: hysteresis",
 };
+// Units of gains per inertia, in the words of what they render; those of their FMUs are 1/s2 and 1/s.
+const UNITS = { k_j: "N/m per kg", b_j: "N.s/m per kg" };
 // Rates (Hz) with a short common period with the haptic rate, for which stability is computed fast.
 const RATES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 25, 26, 28, 30, 32, 36, 40, 44, 48, 50, 56,
   60, 64, 72, 75, 80, 90, 96, 100, 110, 120, 128, 144, 160, 180, 200];
@@ -85,7 +87,7 @@ export class Controls {
   gains({ key, start, units }, name) {
     const k = start.reduce((best, v, j) => (Math.abs(v) > Math.abs(start[best]) ? j : best), 0);
     this.slider(key, titled(name), [LEFT, 1, 0.05], (s) => (s < -1 ? 0 : 10 ** s),
-      ({ value }) => [value ? Math.log10(value) : LEFT, text(value * start[k], units[k])]);
+      ({ value }) => [value ? Math.log10(value) : LEFT, text(value * start[k], UNITS[name.split(".").at(-1)] ?? units[k])]);
   }
 
   jitter({ key }) {
@@ -110,7 +112,7 @@ export class Controls {
 
   labelled(key, title, input) {
     const label = document.createElement("label"), output = document.createElement("output");
-    input.dataset.control = key;
+    input.dataset.control = input.id = label.htmlFor = key; // an output, which comes first, takes a label, too
     label.append(title, output, input);
     this.fieldset.append(label);
     return output;

@@ -16,11 +16,12 @@ export class Ending {
     while (frame.t - this.frames[0].t > LAST) this.frames.shift();
   }
 
-  // Says why; the page goes on when the last moments have been shown.
-  show(why) {
+  // Says why, and which of two runs it was; the page goes on when the last moments have been shown.
+  show(why, run) {
     const diverged = /not finite|diverge/i.test(why), t = this.frames.at(-1)?.t ?? 0;
     const word = document.createElement("b");
-    word.textContent = diverged ? `Diverged at ${t.toFixed(2)} s` : `Ended at ${t.toFixed(2)} s`;
+    const ended = `${diverged ? "diverged" : "ended"} at ${t.toFixed(2)} s`;
+    word.textContent = run ? `${run} ${ended}` : ended[0].toUpperCase() + ended.slice(1);
     this.host.replaceChildren(word, ` ${why}`);
     this.started = performance.now();
     this.played = this.frames;

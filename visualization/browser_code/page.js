@@ -3,7 +3,7 @@ import { SECOND } from "./canvas.js";
 import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
 import { Ending } from "./ending.js";
-import { Energies } from "./energies.js";
+import { Energies, LIGHTS } from "./energies.js";
 import { tags } from "./legend.js";
 import { addressOf, differing, messagesOf } from "./settings.js";
 import { loudness } from "./loudness.js";
@@ -68,11 +68,11 @@ const HANDLERS = {
     else note_address();
   },
   state(message) {
-    if (message.ended && !view.state.ended) ending.show(message.ended);
+    if (message.ended && !view.state.ended) ending.show(message.ended, shown?.b && (message.b ? "B" : "A"));
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
-    if (message.ended) show({ energy: "red" }); // a run that diverged at once never turned red
+    if (message.ended) show({ energy: "red", levels: ["the run has ended"] }); // one that diverged at once never turned red
     $("record").textContent = message.recording ? "End recording" : "Record";
     note();
   },
@@ -87,10 +87,11 @@ const HANDLERS = {
     [message, message.b].forEach((frame, i) => {
       if (!frame || !energies[i]) return;
       energies[i].add(frame);
-      if (frame.light) view.levels[i] = frame.light;
+      if (frame.said) view.levels[i] = frame.said;
       charts.add(frame, i);
     });
-    if (message.light) show({ energy: message.light });
+    const lights = [message.light, message.b?.light];
+    if (message.light) show({ energy: LIGHTS.findLast((light) => lights.includes(light)) });
     if (sound?.signal) sound.feel(loudness(sound.signal, message));
   },
   map: (message) => show({ map: { ...message, since: performance.now() } }),
@@ -103,16 +104,16 @@ const HANDLERS = {
   },
 };
 
-// The light, with the level of the sampling energy and the stability verdict.
+// The light of the energy with its statement, and that of the stability verdict: amber, too, where another hand than the
+// mouse's is unstable, which the picture does not show.
 function show(change) {
   Object.assign(view, change);
-  const levels = view.levels.map((light) => ({ green: "small", amber: "some", red: "high" })[light]);
-  const level = levels.length > 1 ? `A ${levels[0]}, B ${levels[1]}` : levels[0];
+  const { levels, map } = view, elsewhere = map?.verdict === "unstable" && map.mouse === "stable";
   $("light").className = `light ${view.energy ?? ""}`;
-  $("energy").textContent = level ? `sampling energy: ${level}` : "sampling energy";
-  $("verdict").className = `light ${{ stable: "green", marginal: "amber", unstable: "red" }[view.map?.verdict] ?? ""}`;
-  $("verdict").hidden = !view.map;
-  $("verdict").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${view.map?.why ?? ""}`;
+  $("energy").textContent = levels.length > 1 ? levels.map((said, i) => `${"AB"[i]}: ${said}`).join("; ") : levels[0] ?? "energy generated";
+  $("verdict").className = `light ${elsewhere ? "amber" : { stable: "green", marginal: "amber", unstable: "red" }[map?.verdict] ?? ""}`;
+  $("verdict").hidden = !map;
+  $("verdict").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${map?.why ?? ""}`;
 }
 
 // For how long something has been waited for.
@@ -222,7 +223,7 @@ function draw() {
   if (view.frame) {
     const { b } = view.frame;
     stage.draw(ending.frame ?? view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
-    tags($("tags"), [...view.frame.states.map(label), ...(b ? [[SECOND, second()]] : [])]);
+    tags($("tags"), [...view.frame.states.filter((state) => !state.startsWith("energy")).map(label), ...(b ? [[SECOND, second()]] : [])]);
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;
   } else {
     if (view.start) stage.draw(view.start);

@@ -36,7 +36,7 @@ function guarded(act) {
 }
 
 function tick() {
-  for (const run of runs) run.run();
+  runs.forEach((run, i) => { state.b = i > 0; run.run(); }); // which of them ends both
   heard?.samples.push(...[0, 1].map((side) => (runs[side] ?? runs[0]).heard(heard.signal)));
   if (!rows) return;
   runs.forEach((run, i) => rows[i].push(run.row));

@@ -121,8 +121,7 @@ def _energies(run: Results, measures: Measures) -> Numbers:
             yield f"of it at the end, {name} (mJ)", short(1e3 * block.generated)
     yield "connections that carry power across rates", str(len(run.record.across) or "none")
     for name, energy in run.record.meters.items():
-        generated, peak = short(1e3 * energy.generated), short(1e3 * energy.peak)
-        yield f"hold of {name}, generated (mJ)", f"{generated}, at most {peak}"
+        yield f"hold of {name}", summary.describe_generated(energy.peak, energy.generated)
 
 
 def _stability(run: Results) -> Numbers:

@@ -307,13 +307,15 @@ def _constraints(results: Results, times: Vector, numbers: Vector) -> Figure:
 
 
 def _port(results: Results, port: UserPort) -> Figure:
-    peak = 1e3 * port.measured.peak
-    title = f"The rendering generated at most {short(peak)} mJ"
-    at = int(np.argmax(port.generated_J)) if peak > 0 else -1
-    if put_in := float(port.put_in_J[at]):
-        when = f", at {port.time_s[at]:.3g} s" if peak > 0 else ""
-        title += f"{when}, where the hand had put in {short(1e3 * put_in)} mJ"
-    if peak > 0 and port.blocks_J:
+    measured = port.measured
+    peak, at = measured.peak, int(np.argmax(port.generated_J))
+    title = f"The rendering {summary.describe_generated(peak, measured.generated)}"
+    if peak > summary.ROUNDING_J:
+        most = f"{short(1e3 * peak)} mJ, at {port.time_s[at]:.3g} s"
+        title = f"The rendering generated at most {most}"
+        if put_in := float(port.put_in_J[at]):
+            title += f", where the hand had put in {short(1e3 * put_in)} mJ"
+    if peak > summary.ROUNDING_J and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
         title += f"; its largest source is the {SOURCES.get(largest, largest)}"
     label = "energy at the user's port (mJ)"

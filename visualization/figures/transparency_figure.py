@@ -42,6 +42,11 @@ def draw(found: Sequence[Transparency]) -> Figure:
 
 
 def _finding(found: Sequence[Transparency]) -> str:
+    if growing := [pose for pose in found if pose.growing]:
+        loose = f"unstable in some hands at {', '.join(pose.pose for pose in growing)}"
+        if all(pose.steady_in for pose in growing):
+            return f"{loose}; shown is what those feel that keep it steady"
+        return f"{loose}, and in all that were tried at one: no steady feel"
     worst = min(pose.right_up_to for pose in found)
     if np.isinf(worst):
         return f"force and direction are right up to {HERTZ[-1]:g} Hz"

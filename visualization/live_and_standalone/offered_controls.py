@@ -129,11 +129,12 @@ def _gains(scene: Scene, system: System) -> dict[str, tuple[NDArray[np.float64],
             for s in fmu.description.scalars
             if s.causality == "parameter" and s.variability == "tunable" and s.port not in OTHERS
         ]
+        given = {scalar.name: value for scalar, value in fmu.starts}
         for port in dict.fromkeys(s.port for s in tunable):
             if f"{fmu.name}.{port}" in fixed:
                 continue
             entries = fmu.description.port(port, "parameter")
-            start = np.array([s.start for s in entries])
+            start = np.array([given.get(s.name, s.start) for s in entries], float)
             gains[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]
     for name in (stiffness(user) for user in users(scene)):
         if name in gains:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.frozen_nonlinearities import has_friction
-from hapticlink.analysis.stability.hand_cases import Case, InHands
+from hapticlink.analysis.stability.hand_cases import Case, InHands, worst_case
 from hapticlink.analysis.stability.hands import HANDS
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.modes import DRIFT
@@ -18,6 +18,7 @@ from hapticlink.analysis.stability.resting_scene import resting_system
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.components.specs.hand import SpringHand
 from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
@@ -42,8 +43,8 @@ Parameters = Mapping[str, Sequence[float]]
 
 
 def predict_stability(scene: Scene, settings: Settings, parameters: Parameters) -> dict[str, str]:
-    """`verdict` ("" where there is none), `said`, which is its one line on the page, and `why`, its
-    tooltip."""
+    """`verdict` ("" where there is none), that in the hand of the `mouse` alone, `said`, which is
+    its one line on the page, and `why`, its tooltip."""
     *_, last = predict_stepwise(scene, settings, parameters)
     return last
 
@@ -67,16 +68,18 @@ def predict_stepwise(
 
 
 def _verdict(cases: Sequence[Case], beside: str, so_far: bool = False) -> dict[str, str]:
-    worst = max(cases, key=lambda case: case.severity)
+    worst = worst_case(cases)
     verdict = "marginal" if worst.drifts else worst.verdict
-    said = f"{_summary(worst)}{beside}{', so far' if so_far else ''}"
+    mouse = next(case for case in cases if case.hand == MOUSE)
+    calm = "; stable in the mouse's hand" if mouse.verdict == "stable" != worst.verdict else ""
+    said = f"{_summary(worst)}{calm}{beside}{', so far' if so_far else ''}"
     if so_far and verdict != "unstable":  # what only the worst of all hands tells
         verdict = ""
     lines = (
         f"{case.hand}: {case.verdict}, growth rate {case.growth:.4g} 1/s, {case.hertz:.3g} Hz"
         for case in cases
     )
-    return {"verdict": verdict, "said": said, "why": "\n".join(lines)}
+    return {"verdict": verdict, "mouse": mouse.verdict, "said": said, "why": "\n".join(lines)}
 
 
 def judge_hands(
@@ -91,6 +94,7 @@ def judge_hands(
     changed = _at_rate(scene, settings.get(RATE))
     with (
         interrupt.defer_signals(),
+        one_blas_thread(),
         np.errstate(invalid="ignore", over="ignore"),
         build_system(scene) as whole,
     ):

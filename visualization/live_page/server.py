@@ -112,7 +112,7 @@ class Pages:
             if kind == "controls":
                 self._broadcast(kind, self._newest[kind])
             elif kind == "refused" or (kind == "state" and message["ended"]):
-                self._broadcast(kind, message)
+                self._broadcast(kind, message | {"b": True})
         if self._second and not self._second.alive:
             self._compare(False)
             self._broadcast("refused", {"type": "refused", "why": "the second run has ended"})

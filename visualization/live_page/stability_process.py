@@ -78,7 +78,6 @@ class StabilityProcess:
 def main() -> None:
     """Answer what is asked by the standard input: the number of the question with each answer, and
     with None behind the last."""
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the other processor is for the haptic loop
     out, questions = to_caller(), queue.SimpleQueue[Any]()
     signal.signal(signal.SIGINT, lambda *_: None)
     read_message(sys.stdin.buffer)  # the arguments, of which there are none

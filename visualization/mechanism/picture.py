@@ -20,7 +20,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.visualization.mechanism.marks import marks, point_of, state
 
 PORT = "user's port"
-RAW = ("ghost", "q", "lambda", "P_c", "F_motor", "measured")
+RAW = ("ghost", "q", "lambda", "P_c", "measured")
 """What frames have instead of what is drawn."""
 LEAST_SHARE = 0.05
 """Of a constrained direction in the plane, below which it is a mere turn."""

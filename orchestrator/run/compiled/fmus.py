@@ -8,6 +8,7 @@ from typing import Any
 
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
+from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.run.compiled import structures
@@ -85,6 +86,13 @@ def of_instance(
     if check:
         _fill_with(check, instance, c)
     return c
+
+
+def begin_again(instance: Instance, c: structures.Fmu) -> None:
+    """Takes over what an instance has found at another start."""
+    c.fill(instance, "row_due", "good", n_steps=0, untimed=0)
+    inverse = instance.bounds.inverse
+    ctypes.memmove(c.inverse, inverse.ctypes.data, inverse.nbytes)
 
 
 def _fill_with(check: StepCheck, instance: InProcess, fmu: structures.Fmu) -> None:

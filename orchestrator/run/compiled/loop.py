@@ -14,6 +14,7 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.event_kinds import event, key_of, keyed_events
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.sample_ages import Delay, delays
 from hapticlink.orchestrator.results.run_record import Iterations
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import fill_generator
@@ -57,6 +58,13 @@ class Events:
             self._next_window(i)
             if clock.name in sides:
                 self._clocks[i].fill(side=sides[clock.name].c)
+
+    def again(self) -> Events:
+        """The same events, from the first one on."""
+        events = Events(self._machine, self._timeline, self._block)
+        events._kinds = self._kinds
+        events.prepare(())
+        return events
 
     @property
     def complete(self) -> int:
@@ -145,10 +153,16 @@ class CompiledLoop:
 
     def __init__(self, plan: Plan, simulation: Simulation) -> None:
         self._plan, self._simulation = plan, simulation
+        self._delays: dict[int, dict[str, Delay]] = {}
         self._machine = machine = Machine(simulation)
         timeline, pace = plan.system.timeline, simulation.pace
         self.change_hold, self.in_python, self.complete = machine.change_hold, machine.in_python, 0
         self.events = Events(machine, timeline, self._block, pace, simulation.sides)
+
+    def begin_again(self) -> None:
+        """Stand at the first event, with the kinds of events that are known."""
+        self._machine.begin_again()
+        self.events = self.events.again()
 
     def run(self, turn: Callable[[int], object]) -> None:
         """Run all events; `turn` is called from time to time, and at the end, with the tick."""
@@ -162,6 +176,12 @@ class CompiledLoop:
 
     def _block(self, event: Event) -> tuple[int, int]:
         return self._machine.block([*instructions(self._plan.block(event), self._simulation)])
+
+    def delays(self) -> dict[str, Delay]:
+        """The ages of the samples in the events that are complete."""
+        if self.complete not in self._delays:
+            self._delays = {self.complete: delays(self._plan, self.complete)}
+        return self._delays[self.complete]
 
     def iterations(self) -> Iterations | None:
         """The counts of all fixed-point iterations together; None where there is none."""

@@ -207,19 +207,23 @@ class Machine:
 
         return self._index("meter", connection, make)
 
+    def begin_again(self) -> None:
+        """Take over what is new at each start: recorders, and what instances have found there."""
+        for clock, index in self._indices["table"].items():
+            self._fill_table(clock, index)
+        for name, index in self._indices["fmu"].items():
+            fmus.begin_again(self._simulation.instances[name], self._fmus[index])
+
     def _table(self, clock: str) -> int:
-        recorder = self._simulation.recorders[clock]
+        return self._index("table", clock, lambda index: self._fill_table(clock, index))
 
-        def make(index: int) -> object:
-            c = self._tables[index]
-            if recorder.rows is not None:
-                c.fill(block=recorder.rows, rows=recorder.filled)
-            c.fill(recorder, "room", "due", "count", "reached", "every", "end", "view")
-            where = recorder.places if recorder.view is None else None
-            c.fill(n=len(recorder.places), where=where)
-            return recorder
-
-        return self._index("table", clock, make)
+    def _fill_table(self, clock: str, index: int) -> None:
+        recorder, c = self._simulation.recorders[clock], self._tables[index]
+        if recorder.rows is not None:
+            c.fill(block=recorder.rows, rows=recorder.filled)
+        c.fill(recorder, "room", "due", "count", "reached", "every", "end", "view")
+        where = recorder.places if recorder.view is None else None
+        c.fill(n=len(recorder.places), where=where)
 
     # --- what the loop returns for --------------------------------------------------------
 

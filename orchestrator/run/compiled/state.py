@@ -67,6 +67,13 @@ class StateBlock:
         self._integers: list[Array] = []
         self._numbers: list[Array] = []
 
+    def integers(self) -> Integers:
+        """The whole numbers of the state as it is."""
+        if self._own():
+            return self.save().integers
+        self._locate()
+        return np.frombuffer(_read(self._integers), np.int64)
+
     def save(self) -> Saved:
         self._locate()
         lengths = tuple(array.length for array in self._numbers)

@@ -62,13 +62,18 @@ class Structure(ctypes.Structure):
         vars(self).setdefault("kept", {}).update(values)
 
 
+_IN_MEMORY = (ctypes._SimpleCData, ctypes.Structure, ctypes.Array)
+
+
 def _address(value: Any) -> Any:
     """The address of what a pointer points to; any other value itself."""
+    if type(value) is int or type(value) is float:
+        return value
     if isinstance(value, np.ndarray):
         return value.ctypes.data
     if callable(value):
         return ctypes.cast(value, ctypes.c_void_p).value
-    if isinstance(value, ctypes._SimpleCData | ctypes.Structure | ctypes.Array):
+    if isinstance(value, _IN_MEMORY):
         return ctypes.addressof(value)
     return value
 

@@ -18,7 +18,7 @@ from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene_tables import PowerPort
-from hapticlink.orchestrator.system.ports import find_power_port
+from hapticlink.orchestrator.system.ports import power_ports
 from hapticlink.orchestrator.system.system import Connection
 
 
@@ -51,10 +51,8 @@ class Bond:
 
 def bond(c: Connection, signals: SignalVector) -> Bond | None:
     target = signals.system.fmu[c.target].description
-    pairs = (
-        (i, s, find_power_port(c, s, signals.system.energy.power)) for i, s in enumerate(c.inputs)
-    )
-    carrying = [(i, s, p.sign, _displacement(target, s, p)) for i, s, p in pairs if p]
+    pairs = zip(c.inputs, power_ports(c, signals.system.energy.power), strict=True)
+    carrying = [(i, s, p.sign, _displacement(target, s, p)) for i, (s, p) in enumerate(pairs) if p]
     if not carrying or c.initial:
         return None
     entries, inputs, signs, moved = zip(*carrying, strict=True)

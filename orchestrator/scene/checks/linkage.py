@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import get_args
 
 from hapticlink.components.specs.drives import ConstantDrive
-from hapticlink.components.specs.linkage import NO_POINT, Linkage
+from hapticlink.components.specs.joint_types import JOINT_TYPES, CutType, TreeType
+from hapticlink.components.specs.linkage import NO_POINT, Joint, Linkage, Loop
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
@@ -30,7 +32,7 @@ def check_linkage(scene: Scene) -> Iterator[Problem]:
                     yield (*here, kind, i, "bodies", k), unknown("body", name, frames)
             if kind == "loop" and pair.bodies[0] == pair.bodies[1]:
                 yield (*here, kind, i, "bodies"), "a loop joins two different bodies"
-    yield from _cuts(linkage)
+    yield from _own_keys(linkage)
     yield from _gears(linkage)
     yield from _limits(linkage)
     yield from _choices(linkage, bodies)
@@ -68,19 +70,24 @@ def _choices(linkage: Linkage, bodies: Sequence[str]) -> Iterator[Problem]:
             yield (*path, "body"), unknown("body", point.body, bodies)
 
 
-def _cuts(linkage: Linkage) -> Iterator[Problem]:
-    """Problems of keys that a kind of cut joint needs, or does not have."""
-    for i, loop in enumerate(linkage.loop):
-        path: Path = ("linkage", "loop", i)
-        if loop.kind.has_axis and loop.axis is None:
-            yield (*path, "axis"), f"a {loop.type} joint needs its direction (rad)"
-        if not loop.kind.has_axis and loop.axis is not None:
-            yield (
-                (*path, "axis"),
-                f'a {loop.type} joint has no direction: leave it out, or type = "slot"',
-            )
-        if loop.kind.turns and loop.angle is not None:
-            yield (*path, "angle"), f"a {loop.type} joint turns freely: leave its angle out"
+def _own_keys(linkage: Linkage) -> Iterator[Problem]:
+    """Problems of keys that a type of joint needs, or does not have."""
+    tables: dict[str, tuple[Sequence[Joint | Loop], object]] = {
+        "joint": (linkage.joint, TreeType),
+        "loop": (linkage.loop, CutType),
+    }
+    for table, (joints, types) in tables.items():
+        of = {name: JOINT_TYPES[name].own_keys(types is CutType) for name in get_args(types)}
+        for key in dict.fromkeys(key for keys in of.values() for key in keys):
+            able = " or ".join(f'"{name}"' for name in of if key in of[name])
+            for i, joint in enumerate(joints):
+                path: Path = ("linkage", table, i, key.name)
+                given = getattr(joint, key.name) is not None
+                if key not in of[joint.type] and given:
+                    text = f"a {joint.type} joint has no {key.what}: leave it out"
+                    yield path, f"{text}, or type = {able}"
+                elif key in of[joint.type] and key.required and not given:
+                    yield path, f"a {joint.type} joint needs its {key.what} ({key.unit})"
 
 
 def _gears(linkage: Linkage) -> Iterator[Problem]:
@@ -130,8 +137,6 @@ def _tree(linkage: Linkage, frames: Mapping[str, int]) -> Iterator[Problem]:
         if "effort" in joint.ports and isinstance(joint.drive, ConstantDrive):
             message = f"{joint.name}.effort is the drive's constant already: leave out one of them"
             yield (*path, "ports"), message
-        if joint.kind.has_axis and joint.axis is None:
-            yield (*path, "axis"), f"a {joint.type} joint needs its direction (rad)"
     held = {"ground"}
     for name, i in frames.items():
         way: dict[str, None] = {}
@@ -154,7 +159,7 @@ def _limits(linkage: Linkage) -> Iterator[Problem]:
             lower, upper = limits.lower, limits.upper
             if kind == "joint" and part.kind.size > 1:
                 text = f"a {part.type} joint has {part.kind.count} coordinates"
-                yield path, f"{text}: limit revolute or prismatic joints"
+                yield path, f"{text}: limit joints of one coordinate"
             if lower is None and upper is None:
                 yield path, "there is no limit: give `lower`, `upper` or both"
             elif lower is not None and upper is not None and lower >= upper:

@@ -20,6 +20,7 @@ from tests.little_fmus import entries, slave
         (4e-4, 2e-4, "generated at most 0.4 mJ, and by the end has generated 0.2 mJ"),
         (4e-4, 4e-4, "generated 0.4 mJ by the end, and at no time more"),
         (0.0, -2e-4, "generated no energy and dissipated 0.2 mJ"),
+        (3e-17, -2.69e-2, "generated no energy and dissipated 26.9 mJ"),
         (0.0, 0.0, "generated no energy"),
     ],
 )
@@ -80,9 +81,8 @@ def test_turns_that_cost_the_rate_are_told(
 
 SPRING = {"type": "spring", "stiffness": [10, 10, 0.1], "damping": [1, 1, 0.01]}
 AT_START = [0.0, 0.0445, 0.0148]
-AT_TURN = [0.0445, 0.0148, 5.5 + 0.2]
-SINE = {"amplitude": [0, 0, 0.2], "frequency": [1, 1, 1], "phase": [0, 0, -1.5708]}
 FREEZE = {"freeze": ["controller.F_hand"], "time": 0.3}
+SINE = {"amplitude": [1e-4, 0.0, 0.0], "frequency": [2.0, 2.0, 2.0]}
 NOWHERE = [
     ({"hold": "foh", "graphics.rate": 512}, "acts on no connection: there is no connection from a"),
     ({"hold": "foh", "holds.controller.Lambda_inv": "zoh", "holds.controller.P_c": "zoh"}, "have"),
@@ -94,13 +94,13 @@ NOWHERE = [
     ),
     ({"hand": {**SPRING, "target": [[*AT_START, 5.5]]}}, "a whole turn from the handle's angle"),
     ({"hand": {**SPRING, "target": [[*AT_START, -13.35]]}}, "2 whole turns from the handle's"),
-    ({"hand": {**SPRING, "target": {**SINE, "mean": AT_TURN}}}, "a whole turn from the handle's"),
+    ({"hand": {**SPRING, "target": SINE | {"mean": [*AT_START[1:], 5.5]}}}, "a whole turn from"),
 ]
 SOMEWHERE = [
     {"hold": "foh"},
     {"at": [{**FREEZE, "until": 0.301}]},
     {"hand": {**SPRING, "target": [[*AT_START, -0.8]]}},
-    {"hand": {**SPRING, "target": {**SINE, "mean": [0.0445, 0.0148, -0.6]}}},
+    {"hand": {**SPRING, "target": SINE | {"mean": [*AT_START[1:], -0.8]}}},
     {"hand": {**SPRING, "stiffness": [10, 10, 0], "target": [[*AT_START, 5.5]]}},
 ]
 SAID = "acts on no|turn.* from the handle"

@@ -51,6 +51,7 @@ def test_a_sampled_spring_has_the_eigenvalues_of_its_map() -> None:
         ([[1.0, 0.0], [0.0, 0.5]], 1e-6, "stable"),  # moves freely, and is damped otherwise
         ([[1.05, 0.0], [0.0, 0.5]], 0.1, "marginal"),  # may grow
         ([[1.0, 0.1], [0.0, 1.0]], 1e-6, "marginal"),  # moves freely, and nothing else
+        ([[1e138, 0.0], [0.0, 0.5]], 1e139, "unstable"),  # grows by 637 1/s, however exactly
     ],
 )
 def test_a_mode_that_may_grow_is_counted(A: list[list[float]], error: float, said: str) -> None:
@@ -59,6 +60,14 @@ def test_a_mode_that_may_grow_is_counted(A: list[list[float]], error: float, sai
         modes(Linearisation(np.zeros(2), np.zeros(2), np.eye(2), np.array(A), E), 1.0)
     )[0]
     assert verdict(abs(first.z), first.uncertainty) == said
+
+
+def test_a_map_that_is_not_finite_is_refused() -> None:
+    """As a search for the largest gains meets them."""
+    with pytest.raises(hl.InputFault, match="beyond all numbers within a period"):
+        modes(
+            Linearisation(np.zeros(1), np.zeros(1), np.eye(1), np.array([[np.inf]]), np.eye(1)), 1.0
+        )
 
 
 def test_a_hanging_and_a_standing_mechanism_move_as_their_linearisations_do() -> None:

@@ -3,6 +3,7 @@ the handle."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partialmethod
 from typing import Any
 
@@ -126,6 +127,60 @@ def test_a_pressed_run_gives_the_felt_stiffness() -> None:
     along = constraint.along
     size = abs(along @ np.linalg.inv(S) @ F) / abs(along @ S @ x)
     assert size == pytest.approx(constraint.slow, rel=0.01)
+
+
+def test_a_loop_that_is_unstable_says_so_before_its_numbers() -> None:
+    """A rod that stands on its end falls when it is let go: J s^2 + b s - m g c = 0; a firm grip
+    keeps it there. Without a hand that does, no number is told."""
+    m, c, J, b = 0.8, 0.04, 1e-3 + 0.8 * 0.04**2, 0.002
+    rod = {
+        "gravity": [0.0, -9.81],
+        "operational_point": {"body": "rod", "at": [0.05, 0.0]},
+        "start": {"pivot": np.pi / 2},
+        "body": [{"name": "rod", "mass": m, "inertia": 1e-3, "center": [c, 0.0]}],
+        "joint": [{"name": "pivot", "child": "rod", "damping": b}],
+    }
+    falls: dict[str, Any] = {"linkage": rod, "controller.bias": "full", "duration": 0.1}
+    (found,) = transparency.transparency("single-body", write_options(falls), count=1)
+    let_go = found.growing[0]
+    assert let_go.free
+    assert let_go.growth == pytest.approx(max(np.roots([J, b, -m * 9.81 * c]).real), rel=0.01)
+    assert "firm grip" in found.steady_in
+    assert "arm at rest, soft grip" not in found.steady_in
+    _, first, *others = found.lines()
+    assert first.startswith("  unstable when let go: a divergence of 0 Hz grows at 11.3 1/s")
+    assert any("firm grip" in line for line in others)
+    assert any("is felt as" in line for line in others)
+    lines = list(replace(found, steady_in=()).lines())
+    assert lines[-1] == "  no hand that was tried feels it steadily"
+    assert not any("is felt as" in line for line in lines)
+    (calm,) = transparency.transparency("single-body", count=1)
+    assert calm.growing == ()
+    assert not any("unstable" in line for line in calm.lines())
+
+
+def test_what_is_felt_is_that_of_runs_in_the_hands_that_keep_it_steady() -> None:
+    """With frames of 17 haptic periods a firm grip shakes closed-loop-direct, and a light touch
+    does not: shaken by .1 mm at 2 Hz the latter has the compliance within 1 %."""
+    options: dict[str, Any] = {"graphics.rate": "512/17"}
+    found = transparency.transparency("closed-loop-direct", write_options(options), count=1)[0]
+    assert [case.hand for case in found.growing] == ["firm grip"]
+    assert "light touch" in found.steady_in
+    start = hl.run("closed-loop-direct", options | {"duration": 0.01}, figures=False)
+    mean = start["virtual_mechanism.x"][0].tolist()
+    held = write_options(options | {"hand": spring(mean, (0.0, 0.0, 0.0), 1000.0)})
+    with resting("closed-loop-direct", held) as place:
+        X = response(place.period({}), hand_port(place.map.system)).compliance(2.0, T)
+    sine = {"mean": mean, "amplitude": [1e-4, 0.0, 0.0], "frequency": [2.0] * 3}
+    hand = {"type": "spring", "target": sine, "stiffness": [100.0, 100.0, 0.33]}
+    given = options | {"hand": hand | {"damping": [5.0, 5.0, 0.01]}, "duration": 8.0}
+    run = hl.run("closed-loop-direct", given | {"linkage.start_velocity": {}}, figures=False)
+    table = run.tables["haptics"]
+    late = table["time"] > 5.0
+    t = table["time"][late] - 5.0
+    x, F = (phasor(t, table[n][late], 2.0) for n in ("haptic_device.x", "hand.F"))
+    S = np.diag([1.0, 1.0, LENGTH])
+    assert np.linalg.norm(S @ (x - X @ F)) < 0.01 * np.linalg.norm(S @ x)
 
 
 def test_costs_are_those_of_changed_scenes_and_their_limit_that_of_runs(

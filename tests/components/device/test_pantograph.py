@@ -13,6 +13,7 @@ from hapticlink.components.specs.device import Device
 
 DEVICE = Device()
 P = {k: v for k, v in asdict(DEVICE).items() if isinstance(v, float | int)}
+ROUGH = {"motor_damping": 2e-3, "motor_friction": 6e-3}
 POSE, V, WRENCH, ANGLES = (ca.SX.sym(s, n) for s, n in (("x", 3), ("v", 3), ("F", 3), ("a", 4)))
 
 
@@ -37,6 +38,7 @@ stop = function([POSE, V], pantograph.stop_wrench(POSE, V, P))
 estimate = function([ANGLES, POSE], pantograph.pose_from_angles(ANGLES, POSE, P))
 estimate_4 = function([ANGLES, POSE], pantograph.pose_from_angles(ANGLES, POSE, P, iterations=4))
 torques = function([WRENCH, POSE], pantograph.motor_torques(WRENCH, POSE, P))
+friction = function([ANGLES], pantograph.friction_torques(ANGLES, ROUGH))
 
 workspace = st.tuples(st.floats(-0.06, 0.05), st.floats(-0.05, 0.05), st.floats(-20, 20))
 wrenches = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-0.2, 0.2))
@@ -221,3 +223,15 @@ def test_velocity_term_is_the_christoffel_matrix_times_the_velocity():
         M_again, c = term(pose, v)
         np.testing.assert_allclose(M_again, M, rtol=1e-14)
         np.testing.assert_allclose(np.ravel(c), C @ v, rtol=1e-12, atol=1e-16)
+
+
+@settings(max_examples=20)
+@given(st.tuples(*[st.floats(-20, 20)] * 4))
+def test_motors_rub_against_their_rates(rates):
+    """b q' + f where a motor turns much faster than friction changes sign; no power is given."""
+    w = np.array(rates)
+    found = friction(w).ravel()
+    assert (found * w <= 0.0).all()
+    fast = np.abs(w) > 10 * pantograph.FRICTION_RATE
+    expected = -2e-3 * w - 6e-3 * np.sign(w)
+    np.testing.assert_allclose(found[fast], expected[fast], rtol=1e-6)

@@ -16,7 +16,7 @@ from hapticlink.orchestrator.holds.table import TABLE
 from hapticlink.orchestrator.run.compiled.hold_structures import array
 from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.latency_and_loss import SampleLink
-from tests.orchestrator.holds.bench import Bench, generated
+from tests.orchestrator.holds.bench import Bench, generated, vector
 
 BASE = Fraction(3, 7680)
 N = 3
@@ -39,33 +39,48 @@ def through(stamps, samples, slopes=()):
     return KroghInterpolator(np.array([*times, *times][: len(each)])[order], np.array(each)[order])
 
 
-def polynomial(name, stamps, y, yd, t):
-    """A hold's value at tick t from all samples y, and what they have beside, yd."""
-    row = TABLE[name]
-    known = min(len(stamps), row.degree + 1)
-    if row.depth == row.degree + 1 and not row.needs:
-        return through(stamps[-known:], y[-known:])(float(t * BASE))
-    if name == "lead":
-        return y[-1] if len(y) < 2 else 1.5 * y[-1] - 0.5 * y[-2]
-    if name == "slope":
-        if len(y) < 2:
-            return 0.0 * y[-1]
-        return (yd[-1] - yd[-2]) / float((stamps[-1] - stamps[-2]) * BASE)
-    if name == "foh-derivative" or len(y) < 2:
-        return y[-1] + yd[-1] * float((t - stamps[-1]) * BASE)
-    assert name == "hermite"
+def newest(count):
+    """The polynomial through so many of the newest samples."""
+    return lambda stamps, y, yd, t: through(stamps[-count:], y[-count:])(float(t * BASE))
+
+
+def along_derivative(stamps, y, yd, t):
+    return y[-1] + yd[-1] * float((t - stamps[-1]) * BASE)
+
+
+def slope(stamps, y, yd, t):
+    if len(y) < 2:
+        return 0.0 * y[-1]
+    return (yd[-1] - yd[-2]) / float((stamps[-1] - stamps[-2]) * BASE)
+
+
+def hermite(stamps, y, yd, t):
+    if len(y) < 2:
+        return along_derivative(stamps, y, yd, t)
     return through(stamps[-2:], y[-2:], yd[-2:])(float(t * BASE))
 
 
-POLYNOMIALS = [
+LAWS = {
+    "zoh": newest(1),
+    "latest": newest(1),
+    "foh": newest(2),
+    "second-order": newest(3),
+    "foh-derivative": along_derivative,
+    "slope": slope,
+    "hermite": hermite,
+}
+"""The value at tick t from all samples y, and what they have beside, yd."""
+OF_SAMPLES = [
     name for name, row in TABLE.items() if row.push == "samples" and row.needs != "gradient"
 ]
+"""Without `model`, whose law is in test_model_hold.py."""
 
 
-@pytest.mark.parametrize("name", POLYNOMIALS)
+@pytest.mark.parametrize("name", OF_SAMPLES)
 @few
 @given(seeds)
-def test_polynomials_through_samples(name, seed):
+def test_values_are_those_of_the_law(name, seed):
+    assert name in LAWS, f"write the law of {name} in LAWS of this file"
     generator = np.random.default_rng(seed)
     hold = Bench(base=BASE).hold(name, N)
     stamps, y, yd, tick = [], [], [], 0
@@ -77,9 +92,30 @@ def test_polynomials_through_samples(name, seed):
         hold.push(int(tick), sample, int(tick) + 2)
         for ahead in (0.0, generator.uniform(0, 20), 7.5):
             later = int(tick) + 2
-            expected = polynomial(name, stamps, y, yd, later + Fraction(ahead))
+            expected = LAWS[name](stamps, y, yd, later + Fraction(ahead))
             close(hold.value(later, ahead), expected, 1e3)
         tick += generator.integers(3, 40)
+
+
+@pytest.mark.parametrize("name", [name for name in TABLE if TABLE[name].push != "set_position"])
+@few
+@given(seeds)
+def test_the_degree_is_that_of_the_value_within_a_step(name, seed):
+    """Of differences at equal distances those of this order are none, and one order lower some."""
+    generator = np.random.default_rng(seed)
+    row, bench = TABLE[name], Bench(2 * N, BASE)
+    readers = {"displacement": bench.reader(range(N)), "velocity": bench.reader(range(N, 2 * N))}
+    hold = bench.hold(name, N, **readers)
+    for tick in range(0, 160, 40):
+        hold.push(tick, generator.normal(size=hold.width), tick)
+        hold.value(tick)
+    values = np.array([hold.value(120, ahead) for ahead in np.linspace(0.0, 30.0, 13)])
+    degree, scale = row.degree, np.abs(values).max()
+    if degree is None:
+        assert np.abs(np.diff(values, axis=0)).max() > 1e-6 * scale
+    else:
+        assert np.abs(np.diff(values, degree + 1, axis=0)).max() < 1e-9 * scale
+        assert np.abs(np.diff(values, degree, axis=0)).max() > 1e-6 * scale
 
 
 @few
@@ -190,6 +226,40 @@ def test_forces_of_holds_that_observe_their_energy(name, seed, every):
         close(generated(hold), E, 1 + abs(E))
         bench.values[0] += v[-1] * tick_s / 2 * generator.uniform(-0.5, 1.5)
         x.append(2.0 * bench.values[0])
+
+
+@few
+@given(seeds, st.integers(1, 12))
+def test_with_late_samples_the_friction_of_passive_has_the_way_since_the_stamp(seed, late):
+    """F_n - beta sign(d) c with P = E + r times the length of the way since the stamp of F_n, back
+    and forth; r of all samples that are held after the stamp before. E, beta and d are tested with
+    samples that are in time, and E with late ones by meters."""
+    generator = np.random.default_rng(seed)
+    bench = Bench(2, BASE)
+    readers = {"displacement": bench.reader([0]), "velocity": bench.reader([1])}
+    hold = bench.hold("passive", **readers)
+    x, until, swing, stamp, force, largest = [0.0], [], 0.0, 0, 1.0, 1.0
+    hold.push(0, np.array([force]), 0)
+    for tick in range(80):
+        if tick > late and generator.random() < 0.4:
+            before, force = force, float(generator.normal())
+            hold.push(tick - late, np.array([force]), tick)
+            until.append((tick, before))
+            held = [other for ended, other in until if ended > stamp]
+            swing = max(swing, *(abs((before + force) / 2 - other) for other in held))
+            stamp, largest = tick - late, max(abs(force), abs(before))
+        bench.values[:] = x[-1], 10 * generator.normal()
+        found = float(hold.value(tick, 0.5)[0])
+        beta, ahead, steady = (
+            float(vector(hold, name)[0]) for name in ("beta", "predicted", "steady")
+        )
+        way = np.abs(np.diff(x[stamp:])).sum() if until else abs(x[-1])
+        P = generated(hold) + swing * way
+        D = abs(ahead) + (0.0 if P > 0 else abs(steady))
+        c = np.clip(swing + (P / D if D else 0.0), 0.0, max(swing, largest))
+        close(found, force - np.sign(ahead) * beta * c, 1 + abs(force))
+        share = generator.uniform(0.0, 1.5) if generator.random() < 0.95 else -0.5
+        x.append(x[-1] + share * ahead)
 
 
 @pytest.mark.parametrize("sampled", [False, True])

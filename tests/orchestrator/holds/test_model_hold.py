@@ -14,8 +14,7 @@ ENTRIES, COORDINATES = 9, 2
 def bench(matrix=None, factor=1.0):
     made = Bench(COORDINATES)
     reader = made.reader(range(COORDINATES), factor)
-    further = tuple(range(ENTRIES, ENTRIES + COORDINATES * (1 + ENTRIES)))
-    return made, made.hold("model", ENTRIES, matrix=matrix, coordinates=reader, further=further)
+    return made, made.hold("model", ENTRIES, matrix=matrix, coordinates=reader)
 
 
 @settings(max_examples=25, deadline=None)

@@ -2,6 +2,7 @@
 
 import re
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from hapticlink.analysis.sweep.job import jobs
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.plan import explain, operations
 from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.system.timeline import timeline
 from tests.shared_fixtures import sets, status
@@ -29,6 +31,16 @@ def test_explain_tells_blocks_and_the_samples_behind_inputs(tmp_path, capsys, mo
     # Up to the end of the second frame: the projector describes the beginning of the newest one.
     rows = re.findall(r"^ +(\d+)  .* controller: x_D@(\d+) .* P_c@(\d+)$", told, re.M)
     assert rows == [(t, t, "4" if t == "8" else "0") for t in "012345678"]
+
+
+def test_the_legend_has_every_operation_and_what_it_does():
+    classes = {k for k in vars(operations).values() if isinstance(k, type)}
+    classes = {k for k in classes if issubclass(k, operations.Instruction)}
+    bases = {base for k in classes for base in k.__bases__}
+    assert classes - bases == {*get_args(operations.Operation)}
+    told = dict(re.findall(r"^  (\w+) +(.+)$", explain.LEGEND, re.M))
+    assert told == {k.__name__.lower(): k.does for k in classes - bases}
+    assert len({*told.values()}) == len(told)
 
 
 def explained(capsys: pytest.CaptureFixture[str], scene: str, *options: str) -> str:

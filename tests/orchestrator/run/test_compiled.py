@@ -1,5 +1,6 @@
 """The loop carries out every scene and hold in C, and leaves to Python what has to be there."""
 
+import shutil
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,11 @@ def test_every_hold(tmp_path, hold):
     assert hold in run["holds"].values()
     assert sum(link["lost"] for link in run["links"].values())
     assert run["in_python"] == {}
+
+
+def test_the_compiler_of_the_machine_comes_before_zig(monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda name: f"/bin/{name}" if name == "gcc" else None)
+    assert next(build.compilers()).command == ["/bin/gcc"]
 
 
 def test_a_machine_without_the_library_is_told_the_remedy(tmp_path, monkeypatch):

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator import experiment
+from hapticlink.orchestrator import describe_run, experiment
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.description import Description
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import delays, uses
 from hapticlink.orchestrator.results.run_results import RunResults
@@ -233,9 +234,15 @@ def test_hermite_gives_way_where_a_source_has_no_derivative(tmp_path):
     assert error(results.haptics) < 2e-3
 
 
-def test_a_run_says_how_a_plant_takes_an_input_that_varies_within_its_step(tmp_path):
+@pytest.mark.parametrize("degree", [2, None])
+def test_a_run_says_how_a_plant_takes_an_input_that_varies_within_its_step(
+    tmp_path, degree, monkeypatch
+):
     """As a constant: no FMU is told derivatives of its inputs (`one` would fail), whatever it can
-    interpolate."""
+    interpolate; by a hold that is no polynomial, too."""
+    varying = HOLDS["second-order"]._replace(degree=degree)
+    holds = {name: HOLDS[name] for name in HOLDS} | {"second-order": varying}
+    monkeypatch.setattr(describe_run, "HOLDS", holds)
     able = {n: native(tmp_path, n, ("canInterpolateInputs", *FLAGS)) for n in ("one", "two")}
     settings = (
         'coupling = "jacobi"\nsubsteps.two = 2\n'

@@ -9,7 +9,8 @@ import pytest
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from tests.little_fmus import python_fmu
-from tests.orchestrator.foreign_scenes import fmu_table, scene, wire_table
+from tests.orchestrator.c_fmus import NUMBERS, c_fmu3
+from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, scene, wire_table
 
 SCENE, SHORT = "closed-loop-ideal", ("duration=0.5",)
 TOLD = ("end", "fault", "energies", "energies_within_a_rate", "step_errors", "delays", "unstable")
@@ -87,6 +88,22 @@ def test_calls_of_an_event(tmp_path):
             "set": ticks,
             "step": ticks + 2 * checked,
         }
+
+
+def test_an_fmu_in_a_process_of_its_own_counts_its_steps(tmp_path):
+    """Of half a second at 64 Hz, as one that the loop calls."""
+    python_fmu(tmp_path, "One")
+    for where in ("", ISOLATED):
+        path = scene(tmp_path, fmu_table("one", "One", where))
+        assert simulate(str(path), tmp_path / "out").outcome.details.calls["one"]["step"] == 32
+
+
+def test_the_loop_gets_whole_numbers_once(tmp_path):
+    """One get of each type in each row: none is repeated in Python, which takes integers of 64 bits
+    that may not be exact as doubles."""
+    c_fmu3(tmp_path)
+    found = simulate(str(scene(tmp_path, fmu_table("one", "types"))), tmp_path / "out")
+    assert found.outcome.details.calls["one"] == {"get": 32 * len(NUMBERS), "step": 32}
 
 
 FOREIGN = fmu_table("source", "Steady") + fmu_table("eats", "Eats")

@@ -5,6 +5,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.orchestrator.run import step_check
+from hapticlink.orchestrator.run.compiled.operation_records import Machine
 from tests.orchestrator.results.records import tables_of
 from tests.shared_fixtures import run_once
 
@@ -122,6 +123,16 @@ def test_what_is_found_does_not_depend_on_room(monkeypatch):
     assert found.run["in_python"] == {}
     assert found.run["step_errors"] == expected
     assert expected["virtual_mechanism"]["checked"] > 4
+
+
+def test_steps_that_are_left_to_python_are_checked_alike(monkeypatch):
+    """Those of an FMU that the loop does not call itself, as one whose texts are connected."""
+    expected = run_once("obstacles", {"duration": 1.0}).run
+    monkeypatch.setattr(Machine, "_fmu", lambda self, name: None)
+    found = hl.run("obstacles", {"duration": 1.0}).run
+    assert "step virtual_mechanism" in found["in_python"]
+    assert found["step_errors"] == expected["step_errors"]
+    assert found["calls"] == expected["calls"]
 
 
 CONTRADICTION = """

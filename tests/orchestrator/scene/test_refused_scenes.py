@@ -194,6 +194,9 @@ REFUSED = {
     ],
     "pendulum": [
         ("linkage.joint.pivot.limits={stiffness=9.0}", "give `lower`, `upper` or both"),
+        ("linkage.joint.pivot.axis=0.5",
+         'axis: a revolute joint has no direction: leave it out, or type = "prismatic"'),
+        ("linkage.joint.pivot.type=prismatic", "axis: a prismatic joint needs its direction (rad)"),
         (f"{LIMITS}, upper=-1.0}}", "-1.0 is not above `lower` = 1.0"),
         (f"{LIMITS}, restitution=0.5, damping=0.1}}", "`damping` or `restitution`, not both"),
         (f"{LIMITS}, restitution=0.0}}", "give a number >= 0.01"),
@@ -204,6 +207,12 @@ REFUSED = {
     "single-body": [
         ("linkage.joint.float.limits={stiffness=9.0, lower=1.0}",
          "a free joint has three coordinates"),
+    ],
+    "scotch-yoke": [
+        ("linkage.loop.0.type=revolute",
+         'axis: a revolute joint has no direction: leave it out, or type = "slot" or "prismatic"'),
+        ("linkage.loop.0.angle=0.5",
+         'angle: a slot joint has no angle: leave it out, or type = "prismatic"'),
     ],
     "two-hands": [
         ("hands.right={wrench=[0.0, 0.0, 0.0]}", "no point 'right'; there are left"),
@@ -229,7 +238,8 @@ IN_THE_FILE = (
     "device.distal_length=0.005", "linkage.joint.pivot.parent=bar", "hand.type=spring",
     "haptics.rate=5e-324", "\udcff=1", "contacts.disc.pin.name=block", "mechanism_at=graphics",
     "linkage.body.disc.name=block", "linkage.body.block.center=[0.01, 0.0]",
-    "linkage.joint.0.friction_speed=1e-6; duration=0.01",
+    "linkage.joint.0.friction_speed=1e-6; duration=0.01", "linkage.joint.pivot.type=prismatic",
+    "linkage.loop.0.type=revolute",
 )  # fmt: skip
 """The faults of these are not told at the option."""
 TEXTS = {"the scene of test_scene.py": GOOD, "an arm": ARM}

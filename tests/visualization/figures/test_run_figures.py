@@ -78,6 +78,18 @@ def test_the_energy_at_the_port_stands_beside_the_work_of_the_hand() -> None:
     assert high >= max(map(np.max, curves.values()))
 
 
+def test_a_rendering_that_dissipates_is_not_said_to_generate_nothing_at_most() -> None:
+    """A port whose energy falls from the start on."""
+    found = run_once("closed-loop-ideal", ["duration=0.6"])
+    port = user_port(found)
+    assert port
+    falls = port._replace(generated_J=-np.linspace(0.0, 0.0269, len(port.time_s)))
+    figure = run_figures._port(found, falls)
+    said = " ".join(figure.axes[0].get_title().split())
+    assert said.startswith("The rendering generated no energy and dissipated 26.9 mJ")
+    assert "at most" not in said
+
+
 def test_obstacles_and_the_force_of_contacts_are_drawn() -> None:
     found = run_once("obstacles", ["duration=0.7"])
     axes = drawn(found)

@@ -77,6 +77,18 @@ def test_a_verdict_says_that_it_is_without_the_friction_of_a_hold() -> None:
     assert predict_stability(load_viewed_scene(SCENE), settings, {})["said"].endswith(beside)
 
 
+def test_a_hand_that_is_unstable_elsewhere_than_at_the_mouse_is_said_to() -> None:
+    """At its own 30 Hz a firm grip shakes closed-loop-direct and the mouse does not: one line says
+    both, lest what is seen contradicts the light. At 64 Hz there is nothing to add."""
+    beside = "; stable in the mouse's hand"
+    shaken = predict_stability(load_viewed_scene(SCENE), {}, {})
+    assert (shaken["verdict"], shaken["mouse"]) == ("unstable", "stable")
+    assert shaken["said"].endswith(f", in firm grip{beside}")
+    calm = predict_stability(load_viewed_scene(SCENE), {RATE: 64.0}, {})
+    assert (calm["verdict"], calm["mouse"]) == ("stable", "stable")
+    assert beside not in calm["said"]
+
+
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="processes are seen in /proc alone")
 def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
     """Once the new rate is shown, every verdict is on it, and one process computes all."""

@@ -203,6 +203,38 @@ def test_nothing_is_cut_off_in_wide_and_narrow_windows(served: Served, window: W
         nothing_is_cut_off(page, size)
 
 
+def test_the_words_of_a_control_are_its_label_and_each_control_has_a_name(
+    served: Served, window: Window
+) -> None:
+    """A click on the words of a slider is one on the slider, and not on the output beside it."""
+    page = window(served.url)
+    page.until("document.querySelector('[data-control]')")
+    named = """[...document.querySelectorAll("button, input, select")].filter((control) =>
+      !control.textContent.trim() && !control.ariaLabel
+      && control.labels[0]?.control !== control)"""
+    labelled = """[...document.querySelectorAll("[data-control]")].filter((control) =>
+      control.labels.length !== 1 || control.labels[0].control !== control)"""
+    assert page.get(f"{named}.map((control) => control.outerHTML)") == []
+    assert page.get(f"{labelled}.map((control) => control.outerHTML)") == []
+    gain = page.page.inner_text("label:has([data-control='gains.controller.k_j']) output")
+    assert gain == "200 N/m per kg"
+    page.page.locator("label:has([data-control='graphics.rate'])").click(position={"x": 5, "y": 5})
+    assert page.get("document.activeElement.dataset.control") == "graphics.rate"
+
+
+def test_in_a_narrow_window_the_hint_is_beside_the_linkage_and_nothing_moves_when_it_goes(
+    served: Served, window: Window
+) -> None:
+    page = window(served.url, 400, 800)
+    page.until("!document.getElementById('door').hidden")
+    canvas, hint = (page.page.locator(name).bounding_box() for name in ("#scene", "#door"))
+    assert hint["y"] >= canvas["y"] + canvas["height"]
+    page.pull(0.01, 0.01)
+    page.until("document.getElementById('door').hidden")
+    assert page.page.locator("#scene").bounding_box() == canvas
+    page.page.mouse.up()
+
+
 def nothing_is_cut_off(page: Page, size: tuple[int, int]) -> None:
     boxes = {
         name: page.page.locator(name).bounding_box() for name in ("#stage", "#charts", "#controls")

@@ -64,6 +64,22 @@ def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(served: Serve
         window.until(lambda new: not second_runs(served))
 
 
+def test_which_of_both_runs_has_diverged_is_said(served: Served) -> None:
+    """With 100 times the damping of the coupling B diverges, and A does not."""
+    with served.window() as window:
+        window.until(lambda new: "controls" in new)
+        window.send(type="compare", on=True)
+        window.until(lambda new: new.get("scene", {}).get("runs") == 2)
+        window.set("gains.controller.B_pc", 100, b=True)
+        window.send(type="hand", at=[0.06, 0.03], user="")
+        found = window.until(lambda new: new.get("state", {}).get("ended"))
+        assert found["state"]["b"]
+        assert "diverged" in found["state"]["ended"]
+        window.send(type="hand", at=None, user="")
+        window.send(type="compare", on=False)
+        window.until(lambda new: not second_runs(served) and new["scene"].get("runs") == 1)
+
+
 def test_a_second_run_that_dies_ends_the_comparison(served: Served) -> None:
     """What it refuses is said before."""
     with served.window() as window:

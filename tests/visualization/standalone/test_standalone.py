@@ -10,7 +10,10 @@ import pytest
 
 import hapticlink as hl
 from benchmarks import standalone as bench
+from hapticlink.fmus.native import compiler
 from hapticlink.orchestrator.open_scene import load
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
+from hapticlink.visualization.standalone import page as standalone_page
 from tests.shared_fixtures import status
 from tests.visualization.browser_code.chromium import AT, Page, differ_without_topology
 from tests.visualization.browser_code.javascript import NODE
@@ -159,6 +162,26 @@ def test_two_settings_run_under_one_mouse(file: Path, window: Window) -> None:
     differ_without_topology(page)
     assert not page.get(alike)
     page.page.mouse.up()
+
+
+def test_a_page_is_compiled_once_until_its_scene_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second page has the bytes of the first, out of the cache."""
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "cache"))
+    compile_, compiled = compiler._compile, []
+
+    def count(source: Any, folder: Path, target: str, options: Any) -> bytes:
+        compiled.append(target)
+        return compile_(source, folder, target, options)
+
+    monkeypatch.setattr(compiler, "_compile", count)
+    scene, pages = load_viewed_scene("closed-loop-ideal", ["packaging=python"]), []
+    for changed in (scene, scene, load(scene, {"device.handle_mass": 0.13})):
+        pages.append(standalone_page.html(changed, "demo"))
+        compiled.append("page")
+    assert compiled == ["wasm32-wasi", "page", "page", "wasm32-wasi", "page"]
+    assert pages[0] == pages[1] != pages[2]
 
 
 LISTEN = """(() => {

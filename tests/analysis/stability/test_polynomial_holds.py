@@ -1,0 +1,71 @@
+"""Holds as linear systems of their own, against interpolating polynomials, and in scenes against
+periods in which they are differentiated anew at each age of their samples."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hapticlink.analysis.stability import forward_sensitivity
+from hapticlink.analysis.stability.linear_period import LinearPeriod
+from hapticlink.analysis.stability.modes import modes
+from hapticlink.analysis.stability.polynomial_holds import advanced_powers, slopes_of_powers
+from hapticlink.analysis.stability.resting_scene import resting
+from hapticlink.orchestrator.run.compiled.state import StateBlock
+from tests.orchestrator.holds.bench import Bench
+from tests.orchestrator.holds.test_laws import LAWS
+
+POINT = (0.044493, 0.014823, -0.788148)
+FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5.0, 0.01]}
+SCENE = {"graphics.rate": 60, "hand": {**FIRM, "target": [[0.0, *POINT]]}}  # frames of 8 or 9 ticks
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_hold_goes_on_from_its_powers_to_the_interpolating_polynomial(name: str) -> None:
+    n, base, draw = 2, Fraction(3, 7680), np.random.default_rng(5)
+    hold = Bench(n, base).hold(name, n)
+    stamps = [0, 17, 33, 51]
+    samples = draw.normal(size=(len(stamps), hold.width))
+    for stamp, sample in zip(stamps, samples, strict=True):
+        hold.push(stamp, sample, stamp)
+    y, beside = samples[:, :n], samples[:, n:]
+    for tick in (51, 58):
+        powers = slopes_of_powers(hold, tick, 0.5) @ StateBlock(hold.c).save().numbers
+        for dt in (0.0, 0.5, 9.5, 100.0):
+            value = (advanced_powers(hold, dt) @ powers)[:n]
+            expected = LAWS[name](stamps, y, beside, Fraction(tick) + Fraction(dt + 0.5))
+            np.testing.assert_allclose(value, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"hold": "zoh"},
+        {"hold": "lead"},
+        {"hold": "foh"},
+        {"hold": "second-order"},
+        {"hold": "foh", "delays": {"virtual_mechanism.x -> controller.x_S": 3 / 512}},
+        {"hold": "lead", "delays": {"controller.F_drift -> virtual_mechanism.F_drift": 7 / 1024}},
+    ],
+    ids=str,
+)
+def test_a_period_is_that_in_which_each_evaluation_is_differentiated(
+    changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = SCENE | changes
+
+    def leading(period: LinearPeriod) -> list[complex]:
+        return [mode.z for mode in modes(period.linear, period.map_.period)[:6]]
+
+    with resting("closed-loop-direct", options) as place:
+        found, differentiated = leading(place.period({})), place.map.work.counts["differentiated"]
+        fused = leading(place.period({}).fused(["hand"]))
+    monkeypatch.setattr(forward_sensitivity, "is_polynomial", lambda hold: False)
+    with resting("closed-loop-direct", options) as place:
+        anew = leading(place.period({}))
+        assert place.map.work.counts["differentiated"] > differentiated
+    assert found == pytest.approx(anew, abs=1e-7)
+    assert fused == pytest.approx(found, abs=1e-9)
