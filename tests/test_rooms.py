@@ -32,11 +32,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5808,
-    "fmus": 2814,
-    "orchestrator": 12934,
+    "components": 5893,
+    "fmus": 2816,
+    "orchestrator": 12996,
     "programs": 1021,
-    "analysis": 7080,
+    "analysis": 7082,
     "visualization": 3284,
     "api": 430,
     "commands": 1390,

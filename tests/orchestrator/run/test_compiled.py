@@ -40,8 +40,12 @@ def test_every_hold(tmp_path, hold):
     """Of samples that are late and lost, and beside them of some that are in time."""
     kind = "downsampling" if HOLDS[hold].downsamples else "hold"
     options = [f"{kind}={hold}", "graphics.rate=60", "duration=0.3"]
-    late = "delays.virtual_mechanism.x={ min = 0.001, max = 0.03, loss = 0.1, seed = 3 }"
-    run = simulate("closed-loop-direct", tmp_path, [*options, late]).results.run
+    # Gradients are those of the graphics copy.
+    scene, port = ("closed-loop-direct", "virtual_mechanism.x")
+    if HOLDS[hold].needs == "gradient":
+        scene, port = ("closed-loop-ideal", "virtual_environment.P_c")
+    late = f"delays.{port}={{ min = 0.001, max = 0.03, loss = 0.1, seed = 3 }}"
+    run = simulate(scene, tmp_path, [*options, late]).results.run
     assert hold in run["holds"].values()
     assert sum(link["lost"] for link in run["links"].values())
     assert run["in_python"] == {}
