@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from html import escape
 from typing import Any
 
 from hapticlink.analysis.search.search import DOUBLINGS
@@ -14,6 +15,7 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.components.specs.hand import Hand
+from hapticlink.orchestrator.results.html_table import html_table
 
 
 @dataclass(frozen=True)
@@ -133,20 +135,35 @@ class Stability:
     def __str__(self) -> str:
         return "\n".join((f"{self.title}: {self.finding}", *self.lines()))
 
+    def _repr_html_(self) -> str:
+        lines = "".join(f"<li>{escape(line)}</li>" for line in (*self._warnings(), *self._below()))
+        table = html_table(("hand", "worst pose", "growth 1/s", "Hz", "what"), self._in_hands())
+        return f"<p><b>{escape(f'{self.title}: {self.finding}')}</b></p>{table}<ul>{lines}</ul>"
+
     def lines(self) -> Iterator[str]:
         """The result as text, below the finding."""
+        yield from self._warnings()
+        yield f"{'hand':28s} {'worst pose':24s} {'growth 1/s':>11s} {'Hz':>7s}  what"
+        for hand, pose, growth, hertz, what in self._in_hands():
+            yield f"{hand:28s} {pose:24s} {growth:11.3g} {hertz:7.3g}  {what}"
+        yield from self._below()
+
+    def _warnings(self) -> Iterator[str]:
         if self.run_fault:
             yield (
                 f"warning: its own run fails: {self.run_fault}; the poses are those up to there, "
                 "in which small motions alone are judged"
             )
-        yield f"{'hand':28s} {'worst pose':24s} {'growth 1/s':>11s} {'Hz':>7s}  what"
+
+    def _in_hands(self) -> Iterator[tuple[str, str, float, float, str]]:
+        """The worst case of each hand."""
         for hand in _hands(self.cases):
             worst = worst_case(c for c in self.cases if c.hand == hand.hand)
             what = worst.kind if worst.verdict == "unstable" else worst.verdict
-            yield (
-                f"{worst.hand:28s} {worst.pose:24s} {worst.growth:11.3g} {worst.hertz:7.3g}  {what}"
-            )
+            yield worst.hand, worst.pose, worst.growth, worst.hertz, what
+
+    def _below(self) -> Iterator[str]:
+        """What stands below the table of hands: margins, remedies, and what was left out."""
         yield f"margin at {self.worst.pose}: {', '.join(self._margins())}"
         if self.margin.alone:
             yield (

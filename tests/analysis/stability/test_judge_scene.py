@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import shlex
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -408,6 +409,9 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     assert found.record()["growth_rate"] == found.growth == found.worst.growth > 0.0
     assert found.remedies[0].stable
     line = next(line for line in found.lines() if line.startswith("remedy: "))
+    shown = ET.fromstring(f"<div>{found._repr_html_()}</div>")
+    assert {row.findtext("td") for row in shown.iter("tr")} >= {c.hand for c in found.cases}
+    assert line in {entry.text for entry in shown.iter("li")}
     pasted = shlex.split(line.removeprefix("remedy: ").rpartition(": ")[0])[1::2]
     again = hl.stability("virtual-wall", [*overrides.write_options(beyond), *pasted], poses=1)
     held = [c.growth for c in again.cases if not c.free and c.verdict != "marginal"]
