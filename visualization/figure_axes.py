@@ -7,18 +7,13 @@ and `savefig` draws twice, which together takes longer than the rest of a short 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
 from functools import cache
-from io import BytesIO
-from pathlib import Path
 from textwrap import fill
-from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hapticlink.analysis.findings.summary import describe_stop
-from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
@@ -154,39 +149,3 @@ def legend_above_curves(axes: Axes, columns: int) -> None:
     covered = min((ROW * rows + 0.2) / height, 0.5)
     low, high = axes.get_ylim()
     axes.set_ylim(low, low + (high - low) / (1 - covered))
-
-
-_drawing = Lock()
-
-
-def png(figure: Figure, dpi: int = 150) -> bytes:
-    """A figure as a PNG; dpi: dots per inch."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    figure.set_dpi(dpi)
-    file = BytesIO()
-    # Letters that are not fitted to dots keep their widths, and a figure takes a seventh less time.
-    # The setting is of the process: threads draw one after the other.
-    with _drawing, rc_context({"text.hinting": "none"}):
-        FigureCanvasAgg(figure).print_png(
-            file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}
-        )
-    return file.getvalue()
-
-
-def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
-    """Write each figure as a PNG; returns the file names. Raises Interrupted."""
-    return write_pngs(((name, png(figure)) for name, figure in figures.items()), folder)
-
-
-def write_pngs(pngs: Iterable[tuple[str, bytes]], folder: Path) -> list[str]:
-    """Writes PNGs by name; returns the file names. Raises Interrupted."""
-    names = []
-    for name, content in pngs:
-        interrupt.raise_if_interrupted()
-        path = folder / f"{name}.png"
-        path.unlink(missing_ok=True)  # a link is replaced, not followed
-        path.write_bytes(content)
-        names.append(path.name)
-    return names

@@ -46,10 +46,10 @@ from hapticlink.visualization.figure_axes import (
     headline,
     in_lines,
     plain,
-    png,
     set_margins,
     titled_axes,
 )
+from hapticlink.visualization.figure_files import encode
 from hapticlink.visualization.figures.curves import curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
@@ -114,10 +114,12 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     return drawn_by
 
 
-def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
-    """Name and PNG of each figure of a run, each drawn when it is asked for."""
+def files(results: Results, formats: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of each file of the figures of a run, each drawn when it is asked for."""
     for name, draw in drawings(results).items():
-        yield name, png(draw())
+        figure = draw()
+        for kind in formats:
+            yield f"{name}.{kind}", encode(figure, kind)
 
 
 def _mechanism(results: Results, linkage: Linkage, q: Vector, port: UserPort | None) -> Figure:

@@ -21,8 +21,10 @@ from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.visualization import figure_files
 from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import headline, plain
+from hapticlink.visualization.figure_files import encode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,8 +55,13 @@ FEW_KEYS = 3
 FEW = len(CURVES)
 """Number of lines that differ in colour; further ones also differ in dash pattern."""
 GOOD = ("duration",)
-LAST_CHUNK = b"IEND\xaeB`\x82"
-"""Of a PNG that is whole."""
+DPI = 130
+STAMPS = {
+    "png": ("Comment", b"IEND\xaeB`\x82"),
+    "pdf": ("Keywords", b"%%EOF\n"),
+    "svg": ("Description", b"</svg>\n"),
+}
+"""By format, the metadata that say what a figure shows, and how a file ends that is whole."""
 
 
 def check_metric(metric: str, scenes: Sequence[Scene]) -> None:
@@ -102,24 +109,34 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
     return figure
 
 
-def save(figure: Figure, path: Path, comment: str | None = None) -> None:
-    """Write a figure without the software's version, so that the same rows give the same bytes."""
-    figure.savefig(path, dpi=130, metadata={"Software": None, "Comment": comment})
-
-
-def write_figure(path: Path, rows: Sequence[Row], keys: Sequence[str], metric: str | None) -> bool:
-    """Write the figure of `draw`, unless the file there is that one already: loading Matplotlib and
-    drawing take longer than finding a finished sweep. Returns whether there is a figure. Raises as
-    `draw` does."""
+def write_figure(
+    folder: Path,
+    rows: Sequence[Row],
+    keys: Sequence[str],
+    metric: str | None,
+    formats: Sequence[str],
+) -> list[str]:
+    """Write the figure of `draw` as `sweep` in some formats, unless the files there are that one
+    already: loading Matplotlib and drawing take longer than finding a finished sweep. Returns the
+    names of the files, none if there is no figure. Raises as `draw` does."""
     made_with = version("matplotlib"), sources(hapticlink.visualization)
     shown = sha(json.dumps([rows, keys, metric, made_with], default=str))
-    if path.is_file():
-        there = path.read_bytes()
-        if shown.encode() in there and there.endswith(LAST_CHUNK):
-            return True
-    if drawn := draw(rows, keys, metric):
-        save(drawn, path, shown)
-    return drawn is not None
+    names = [f"sweep.{kind}" for kind in formats]
+    if all(_is_there(folder / name, shown) for name in names):
+        return names
+    drawn = draw(rows, keys, metric)
+    if drawn is None:
+        return []
+    made = (encode(drawn, kind, DPI, {STAMPS[kind][0]: shown}) for kind in formats)
+    return figure_files.write(zip(names, made, strict=True), folder)
+
+
+def _is_there(path: Path, shown: str) -> bool:
+    """Whether a figure is whole and has the stamp `shown`."""
+    if not path.is_file():
+        return False
+    there, (_, end) = path.read_bytes(), STAMPS[path.suffix[1:]]
+    return shown.encode() in there and there.endswith(end)
 
 
 def _axes(wide: bool) -> tuple[Figure, Any]:
