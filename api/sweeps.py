@@ -110,9 +110,9 @@ def sweep(
 
     The table is returned, and with `out` also written to that folder: table.csv, sweep.png (of the
     column `metric`; `format` as in `run`) and a file per row, so that an interrupted sweep can be
-    continued by the same call. `jobs` is the number of runs at a time, by default one per processor; `scheduler` is the
-    address of a Dask scheduler to run on. `progress` is called with the numbers of finished and of
-    all runs.
+    continued by the same call. `jobs` is the number of runs at a time, by default one per
+    processor; `scheduler` is the address of a Dask scheduler to run on. `progress` is called with
+    the numbers of finished and of all runs.
 
     A run that fails is a row of the table. Raises InputFault for invalid input and if every run is
     refused, Fault if the sweep is interrupted.

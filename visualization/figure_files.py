@@ -14,13 +14,13 @@ from hapticlink.orchestrator.base.errors import InputFault, unknown
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-METADATA: dict[str, dict[str, None]] = {
+METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
     "svg": {"Date": None, "Creator": None},
 }
 """By format, what of its own Matplotlib leaves out."""
-LOOK = {
+LOOK: Any = {
     "text.hinting": "none",
     "pdf.fonttype": 42,
     "svg.fonttype": "path",
@@ -49,7 +49,7 @@ def encode(
     how: dict[str, Any] = {"pil_kwargs": {"compress_level": 1}} if kind == "png" else {}
     file = BytesIO()
     with _drawing, rc_context(LOOK):  # of the process: threads draw one after the other
-        metadata = METADATA[kind] | (more or {})
+        metadata = {**METADATA[kind], **(more or {})}
         figure.savefig(file, format=kind, dpi=dpi, metadata=metadata, **how)
     return file.getvalue()
 
