@@ -114,15 +114,17 @@ def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path)
 def _pictures(scene: Scene) -> dict[str, bytes]:
     """PNGs by caption: the blocks of a scene and, as far as it gets, a reference run of it."""
     from hapticlink.orchestrator.experiment import simulate
-    from hapticlink.visualization.figure_axes import png  # loads Matplotlib
+    from hapticlink.visualization.figure_files import encode
     from hapticlink.visualization.figures import block_diagram, run_figures
 
     with temporary_folders.temporary_folder() as room:
         run = simulate(scene, room, in_memory=True, csv=False)
-        pictures = {BLOCKS: png(block_diagram.figure(run.system, scene.title), DPI)}
+        pictures = {BLOCKS: encode(block_diagram.figure(run.system, scene.title), "png", DPI)}
         drawn = run_figures.drawings(run.results)
         return pictures | {
-            caption: png(drawn[name](), DPI) for name, caption in SHOWN.items() if name in drawn
+            caption: encode(drawn[name](), "png", DPI)
+            for name, caption in SHOWN.items()
+            if name in drawn
         }
 
 

@@ -13,7 +13,7 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.visualization.figures import sweep_figure
+from hapticlink.visualization import figure_files
 
 
 def stability_map(
@@ -48,5 +48,5 @@ def stability_map(
     tell = progress or (lambda done, of: None)
     given = overrides.write_options(options)
     found = compute_map(scene, given, axes(vary), folder, processes, check, seed, tell)
-    sweep_figure.save(drawing.draw(found), folder / "map.png")
+    figure_files.save({"map": drawing.draw(found)}, folder)
     return found

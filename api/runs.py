@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
@@ -26,7 +26,7 @@ from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.visualization import figure_axes
+from hapticlink.visualization import figure_files
 
 
 class RunInterrupted(Interrupted):
@@ -44,6 +44,7 @@ def run(
     *,
     out: str | Path | None = None,
     figures: bool = True,
+    format: str = "png",
     progress: Callable[[float], None] | None = None,
     real_time: bool = False,
     arrivals: str | Path | None = None,
@@ -54,7 +55,8 @@ def run(
     """Run a scene, changed by `options` (see `scene`).
 
     The results are returned, and with `out` also written to that folder: a CSV per rate, run.json,
-    plan.txt and, where `figures` is true, figures. They replace those of an earlier run there from
+    plan.txt and, where `figures` is true, figures, in the formats `format` (png, pdf or svg,
+    several with commas between). They replace those of an earlier run there from
     the first row on. `progress` is called with the simulated time (s) from time to time, `answer`
     with the results as soon as they are there, before figures are drawn.
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
@@ -70,6 +72,7 @@ def run(
     run scenes at the same time, each into a folder of its own; the current directory stays as it
     is, and Ctrl-C ends the runs of the main thread.
     """
+    drawn = figure_files.formats(format) if figures else ()
     read = open_scene.load(scene, options)
     if arrivals is not None and (real_time or remote):
         raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")
@@ -77,7 +80,7 @@ def run(
     if arrivals is not None:
         paced = RecordedArrivals(Path(arrivals), read)
     servers = Servers(remote or {}, Path(key) if key else key_file.DEFAULT)
-    return run_paced(read, out, paced, figures, progress, remote=servers, answer=answer)
+    return run_paced(read, out, paced, drawn, progress, remote=servers, answer=answer)
 
 
 @interrupt.defer_signals()
@@ -85,13 +88,13 @@ def run_paced(
     scene: Scene,
     out: str | Path | None,
     real_time: RealTimeRun | None,
-    figures: bool = True,
+    figures: Sequence[str] = ("png",),
     progress: Callable[[float], None] | None = None,
     tables: bool = True,
     remote: Servers = NOWHERE,
     answer: Callable[[Run], object] | None = None,
 ) -> Run:
-    """As `run`; without `out` and `tables` the results have no tables."""
+    """As `run`, with the formats of figures; without `out` and `tables` there are no tables."""
     simulated = partial(simulate, scene, progress=progress, real_time=real_time, remote=remote)
     if out is None:
         ended = _in_memory(simulated, tables)
@@ -118,7 +121,7 @@ def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
 def _in_folder(
     simulated: Callable[..., Experiment],
     folder: Path,
-    figures: bool,
+    figures: Sequence[str],
     answer: Callable[[Run], object] | None,
 ) -> Run:
     ended = simulated(folder, keep_rows=True, locked=True)
@@ -129,7 +132,7 @@ def _in_folder(
 
 
 def _describe_run(
-    folder: Path, ended: Experiment, figures: bool, answer: Callable[[Run], object] | None
+    folder: Path, ended: Experiment, figures: Sequence[str], answer: Callable[[Run], object] | None
 ) -> Run:
     """What the rows of a run say of it, in its folder."""
     results = ended.results
@@ -163,7 +166,7 @@ def _tell_of_missing_files(folder: Path, ended: Experiment) -> Iterator[None]:
         logging.getLogger(__name__).warning(message, folder, describe_os_error(error, folder))
 
 
-def _write_files(ended: Experiment, figures: bool) -> Iterator[list[str]]:
+def _write_files(ended: Experiment, figures: Sequence[str]) -> Iterator[list[str]]:
     """Writes the plan of a run that had a step, and then its figures; the names of the files, none
     at first. Raises Interrupted and OSError."""
     yield []
@@ -178,7 +181,7 @@ def _write_files(ended: Experiment, figures: bool) -> Iterator[list[str]]:
     if figures:
         from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
 
-        yield figure_axes.write_pngs(run_figures.pngs(ended.results), ended.folder)
+        yield figure_files.write(run_figures.files(ended.results, figures), ended.folder)
 
 
 def load(folder: str | Path) -> Run:

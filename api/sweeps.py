@@ -23,6 +23,7 @@ from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.visualization import figure_files
 from hapticlink.visualization.figures import sweep_figure
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ def sweep(
     jobs: int | None = None,
     scheduler: str | None = None,
     metric: str | None = None,
+    format: str = "png",
     progress: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Run many variants of a scene in parallel, in a pool of processes.
@@ -107,16 +109,17 @@ def sweep(
     `scene`) apply to all runs.
 
     The table is returned, and with `out` also written to that folder: table.csv, sweep.png (of the
-    column `metric`) and a file per row, so that an interrupted sweep can be continued by the same
-    call. `jobs` is the number of runs at a time, by default one per processor; `scheduler` is the
-    address of a Dask scheduler to run on. `progress` is called with the numbers of finished and of
-    all runs.
+    column `metric`; `format` as in `run`) and a file per row, so that an interrupted sweep can be
+    continued by the same call. `jobs` is the number of runs at a time, by default one per
+    processor; `scheduler` is the address of a Dask scheduler to run on. `progress` is called with
+    the numbers of finished and of all runs.
 
     A run that fails is a row of the table. Raises InputFault for invalid input and if every run is
     refused, Fault if the sweep is interrupted.
     """
     if jobs is not None and jobs < 1:
         raise InputFault(f"--jobs {jobs}: give 1 or more")
+    formats = figure_files.formats(format)
     varied = points(vary, runs)
     made = job.jobs(scene, overrides.write_options(options), varied)
     if metric:
@@ -137,6 +140,5 @@ def sweep(
                 raise Fault(f"interrupted: {left.done} of {left.of} runs; {advice}") from None
     folder = folders.ensure(out)
     found = Sweep(into(folder), keys, folder, ("table.csv",))
-    if sweep_figure.write_figure(folder / "sweep.png", found.rows, keys, metric):
-        return replace(found, files=("table.csv", "sweep.png"))
-    return found
+    drawn = sweep_figure.write_figure(folder, found.rows, keys, metric, formats)
+    return replace(found, files=("table.csv", *drawn))

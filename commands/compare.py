@@ -23,14 +23,14 @@ def compare(runs: Runs, /, *, out: Out = None, json: Json = False) -> int:
     """
     import hapticlink as hl
     from hapticlink.orchestrator.results import folders
-    from hapticlink.visualization import figure_axes
+    from hapticlink.visualization import figure_files
 
     if len(runs) < 2:
         raise InputFault("compare takes two runs or more: `hapticlink report` is for one")
     comparison = hl.compare(runs)
     lines = [str(comparison)]
     if out:
-        names = figure_axes.save(comparison.figures(), folders.ensure(out))
+        names = figure_files.save(comparison.figures(), folders.ensure(out))
         lines.append(f"{out}/: {', '.join(names)}")
     print_result(lines, {"note": comparison.note, "runs": comparison.values()}, False, json)
     return 0

@@ -122,7 +122,7 @@ def _pose(start: dict[str, float]) -> list[float]:
 
 def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
     from hapticlink.orchestrator.results import folders
-    from hapticlink.visualization import figure_axes
+    from hapticlink.visualization import figure_files
     from hapticlink.visualization.figures import block_diagram, schematic
     from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
@@ -133,7 +133,7 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
         title = f"Device and its workspace: {scene.title}"
         figures["workspace"] = workspace_drawing.draw(scene.device, _pose(start), title)
     figures |= schematic.figures(scene, system)
-    for name in figure_axes.save(figures, folders.ensure(out)):
+    for name in figure_files.save(figures, folders.ensure(out)):
         say(f"  {out / name}")
 
 

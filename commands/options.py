@@ -45,6 +45,9 @@ Map = Annotated[
         "FMUs block.port=..."
     ),
 ]
+Format = Annotated[
+    str, Parameter(help="Formats of figures: png, pdf or svg, several with commas between.")
+]
 Out = Annotated[Path | None, Parameter(help="Folder to write to.")]
 Quiet = Annotated[
     bool, Parameter(negative="", help="Print warnings and errors only, on standard error.")

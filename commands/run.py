@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from hapticlink.commands.options import (
     PRINTED,
     UNCHANGED,
+    Format,
     Output,
     Scene,
     SceneOptions,
@@ -62,6 +63,7 @@ def run(
     changes: SceneOptions = UNCHANGED,
     set_file: SetFile = None,
     figures: Figures = True,
+    format: Format = "png",
     explain: Explain = False,
     real_time: RealTime = False,
     remote: Remote = None,
@@ -79,6 +81,7 @@ def run(
 
         hapticlink run closed-loop
         hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
+        hapticlink run closed-loop --format pdf,svg
         hapticlink run my-scene.toml --no-figures --json > result.json
     """
     import hapticlink as hl
@@ -113,6 +116,7 @@ def run(
                 read,
                 out=folder,
                 figures=figures,
+                format=format,
                 progress=shown.enter_context(bar),
                 answer=answer,
                 real_time=real_time,

@@ -112,10 +112,10 @@ def stability(
         record |= {"port": passivity.record()}
         lines += passivity.lines()
     if figure and isinstance(judged, hl.Stability):
-        from hapticlink.visualization import figure_axes  # Matplotlib is slow to load
+        from hapticlink.visualization import figure_files  # Matplotlib is slow to load
         from hapticlink.visualization.figures import stability_figure
 
-        figure_axes.save({"stability": stability_figure.draw(judged)}, folders.ensure(folder))
+        figure_files.save({"stability": stability_figure.draw(judged)}, folders.ensure(folder))
     write_json(folders.ensure(folder) / "stability.json", record)
     output.show(f"{name}: {judged.finding}", (*lines, f"{folder}/stability.json"), record)
     return 0

@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands import progress
-from hapticlink.commands.options import PRINTED, Output, Scene, Set, default_folder, title
+from hapticlink.commands.options import PRINTED, Format, Output, Scene, Set, default_folder, title
 from hapticlink.orchestrator.base.terminal_output import say
 
 Vary = Annotated[
@@ -43,6 +43,7 @@ def sweep(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     metric: Metric = None,
+    format: Format = "png",
     output: Output = PRINTED,
 ) -> int:
     """Run many variants of a scene in parallel; write table.csv and sweep.png to OUT (default
@@ -65,7 +66,7 @@ def sweep(
     with progress.runs(f"{title(scene)}: sweep", output.quiet) as count:
         result = hl.sweep(
             scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
-            scheduler=scheduler, metric=metric, progress=count,
+            scheduler=scheduler, metric=metric, format=format, progress=count,
         )  # fmt: skip
     for row in result.failed[:10]:
         what = ", ".join(f"{k}={v}" for k, v in row.items() if k in result.keys)

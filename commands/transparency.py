@@ -37,7 +37,7 @@ def transparency(
     from hapticlink.analysis.transparency import mobility_at_hand as analysis
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
-    from hapticlink.visualization import figure_axes
+    from hapticlink.visualization import figure_files
     from hapticlink.visualization.figures import transparency_figure
 
     given, what = changes.options, "equilibria and linearisations, which can take a minute"
@@ -51,7 +51,7 @@ def transparency(
         "changes": {cost.change: cost.record() for cost in beside},
     }
     write_json(folder / "transparency.json", record)
-    figure_axes.save({"transparency": transparency_figure.draw(in_poses)}, folder)
+    figure_files.save({"transparency": transparency_figure.draw(in_poses)}, folder)
     lines = [line for pose in in_poses for line in pose.lines()]
     lines += analysis.cost_lines(beside) if beside else []
     output.show(f"{title(scene)}:", (*lines, f"{folder}/"), record)

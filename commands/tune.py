@@ -37,7 +37,7 @@ def tune(
     from hapticlink.orchestrator.base.errors import Interrupted
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
-    from hapticlink.visualization import figure_axes
+    from hapticlink.visualization import figure_files
     from hapticlink.visualization.figures import tuning_figure
 
     folder = out or default_folder("tuned", scene)
@@ -49,7 +49,7 @@ def tune(
         folders.ensure(folder)
         write_json(folder / "tune.json", tuned.record())
         (folder / "tuned.toml").write_text(tuned.scene(), encoding="utf-8")
-        figure_axes.save({"tune": tuning_figure.draw(tuned)}, folder)
+        figure_files.save({"tune": tuning_figure.draw(tuned)}, folder)
         kept = True
 
     try:

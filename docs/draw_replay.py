@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 
 import hapticlink as hl
 from hapticlink.orchestrator.results.folders import load_by_name
-from hapticlink.visualization import figure_axes
+from hapticlink.visualization import figure_files
 from hapticlink.visualization.compare import overlay
 from hapticlink.visualization.compare import page as report
 from hapticlink.visualization.figures import run_figures
@@ -38,9 +38,9 @@ def main() -> None:
             options = {"controller.topology": topology}
             hl.run("closed-loop", options, out=folder, figures=False)
         OUT.joinpath("figures").mkdir(exist_ok=True)
-        figure_axes.save(run_figures.figures(hl.run("enclosure")), OUT / "figures")
+        figure_files.save(run_figures.figures(hl.run("enclosure")), OUT / "figures")
         over = overlay.figures(load_by_name(folders))
-        figure_axes.save({f"compare_{name}": f for name, f in over.items()}, OUT / "figures")
+        figure_files.save({f"compare_{name}": f for name, f in over.items()}, OUT / "figures")
         runs = [Recorded(str(folder)) for folder in folders]
         replay_page.write_replay(runs, OUT / "topology.gif")
         page = started.chromium.launch(

@@ -16,12 +16,12 @@ import hapticlink.visualization.figures.run_figures
 from matplotlib.figure import Figure
 from hapticlink.commands import main
 from hapticlink.orchestrator.scene.scene import adapter
-from hapticlink.visualization.figure_axes import png
+from hapticlink.visualization.figure_files import encode
 adapter()
 figure = Figure()
 figure.subplots().set_title("warm")
 figure.legend(figure.axes[0].plot([0.0, 1.0]), ["one"])
-png(figure)
+encode(figure, "png")
 gc.set_threshold(200_000)  # as __main__ has it
 gc.freeze()
 for request in map(json.loads, sys.stdin):

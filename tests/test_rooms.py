@@ -37,9 +37,9 @@ CODE_LINES = {
     "orchestrator": 12996,
     "programs": 1021,
     "analysis": 7091,
-    "visualization": 3284,
-    "api": 430,
-    "commands": 1390,
+    "visualization": 3329,
+    "api": 435,
+    "commands": 1396,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -6,21 +6,18 @@ and `savefig` draws twice, which together takes longer than the rest of a short 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
 from functools import cache
-from io import BytesIO
-from pathlib import Path
 from textwrap import fill
-from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hapticlink.analysis.findings.summary import describe_stop
-from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import shorten
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
+from hapticlink.visualization.curve_colours import CURVES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,8 +33,12 @@ _ENDS = {
     "reset": "it was reset",
 }
 
+WIDTH = 68
+"""Letters in a line of title."""
 MARGINS = {"left": 0.95, "right": 0.15, "bottom": 0.55, "top": 0.62}
 """Inches around the axes, with room for two lines of title above the exponent of an axis."""
+LINE = 0.17
+"""Height (in) of each further line of title."""
 ROW, COLUMNS = 0.15, 3
 """Height (in) of a row of a legend below the axes, and the number of its columns."""
 
@@ -61,10 +62,20 @@ def _letters() -> frozenset[int]:
     return frozenset(code for file in files for code in font_manager.get_font(file).get_charmap())
 
 
-def headline(on: Any, text: str, width: int, **where: float) -> None:
+def headline(on: Any, text: str, width: int, **where: Any) -> None:
     """Writes the finding of a figure or of its axes above it, in lines of `width` letters."""
     write = getattr(on, "suptitle", None) or on.set_title
-    write(plain(fill(text, width)), fontsize="medium", **where)
+    write(plain(in_lines(text, width)), fontsize="medium", **where)
+
+
+def in_lines(text: str, width: int) -> str:
+    """A text in as few lines of at most `width` letters as there can be, of about one length, none
+    of which breaks between a number and its unit."""
+    text = re.sub(r"(?<=\d) (?=([^\W\d]{1,2}|%)(\W|$))", "\N{NO-BREAK SPACE}", text)
+    lines = fill(text, width)
+    while width > 1 and (shorter := fill(text, width - 1)).count("\n") == lines.count("\n"):
+        lines, width = shorter, width - 1
+    return lines
 
 
 def titled_axes(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
@@ -79,13 +90,15 @@ def titled_axes(results: Results, title: str, x: str, *y: str) -> tuple[Figure, 
         if reason == "stop_when" and said.startswith("the device"):
             why = said
         title += f", until {why} at {short(results.last_time)} s"
-    figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1)))
-    set_margins(figure)
+    further = LINE * max(in_lines(title, WIDTH).count("\n") - 1, 0)
+    figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1) + further))
+    set_margins(figure, top=MARGINS["top"] + further)
     every = figure.subplots(len(y), 1, sharex=True, squeeze=False)[:, 0]
     for axes, label in zip(every, y, strict=True):
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
-    headline(every[0], title, 70, y=1.0, pad=12)  # at a fixed height
+        axes.set_prop_cycle(color=CURVES)
+    headline(every[0], title, WIDTH, y=1.0, pad=12)  # at a fixed height
     every[-1].set_xlabel(x)
     if x == "time (s)":
         for axes in every:
@@ -121,10 +134,11 @@ def set_margins(figure: Figure, **margins: float) -> None:
 
 def legend_below(figure: Figure) -> None:
     """A legend of all that is labelled, below the axes."""
-    legend = figure.legend(fontsize="x-small", ncols=COLUMNS, loc="lower center")
+    legend = figure.legend(fontsize="x-small", ncols=COLUMNS, loc="lower center", frameon=False)
     lines = [text.get_text().count("\n") + 1 for text in legend.get_texts()]
     tallest = max((sum(column) for column in np.array_split(lines, COLUMNS)), default=0)
-    set_margins(figure, bottom=MARGINS["bottom"] + 0.15 + ROW * tallest)
+    bottom = MARGINS["bottom"] + 0.1 + ROW * tallest
+    figure.subplots_adjust(bottom=bottom / figure.get_figheight())
 
 
 def legend_above_curves(axes: Axes, columns: int) -> None:
@@ -135,39 +149,3 @@ def legend_above_curves(axes: Axes, columns: int) -> None:
     covered = min((ROW * rows + 0.2) / height, 0.5)
     low, high = axes.get_ylim()
     axes.set_ylim(low, low + (high - low) / (1 - covered))
-
-
-_drawing = Lock()
-
-
-def png(figure: Figure, dpi: int = 150) -> bytes:
-    """A figure as a PNG; dpi: dots per inch."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    figure.set_dpi(dpi)
-    file = BytesIO()
-    # Letters that are not fitted to dots keep their widths, and a figure takes a seventh less time.
-    # The setting is of the process: threads draw one after the other.
-    with _drawing, rc_context({"text.hinting": "none"}):
-        FigureCanvasAgg(figure).print_png(
-            file, metadata={"Software": None}, pil_kwargs={"compress_level": 1}
-        )
-    return file.getvalue()
-
-
-def save(figures: Mapping[str, Figure], folder: Path) -> list[str]:
-    """Write each figure as a PNG; returns the file names. Raises Interrupted."""
-    return write_pngs(((name, png(figure)) for name, figure in figures.items()), folder)
-
-
-def write_pngs(pngs: Iterable[tuple[str, bytes]], folder: Path) -> list[str]:
-    """Writes PNGs by name; returns the file names. Raises Interrupted."""
-    names = []
-    for name, content in pngs:
-        interrupt.raise_if_interrupted()
-        path = folder / f"{name}.png"
-        path.unlink(missing_ok=True)  # a link is replaced, not followed
-        path.write_bytes(content)
-        names.append(path.name)
-    return names

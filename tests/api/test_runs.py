@@ -6,7 +6,7 @@ import re
 import signal
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -286,13 +286,13 @@ def test_ctrl_c_raises_with_the_results_so_far(out: str | None, tmp_path: Path) 
 def test_ctrl_c_while_figures_are_drawn_says_so(
     bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    drawn = run_figures.pngs
+    drawn = run_figures.files
 
-    def interrupted(found: hl.Run) -> Iterator[tuple[str, bytes]]:
+    def interrupted(found: hl.Run, formats: Sequence[str]) -> Iterator[tuple[str, bytes]]:
         os.kill(os.getpid(), signal.SIGINT)
-        return drawn(found)
+        return drawn(found, formats)
 
-    monkeypatch.setattr(run_figures, "pngs", interrupted)
+    monkeypatch.setattr(run_figures, "files", interrupted)
     assert status("run", bar, "--out", tmp_path) == 1
     assert "has the results of the run, not all of its figures" in capsys.readouterr().err
     assert hl.load(tmp_path).run["end"]["reason"] == "duration"
@@ -324,7 +324,7 @@ def test_a_disk_that_is_full_for_the_figures_keeps_the_run(
             file.write(b"a figure")
         return []
 
-    monkeypatch.setattr("hapticlink.visualization.figure_axes.write_pngs", full)
+    monkeypatch.setattr("hapticlink.visualization.figure_files.write", full)
     made = hl.run(bar, out=tmp_path)
     assert made.fault is None
     assert "No space left on device" in caplog.text

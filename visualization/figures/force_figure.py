@@ -13,6 +13,7 @@ from hapticlink.analysis.findings.tracking import UserSignals, find_users
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
+from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import legend_above_curves, titled_axes
 from hapticlink.visualization.figures.curves import curve
 
@@ -44,14 +45,15 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     names = [*WRENCHES.values()]
     for name, (time, force, moment) in drawn.items():
         user, _, kind = name.rpartition(": ")
-        look = {"lw": 1, "color": f"C{names.index(kind)}", "ls": styles[user]}
+        look = {"lw": 1, "color": CURVES[names.index(kind)], "ls": styles[user]}
         axes[0].plot(time, force, label=name, **look)
-        axes[1].plot(time, moment, **look)
-    legend_above_curves(axes[0], columns=2)
+        axes[1].plot(time, moment, label=name, **look)
+    for each in axes[:2]:
+        legend_above_curves(each, columns=2)
     for user, (time, *tau) in driven.items():
         for i, each in enumerate(tau):
             label = None if user else f"motor {i + 1}"
-            axes[2].plot(time, each, lw=1, color=f"C{i}", ls=styles[user], label=label)
+            axes[2].plot(time, each, lw=1, color=CURVES[i], ls=styles[user], label=label)
         for sign in (-1, 1):
             label = None if user or sign < 0 else "limit"
             axes[2].axhline(sign * limits[user], color="k", lw=0.8, ls="--", label=label)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import cycle
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from hapticlink.analysis.findings.tracking import (
     of_port,
     pose_error,
 )
-from hapticlink.analysis.findings.user_port import UserPort, allowance, tolerated_energy, user_port
+from hapticlink.analysis.findings.user_port import UserPort, tolerated_energy, user_port
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.signal_names import (
@@ -41,7 +41,15 @@ from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
 from hapticlink.orchestrator.results.recorded_scene import all_devices, scene_part
 from hapticlink.visualization import figure_axes
-from hapticlink.visualization.figure_axes import plain, png, set_margins, titled_axes
+from hapticlink.visualization.curve_colours import CURVES
+from hapticlink.visualization.figure_axes import (
+    headline,
+    in_lines,
+    plain,
+    set_margins,
+    titled_axes,
+)
+from hapticlink.visualization.figure_files import encode
 from hapticlink.visualization.figures.curves import curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
@@ -63,7 +71,7 @@ SOURCES = {
     "topology": "topology controller, F_T",
     "environment": WRENCHES[ENVIRONMENT_WRENCH],
 }
-"""The blocks of `port_blocks.py` as a reader knows them."""
+"""The blocks of `port_blocks.py` that are no hold, as a reader knows them."""
 
 
 def figures(results: Results) -> dict[str, Figure]:
@@ -79,7 +87,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     with_rows = {name: table for name, table in results.tables.items() if len(table.rows)}
     results = with_record(replace(results, tables=with_rows), results.record)
     whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
-    counted, generated = count_constrained(results), _generated_energies(results)
+    counted = count_constrained(results)
     # an SSP has the block, but not its description
     linkage, devices = scene_part(results, "linkage", Linkage), all_devices(results)
     size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
@@ -101,35 +109,38 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         drawn_by["constraints"] = partial(_constraints, results, *counted)
     if port:
         drawn_by["user_port"] = partial(_port, results, port)
-    if generated:
-        drawn_by["energies"] = partial(_energies, results, generated)
     if (paced := results.record.real_time) and paced["ticks"]:
         drawn_by["real_time"] = partial(real_time, results)
     return drawn_by
 
 
-def pngs(results: Results) -> Iterator[tuple[str, bytes]]:
-    """Name and PNG of each figure of a run, each drawn when it is asked for."""
+def files(results: Results, formats: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of each file of the figures of a run, each drawn when it is asked for."""
     for name, draw in drawings(results).items():
-        yield name, png(draw())
+        figure = draw()
+        for kind in formats:
+            yield f"{name}.{kind}", encode(figure, kind)
 
 
 def _mechanism(results: Results, linkage: Linkage, q: Vector, port: UserPort | None) -> Figure:
     marked = episodes(results)
     figure, axes = titled_axes(results, _finding(results, marked, port), "x (mm)", "y (mm)")
     contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
+    starts: list[Vector] = []
     ends: list[Vector] = []
-    for label, style, path in _paths(results):
-        axes.plot(*path.T, style, color=marks.RED, lw=0.8, label=plain(f"path of {label}"))
+    for (label, style, path), colour in zip(_paths(results), cycle(CURVES)):
+        axes.plot(*path.T, style, color=colour, lw=1.1, label=plain(f"path of {label}"))
+        starts.append(path[0])
         ends.append(path[-1])
-    axes.plot(*np.transpose(ends), "s", color=marks.RED, ms=4, label="end of a path")
+    square: Any = {"marker": "s", "ls": "", "color": "k", "ms": 5, "zorder": 7}
+    axes.plot(*np.transpose(starts), mfc="w", label="start of a path", **square)
+    axes.plot(*np.transpose(ends), label="end of a path", **square)
     _mark(results, marked, axes)
     _arrow(results, axes)
     limits = drawing.draw(axes, linkage, q[0], q[-1], contacts, devices.get(""))
     figure.set_size_inches(9.4, 6.4)
     set_margins(figure, right=BESIDE)
-    title = fill(axes.get_title().replace("\n", " "), 100)
-    axes.set_title(title, fontsize="medium", x=0, y=1.0, pad=12, ha="left")
+    headline(axes, axes.get_title().replace("\n", " "), 100, x=0, y=1.0, pad=12, ha="left")
     whole = figure.add_axes((1 - BESIDE / 9.4 + 0.01, 0.5, BESIDE / 9.4 - 0.03, 0.34))
     if devices:
         drawing.device(whole, linkage, q[0], devices, limits)
@@ -144,20 +155,21 @@ def _mechanism(results: Results, linkage: Linkage, q: Vector, port: UserPort | N
 
 
 def _finding(results: Results, marked: Sequence[Episode], port: UserPort | None) -> str:
-    """How far the operational point was led, how far the handle was from it, where the linkage gave
-    way in fewer directions, and what the rendering gave back."""
-    parts = [f"The operational point was led up to {_with('mm', _reach(results))} from its start"]
+    """The tracking error, how far the operational point moved, how often the number of constrained
+    directions was unusual, and what the rendering generated."""
+    parts = [f"motion of the operational point up to {short(_reach(results))} mm from its start"]
     if of_port(results, HANDLE_POSE):
         time, apart, _ = pose_error(results)
-        at = _with("s", float(time[apart.argmax()]))
-        parts.append(f"the handle was at most {_with('mm', apart.max())} off it, at {at}")
+        at = short(float(time[apart.argmax()]))
+        parts.insert(0, f"tracking error up to {short(apart.max())} mm, at {at} s")
     if unusual := [e for e in marked if e.kind == "constraints"]:
         spans = f"{len(unusual)} intervals" if len(unusual) > 1 else "one interval"
-        parts.append(f"the number of constrained directions is unusual in {spans} (pink)")
+        parts.append(f"unusual number of constrained directions in {spans}")
     if port and (found := port.measured).peak > tolerated_energy(found.hand_work):
-        by = _with("s", found.time_of_peak)
-        parts.append(f"{_with('mJ', 1e3 * found.peak)} generated by {by}")
-    return "; ".join(parts)
+        by = short(found.time_of_peak)
+        parts.append(f"{short(1e3 * found.peak)} mJ generated by {by} s")
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def _reach(results: Results) -> float:
@@ -167,11 +179,6 @@ def _reach(results: Results) -> float:
     return float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0))
 
 
-def _with(unit: str, value: float) -> str:
-    """A number that no line break separates from its unit."""
-    return f"{short(float(f'{value:.3g}'))}\N{NO-BREAK SPACE}{unit}"
-
-
 def _arrow(results: Results, axes: Axes) -> None:
     """The largest force of the hand, where it acted."""
     largest = _largest(results)
@@ -179,7 +186,7 @@ def _arrow(results: Results, axes: Axes) -> None:
         return
     size, time, force, pose = largest
     _, color, where = marks.FORCES["F_hand"]
-    label = fill(f"largest force of the hand, {short(size)} N, at {time:.3g} s", 34)
+    label = in_lines(f"largest force of the hand, {short(size)} N, at {time:.3g} s", 34)
     place = (marks.Place((where,)),)
     arrow = marks.arrow("force", place, color, label, ("F_hand",))._replace(size=ARROW / size)
     drawing.paint(axes, [arrow], {where: pose, "F_hand": force.tolist()}, zorder=6)
@@ -262,10 +269,8 @@ def _distance(results: Results) -> Figure:
     users = {u.name: curve(*pose_error(results, u)) for u in find_users(results)}
     largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
     at = int(gap.argmax())
-    title = (
-        f"Distance of handle to {_point(largest)}: at most {short(gap[at])} mm, "
-        f"at {short(time[at])} s"
-    )
+    most = f"{short(gap[at])} mm from {_point(largest)}, at {short(time[at])} s"
+    title = f"Handle at most {most}"
     figure, axes = titled_axes(results, title, "time (s)", "distance |x_S - x_D| (mm)")
     for (user, error), style in zip(users.items(), cycle(STYLES)):
         axes.plot(*error[:2], style, label=plain(_point(user)))
@@ -275,7 +280,7 @@ def _distance(results: Results) -> Figure:
 
 
 def _point(user: str) -> str:
-    return f"point {user}" if user else "operational point"
+    return f"point {user}" if user else "the operational point"
 
 
 def _contact(results: Results, times: Vector, pushes: NDArray[np.bool_]) -> Figure:
@@ -298,12 +303,30 @@ def _constraints(results: Results, times: Vector, numbers: Vector) -> Figure:
     time, count = curve(times, numbers)
     most = int(count.max())
     share = 100 * (samples[max(samples)] / sum(samples.values()))
-    title = f"{most} constrained directions in {share:.3g} % of the samples"
-    figure, axes = titled_axes(results, title, "time (s)", "constrained directions")
+    title = f"{most} of 3 directions of motion constrained in {share:.3g} % of the samples"
+    label = "constrained directions\n(a wrench along one accelerates nothing)"
+    figure, axes = titled_axes(results, title, "time (s)", label)
+    set_margins(figure, right=0.7)
     axes.step(time, count, where="post")
     if most < 10:
-        axes.set_yticks(range(most + 2))
+        axes.set(yticks=range(max(most, 3) + 1), ylim=(-0.15, max(most, 3) + 0.15))
+    free = axes.secondary_yaxis("right", functions=(_free, _free))
+    free.set(yticks=range(4), ylabel="directions free to move, of x, y and rotation")
     return figure
+
+
+def _free(constrained: Vector) -> Vector:
+    """The number of directions of motion in the plane that are not constrained; its own inverse."""
+    return 3 - constrained
+
+
+def _source(block: str) -> str:
+    """A block of `port_blocks.py` as a reader knows it."""
+    _, hold, of = block.rpartition("hold of ")
+    if hold:
+        signal, on, where = of.partition(" on ")
+        return f"hold of the {labels.signal(signal)}{on}{where}"
+    return SOURCES.get(block, block)
 
 
 def _port(results: Results, port: UserPort) -> Figure:
@@ -311,58 +334,25 @@ def _port(results: Results, port: UserPort) -> Figure:
     peak, at = measured.peak, int(np.argmax(port.generated_J))
     title = f"The rendering {summary.describe_generated(peak, measured.generated)}"
     if peak > summary.ROUNDING_J:
-        most = f"{short(1e3 * peak)} mJ, at {port.time_s[at]:.3g} s"
-        title = f"The rendering generated at most {most}"
+        title = f"At most {short(1e3 * peak)} mJ generated, at {port.time_s[at]:.3g} s"
         if put_in := float(port.put_in_J[at]):
             title += f", where the hand had put in {short(1e3 * put_in)} mJ"
     if peak > summary.ROUNDING_J and port.blocks_J:
-        largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name].max()))
-        title += f"; its largest source is the {SOURCES.get(largest, largest)}"
+        largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name][at]))
+        title += f"; largest source then: {_source(largest)}"
     label = "energy at the user's port (mJ)"
     figure, axes = titled_axes(results, title, "time (s)", label)
     axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="generated in all")
     axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label="put in by the hand")
     for name, energy in port.blocks_J.items():
         if np.abs(energy).max() > DRAWN * np.abs(port.generated_J).max():
-            source = plain(fill(SOURCES.get(name, name), 28))
-            axes.plot(port.time_s, 1e3 * energy, lw=1.0, label=source)
-    most = f"tolerated: {allowance(port.hand_work_J)}"
-    axes.axhline(
-        1e3 * tolerated_energy(port.hand_work_J), color="k", ls="--", lw=0.8, label=fill(most, 28)
-    )
+            source = plain(fill(_source(name), 32))
+            axes.plot(port.time_s, 1e3 * energy, lw=1.2, label=source)
+    most = 1e3 * tolerated_energy(port.hand_work_J)
+    axes.axhline(most, color="k", ls="--", lw=0.8, label=f"tolerated: {short(most)} mJ")
     low, high = axes.get_ylim()
     axes.axhspan(min(low, 0), 0, color="#228833", alpha=0.06, lw=0, label="passive: 0 or less")
     axes.set_ylim(min(low, 0), high)
     axes.axhline(0, color="0.4", lw=0.8)
     figure_axes.legend_below(figure)
-    return figure
-
-
-def _generated_energies(results: Results) -> dict[str, float]:
-    """Energy (J) that the hold of each connection between rates generated, of all connections where
-    none is between rates; none that is rounding."""
-    meters = results.record.across or results.record.meters
-    said = labels.connections(meters)
-    return {
-        said[name]: energy.generated
-        for name, energy in meters.items()
-        if abs(energy.generated) > summary.SMALLEST_J
-    }
-
-
-def _energies(results: Results, generated: dict[str, float]) -> Figure:
-    total = sum(generated.values())
-    unit, per = ("mJ", 1e3) if max(map(abs, generated.values())) < 0.1 else ("J", 1.0)
-    verb = "generate" if total >= 0 else "dissipate"
-    which = "between the rates " if results.record.across else ""
-    title = f"The holds {which}{verb} {short(abs(total) * per)} {unit} in all"
-    label = f"energy generated by the hold ({unit}; negative: dissipated)"
-    figure, axes = titled_axes(results, title, label, "")
-    set_margins(figure, left=2.3)
-    values = [value * per for value in generated.values()]
-    bars = axes.barh([plain(fill(name, 30)) for name in generated], values, height=0.5)
-    axes.bar_label(bars, [short(value) for value in values], padding=3)
-    axes.margins(x=0.35, y=0.2)
-    axes.axvline(0, color="0.4", lw=0.8)
-    axes.invert_yaxis()
     return figure

@@ -21,7 +21,10 @@ from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.visualization import figure_files
+from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import headline, plain
+from hapticlink.visualization.figure_files import encode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,15 +42,26 @@ NAMES = {
     "end_time_s": "end of the run (s)",
     "run_time_s": "run time (s)",
 }
+QUANTITIES = {
+    "graphics.rate": "graphics rate",
+    "haptics.rate": "rate of the haptic loop",
+    "duration": "simulated time",
+}
+"""Keys in words, where these are not `quantity of the part`."""
 UNITS = {"rate": "Hz", "duration": "s", "phase": "s", "mass": "kg", "inertia": "kg m2"}
 """Units of the keys that are varied most often, by the last part of the key."""
 FEW_KEYS = 3
 """Keys whose values alone name a row: of more, each row says those that it gives."""
-FEW = 8
+FEW = len(CURVES)
 """Number of lines that differ in colour; further ones also differ in dash pattern."""
 GOOD = ("duration",)
-LAST_CHUNK = b"IEND\xaeB`\x82"
-"""Of a PNG that is whole."""
+DPI = 130
+STAMPS = {
+    "png": ("Comment", b"IEND\xaeB`\x82"),
+    "pdf": ("Keywords", b"%%EOF\n"),
+    "svg": ("Description", b"</svg>\n"),
+}
+"""By format, the metadata that say what a figure shows, and how a file ends that is whole."""
 
 
 def check_metric(metric: str, scenes: Sequence[Scene]) -> None:
@@ -95,30 +109,43 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
     return figure
 
 
-def save(figure: Figure, path: Path, comment: str | None = None) -> None:
-    """Write a figure without the software's version, so that the same rows give the same bytes."""
-    figure.savefig(path, dpi=130, metadata={"Software": None, "Comment": comment})
-
-
-def write_figure(path: Path, rows: Sequence[Row], keys: Sequence[str], metric: str | None) -> bool:
-    """Write the figure of `draw`, unless the file there is that one already: loading Matplotlib and
-    drawing take longer than finding a finished sweep. Returns whether there is a figure. Raises as
-    `draw` does."""
+def write_figure(
+    folder: Path,
+    rows: Sequence[Row],
+    keys: Sequence[str],
+    metric: str | None,
+    formats: Sequence[str],
+) -> list[str]:
+    """Write the figure of `draw` as `sweep` in some formats, unless the files there are that one
+    already: loading Matplotlib and drawing take longer than finding a finished sweep. Returns the
+    names of the files, none if there is no figure. Raises as `draw` does."""
     made_with = version("matplotlib"), sources(hapticlink.visualization)
     shown = sha(json.dumps([rows, keys, metric, made_with], default=str))
-    if path.is_file():
-        there = path.read_bytes()
-        if shown.encode() in there and there.endswith(LAST_CHUNK):
-            return True
-    if drawn := draw(rows, keys, metric):
-        save(drawn, path, shown)
-    return drawn is not None
+    names = [f"sweep.{kind}" for kind in formats]
+    if all(_is_there(folder / name, shown) for name in names):
+        return names
+    drawn = draw(rows, keys, metric)
+    if drawn is None:
+        return []
+    made = (encode(drawn, kind, DPI, {STAMPS[kind][0]: shown}) for kind in formats)
+    return figure_files.write(zip(names, made, strict=True), folder)
+
+
+def _is_there(path: Path, shown: str) -> bool:
+    """Whether a figure is whole and has the stamp `shown`."""
+    if not path.is_file():
+        return False
+    there, (_, end) = path.read_bytes(), STAMPS[path.suffix[1:]]
+    return shown.encode() in there and there.endswith(end)
 
 
 def _axes(wide: bool) -> tuple[Figure, Any]:
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    figure = ShownFigure(figsize=(8.4 if wide else 6.4, 4.6), layout="constrained")
+    inside = ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12)
+    figure = ShownFigure(figsize=(8.4 if wide else 6.4, 4.6), layout=inside)
     axes = figure.add_subplot()
     axes.grid(alpha=0.3)
     return figure, axes
@@ -135,9 +162,15 @@ def unit(key: str) -> str:
     return UNITS.get(key.rpartition(".")[2], "")
 
 
+def words(key: str) -> str:
+    """A scene's key in words: `linkage.body.link0.mass` is `mass of link0`."""
+    path = key.replace("_", " ").split(".")
+    return QUANTITIES.get(key) or " of ".join(reversed(path[-2:]))
+
+
 def axis(key: str) -> str:
-    """A key with its unit, `graphics.rate (Hz)`."""
-    return f"{key} ({unit(key)})" if unit(key) else key
+    """A key in words with its unit, `graphics rate (Hz)`."""
+    return f"{words(key)} ({unit(key)})" if unit(key) else words(key)
 
 
 def finding(
@@ -147,7 +180,8 @@ def finding(
     the row `best` that has it, and how many of the `of` runs ended early or failed."""
     name, _, measured = quantity.partition(" (")
     named = _naming(best, keys)
-    where = ", ".join(f"{k} = {best.get(k, 'as in the scene')} {unit(k)}".rstrip() for k in named)
+    given = ((k, best.get(k, "as in the scene")) for k in named)
+    where = ", ".join(f"{words(k)} = {value} {unit(k)}".rstrip() for k, value in given)
     text = f"{name[:1].upper()}{name[1:]} down to {short(value)} {measured.rstrip(')')}".rstrip()
     few = f"; {ended} of {of} runs ended early or failed" if ended else ""
     return f"{text} at {where}{few}"
@@ -172,18 +206,15 @@ def _is_shown(row: Row, metric: str) -> bool:
 
 
 def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric: str) -> None:
-    from matplotlib import colormaps
-
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(_label(row, others), []).append(row)
-    colours = colormaps["tab10"](range(FEW))
     drawn = []
     for i, (label, group) in enumerate(groups.items()):
         group.sort(key=lambda r: float(r[x]))
         positions = np.array([float(r[x]) for r in group])
         value = np.array([r[metric] if _is_shown(r, metric) else np.nan for r in group])
-        colour, dash = colours[i % FEW], ("-", "--", ":", "-.")[i // FEW % 4]
+        colour, dash = CURVES[i % FEW], ("-", "--", ":", "-.")[i // FEW % 4]
         axes.plot(positions, value, dash, color=colour, marker=".", label=label or None)
         drawn += [v for v in value if np.isfinite(v)]
         bad = [float(r[x]) for r in group if not _is_shown(r, metric)]
@@ -197,10 +228,10 @@ def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric
     _scale(axes, drawn)
     axes.set(xlabel=axis(x), ylabel=_named(metric))
     if len(groups) > 1 or any(not _is_shown(r, metric) for r in rows):
-        title = ", ".join(others) if others else None
+        title = ", ".join(map(words, others)) or None
         axes.legend(
             title=title, fontsize="small", loc="center left", bbox_to_anchor=(1.01, 0.5),
-            ncols=1 + len(groups) // 24,
+            frameon=False, ncols=1 + len(groups) // 24,
         )  # fmt: skip
 
 
@@ -212,17 +243,18 @@ def _map(figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: st
             values[ys.index(float(r[y])), xs.index(float(r[x]))] = r[metric]
     axes.set_facecolor("0.85")  # where a run ended early or failed
     axes.grid(False)
+    lost = "; grey: ended early or failed" if any(not _is_shown(r, metric) for r in rows) else ""
     finite = values[np.isfinite(values)]
     wide = finite.size and finite.min() > 0 and finite.max() > 30 * finite.min()
     mesh = axes.pcolormesh(xs, ys, values, shading="nearest", norm="log" if wide else "linear")
-    figure.colorbar(mesh, label=f"{_named(metric)}; grey: ended early or failed")
+    figure.colorbar(mesh, label=f"{_named(metric)}{lost}")
     axes.set(xlabel=axis(x), ylabel=axis(y))
 
 
 def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str) -> None:
     labels = [_label(r, keys) for r in rows]
     values = [r[metric] if _is_shown(r, metric) else np.nan for r in rows]
-    axes.barh(range(len(rows)), values, tick_label=labels)
+    axes.barh(range(len(rows)), values, height=0.5, tick_label=labels, color=CURVES[0])
     for i, value in enumerate(values):
         if np.isnan(value):
             axes.text(
@@ -232,7 +264,8 @@ def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str) -> N
     if len(keys) > FEW_KEYS:
         axes.figure.set_figwidth(10)
     axes.figure.set_figheight(max(4.6, 1.5 + sum(0.2 + 0.2 * len(t.split("\n")) for t in labels)))
-    axes.set(xlabel=_named(metric), ylabel=", ".join(keys) if len(keys) <= FEW_KEYS else "")
+    named = ", ".join(map(words, keys)) if len(keys) <= FEW_KEYS else ""
+    axes.set(xlabel=_named(metric), ylabel=named)
 
 
 def _scale(axes: Any, values: Sequence[float]) -> None:
