@@ -98,7 +98,8 @@ def of_mobility(space: OperationalSpace, J: ca.SX) -> ca.SX:
 
 
 def of_projector(found: ConstrainedDirections, slope: ca.SX) -> ca.SX:
-    """That of the projector on constrained directions, from that of the mobility."""
+    """That of the projector on constrained directions, from that of the mobility; without the part
+    between two equal eigenvalues, where there is none."""
     S, values, vectors = found.scaling, found.values, found.vectors
     n, chosen = S.shape[0], is_among_smallest(values, found.number)
     turned = [
@@ -109,9 +110,8 @@ def of_projector(found: ConstrainedDirections, slope: ca.SX) -> ca.SX:
         mixed = ca.SX(n, n)
         for i in range(n):
             for j in range(n):
-                parts = chosen[i] * (1 - chosen[j])
-                gap = ca.if_else(parts, values[i] - values[j], 1)
-                mixed[i, j] = parts * rate[j, i] / gap
+                gap = ca.if_else(values[i] == values[j], ca.inf, values[i] - values[j])
+                mixed[i, j] = chosen[i] * (1 - chosen[j]) * rate[j, i] / gap
         columns.append(ca.vec((vectors @ (mixed + mixed.T) @ vectors.T).T))
     return ca.horzcat(*columns)
 

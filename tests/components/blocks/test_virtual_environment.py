@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hapticlink.components.dynamics.constrained_directions import ConstrainedDirections
+from hapticlink.components.dynamics.gradients import of_projector
 from hapticlink.components.specs.linkage import (
     Directions,
     FurtherPoint,
@@ -192,6 +195,14 @@ def test_gradients_hold_along_redundant_closures(turned, ratio):
         slope = (ahead[name] - behind[name]).ravel() / 2e-5
         found = here[f"{name}_gradient"] @ along
         np.testing.assert_allclose(found, slope, atol=1e-6 * np.abs(here[name]).max(), err_msg=name)
+
+
+def test_between_equal_eigenvalues_the_projector_has_no_gradient():
+    values, slope = ca.DM([1, 1, 3]), ca.DM(np.ones((9, 1)))
+    eye = ca.SX.eye(3)
+    found = ConstrainedDirections(*[ca.SX()] * 2, {}, eye, ca.SX(values), eye, ca.SX(1))
+    gradient = np.reshape(ca.evalf(of_projector(found, ca.SX(slope))), (3, 3))
+    np.testing.assert_array_equal(gradient, [[0, 0, -0.5], [0, 0, 0], [-0.5, 0, 0]])
 
 
 def test_matrices_are_computed_in_the_middle_of_the_frame_in_which_they_are_used():
