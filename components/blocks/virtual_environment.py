@@ -19,6 +19,7 @@ from hapticlink.components.contact.kept_sides import KeptSides
 from hapticlink.components.dynamics import follow_mechanism, further_points, gradients, grasp
 from hapticlink.components.dynamics import local_model as held_matrices
 from hapticlink.components.dynamics.assembly import assemble, require_assembled
+from hapticlink.components.dynamics.constrained_directions import ConstrainedDirections
 from hapticlink.components.dynamics.light_bodies import require_inertia
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import (
@@ -98,19 +99,16 @@ def virtual_environment(
         point = block.x.get(grasp.READY)
         space = OperationalSpace(LinkageModel(linkage, block.p, q, block.x["qd"], point=point))
     if mobility:
-        mobilities = {"Lambda_inv": space.Lambda_inv} | further_points.mobilities(space, users)
-        output |= mobilities
-        for name, matrix in mobilities.items() if predicted else ():
-            output |= gradients.of_matrix(name, matrix, space.model.q)
+        output |= {"Lambda_inv": space.Lambda_inv} | further_points.mobilities(space, users)
+    found: dict[str, ConstrainedDirections] = {}
     if directions:
         points = grasp.points_of_copy(block) if linkage.choices else None
         found = further_points.directions(block, space, users, q0, q_next, points)
         for name, directed in found.items():
             initial[name], step[name] = directed.first, directed.after
             output |= directed.output
-            if predicted:
-                P_c = name.replace("n_constrained", "P_c")
-                output |= gradients.of_projector(P_c, directed, space.model.q)
+    if predicted:
+        output |= gradients.values(space, users, found, mobility=mobility)
     if linkage.closed:
         output |= _branch(block, model)
     if contacts:

@@ -115,13 +115,13 @@ class Points:
 
 @dataclass(frozen=True)
 class ConstrainedDirections:
-    """The state n_constrained at the start and after a step, and the outputs; the scaled mobility
-    with its eigenvalues and eigenvectors, of which P_c has the `number` smallest."""
+    """The state n_constrained at the start and after a step, and the outputs; S, and of the scaled
+    mobility the eigenvalues and eigenvectors, of which P_c has the `number` smallest."""
 
     first: ca.SX
     after: ca.SX
     output: dict[str, ca.SX]
-    scaled: ca.SX
+    scaling: ca.SX
     values: ca.SX
     vectors: ca.SX
     number: ca.SX
@@ -155,12 +155,11 @@ def constrained_directions(
         mobility, least = scaled(q, block.u.vector, p.vector, *point)
         return count(eigen(mobility)[0], before, tolerance, hysteresis, least)
 
-    A = scaled(q, *given)[0]
-    found = (*eigen(A), before)
+    found = (*eigen(scaled(q, *given)[0]), before)
     output = {f"{prefix}P_c": projector(*found), f"{prefix}n_constraints": before}
     first, after = own, own
     if points:
         first, after = [points.first], [points.after]
         before = ca.if_else(points.changes, 0, before)
     numbers = number(q0, ca.SX(0), *first), number(q1, before, *after)
-    return ConstrainedDirections(*numbers, output, A, *found)
+    return ConstrainedDirections(*numbers, output, S, *found)

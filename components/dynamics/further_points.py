@@ -95,15 +95,16 @@ def efforts(model: LinkageModel, u: Signals) -> ca.SX:
     return Q
 
 
-def _jacobians(model: LinkageModel, names: Users) -> dict[str, ca.SX]:
+def jacobians(model: LinkageModel, names: Users) -> dict[str, ca.SX]:
+    """J_k of the points, by name."""
     points = (p for name in names for p in model.linkage.point if p.name == name)
     return {p.name: ca.jacobian(model.pose(p.body, f"{p.name}.at"), model.q) for p in points}
 
 
 def mobilities(space: OperationalSpace, names: Users) -> dict[str, ca.SX]:
     """Lambda_k^-1 of the points, by output."""
-    jacobians = _jacobians(space.model, names)
-    return {f"{name}.Lambda_inv": space.mobility(J) for name, J in jacobians.items()}
+    points = jacobians(space.model, names).items()
+    return {f"{name}.Lambda_inv": space.mobility(J) for name, J in points}
 
 
 def values(
@@ -140,6 +141,6 @@ def directions(
     """The constrained directions at the operational point and at those of users, by state.
     points: of an operational point that changes."""
     constrained = [constrained_directions(block, space, q0, q1, points=points)]
-    for name, J in _jacobians(space.model, users).items():
+    for name, J in jacobians(space.model, users).items():
         constrained.append(constrained_directions(block, space, q0, q1, J, f"{name}."))
     return dict(zip(counts(users), constrained, strict=True))

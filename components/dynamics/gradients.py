@@ -6,6 +6,13 @@ mechanism is, to first order, at
 
     q_predicted = q + 3/2 h qd
 
+With a = D^-1 (J' + W' lambda) and W a = 0 the mobility is J a, and its gradient is the one of
+
+    J a + (J a)' + lambda' W a + (lambda' W a)' - a' D a
+
+with a and lambda held: no factor is differentiated, which has no derivative where closures are
+redundant (there it holds along the closures).
+
 The gradient of the projector P on the eigenvectors v_i of the small eigenvalues l_i of A, by those
 of A (Kato, Perturbation Theory for Linear Operators, section II.2):
 
@@ -14,15 +21,18 @@ of A (Kato, Perturbation Theory for Linear Operators, section II.2):
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import casadi as ca
 
 from hapticlink.components.component import Block, Variable
+from hapticlink.components.dynamics import further_points
+from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.constrained_directions import (
     ConstrainedDirections,
     is_among_smallest,
 )
+from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.ports import Gradient
 from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.linkage import Linkage
@@ -56,29 +66,54 @@ def predict(block: Block, q: ca.SX, qd: ca.SX) -> ca.SX:
     return q + LEAD * block.h * qd
 
 
-def of_matrix(name: str, matrix: ca.SX, q: ca.SX) -> dict[str, ca.SX]:
-    """The gradient of an output that is an expression of the symbols q."""
-    return {_name(name): ca.jacobian(ca.vec(matrix.T), q)}
+def values(
+    space: OperationalSpace,
+    users: further_points.Users,
+    found: Mapping[str, ConstrainedDirections],
+    *,
+    mobility: bool,
+) -> Iterator[tuple[str, ca.SX]]:
+    """The gradients by output: of the mobilities, if asked for, and of the projectors on the
+    constrained directions that are `found`, by state."""
+    jacobians = further_points.jacobians(space.model, users)
+    own = {"": space.terms.J_h} | {f"{name}.": J for name, J in jacobians.items()}
+    for prefix, J in own.items():
+        slope = of_mobility(space, J)
+        if mobility:
+            yield _name(f"{prefix}Lambda_inv"), slope
+        if directed := found.get(f"{prefix}n_constrained"):
+            yield _name(f"{prefix}P_c"), of_projector(directed, slope)
 
 
-def of_projector(name: str, found: ConstrainedDirections, q: ca.SX) -> dict[str, ca.SX]:
-    """That of the projector on constrained directions, which are expressions of the symbols q."""
-    A, values, vectors = found.scaled, found.values, found.vectors
-    n, chosen = A.shape[0], is_among_smallest(values, found.number)
+def of_mobility(space: OperationalSpace, J: ca.SX) -> ca.SX:
+    """The gradient (k^2 x n) of the mobility (k x k) of points with Jacobian J (k x n), which is an
+    expression of the model's symbols q."""
+    model = space.model
+    solved = space.solver.solve(J.T, ca.SX(space.solver.m, J.shape[0]))
+    a, multipliers = held = [ca.SX.sym("held", part.sparsity()) for part in solved]
+    half = J @ a + multipliers.T @ (model.W @ a)
+    mobility = half + half.T - a.T @ TreeInertia(model).apply(a)
+    slope = ca.jacobian(ca.vec(mobility), model.q)
+    return ca.substitute([slope], held, [*solved])[0]
+
+
+def of_projector(found: ConstrainedDirections, slope: ca.SX) -> ca.SX:
+    """That of the projector on constrained directions, from that of the mobility; without the part
+    between two equal eigenvalues, where there is none."""
+    S, values, vectors = found.scaling, found.values, found.vectors
+    n, chosen = S.shape[0], is_among_smallest(values, found.number)
     turned = [
-        vectors.T @ ca.reshape(column, n, n) @ vectors
-        for column in ca.horzsplit(ca.jacobian(ca.vec(A), q))
+        vectors.T @ S @ ca.reshape(column, n, n) @ S @ vectors for column in ca.horzsplit(slope)
     ]
     columns = []
     for rate in turned:
         mixed = ca.SX(n, n)
         for i in range(n):
             for j in range(n):
-                parts = chosen[i] * (1 - chosen[j])
-                gap = ca.if_else(parts, values[i] - values[j], 1)
-                mixed[i, j] = parts * rate[j, i] / gap
+                gap = ca.if_else(values[i] == values[j], ca.inf, values[i] - values[j])
+                mixed[i, j] = chosen[i] * (1 - chosen[j]) * rate[j, i] / gap
         columns.append(ca.vec((vectors @ (mixed + mixed.T) @ vectors.T).T))
-    return {_name(name): ca.horzcat(*columns)}
+    return ca.horzcat(*columns)
 
 
 def part(outputs: Iterable[str]) -> BlockPart:

@@ -2,16 +2,27 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.specs.linkage import Directions, FurtherPoint, GraphicsCopy
+from hapticlink.components.dynamics.constrained_directions import ConstrainedDirections
+from hapticlink.components.dynamics.gradients import of_projector
+from hapticlink.components.specs.linkage import (
+    Directions,
+    FurtherPoint,
+    GraphicsCopy,
+    Joint,
+    Linkage,
+    Loop,
+    OperationalPoint,
+)
 from studies.report import appendix_a
 from studies.report.appendix_a import L
 from tests.blocks import Running, running, virtual_environment
-from tests.mechanisms import WRENCH, five_bar
+from tests.mechanisms import WRENCH, five_bar, rod
 
 
 def environment(**settings):
@@ -154,6 +165,44 @@ def test_gradients_are_those_of_the_matrices_at_the_predicted_coordinates(users,
             slope = (ahead[name] - behind[name]).ravel() / 2e-5
             size = np.abs(gradients[name]).max()
             np.testing.assert_allclose(gradients[name][:, k], slope, atol=1e-5 * size, err_msg=name)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(0.2, 1.4), st.floats(0.1, 0.4))
+def test_gradients_hold_along_redundant_closures(turned, ratio):
+    """Of a platform on three rockers, which stay parallel; the third is redundant."""
+    rockers = [rod(name, 0.2, 0.3) for name in ("left", "middle", "right")]
+    at = {"left": 0.0, "middle": 0.3 * ratio, "right": 0.3}
+    joints = [Joint(name=name, child=name, at_parent=(x, 0.0)) for name, x in at.items()]
+    linkage = Linkage(
+        body=(*rockers, rod("platform", 0.3)),
+        joint=(*joints, Joint(name="hinge", parent="left", child="platform", at_parent=(0.2, 0.0))),
+        loop=tuple(
+            Loop(bodies=("platform", name), at=((at[name], 0.0), (0.2, 0.0)))
+            for name in ("middle", "right")
+        ),
+        operational_point=OperationalPoint(body="platform", at=(0.1, 0.02)),
+        start={"left": 0.5, "middle": 0.5, "right": 0.5, "hinge": -0.5},
+    )
+    copy = Running(virtual_environment(linkage, GraphicsCopy(), Directions(), predicted=True))
+    along = np.array([1.0, 1.0, 1.0, -1.0])
+
+    def at_angle(angle):
+        return copy.put(q_predicted=angle * along).y
+
+    here, ahead, behind = (at_angle(turned + e) for e in (0.0, 1e-5, -1e-5))
+    for name in ("Lambda_inv", "P_c"):
+        slope = (ahead[name] - behind[name]).ravel() / 2e-5
+        found = here[f"{name}_gradient"] @ along
+        np.testing.assert_allclose(found, slope, atol=1e-6 * np.abs(here[name]).max(), err_msg=name)
+
+
+def test_between_equal_eigenvalues_the_projector_has_no_gradient():
+    values, slope = ca.DM([1, 1, 3]), ca.DM(np.ones((9, 1)))
+    eye = ca.SX.eye(3)
+    found = ConstrainedDirections(*[ca.SX()] * 2, {}, eye, ca.SX(values), eye, ca.SX(1))
+    gradient = np.reshape(ca.evalf(of_projector(found, ca.SX(slope))), (3, 3))
+    np.testing.assert_array_equal(gradient, [[0, 0, -0.5], [0, 0, 0], [-0.5, 0, 0]])
 
 
 def test_matrices_are_computed_in_the_middle_of_the_frame_in_which_they_are_used():
