@@ -40,7 +40,7 @@ def own_temporary_folder(
 @pytest.fixture
 def emptied_temporary_folder(own_temporary_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """That folder, for a test that looks at what its runs leave there: no FMU stays unpacked."""
-    monkeypatch.setattr(process_cache, "_stay", False)
+    monkeypatch.setattr(process_cache, "_staying", 0)
     return own_temporary_folder
 
 

@@ -8,26 +8,31 @@ from threading import Lock
 from typing import Any, Generic, TypeVar
 
 Item = TypeVar("Item")
-_keeping = False
+_keeping = 0
+"""The contexts of `keep` that are open, in all threads."""
+_lock = Lock()
 _shelves: list[Shelf[Any]] = []
 
 
 @contextmanager
 def keep() -> Iterator[None]:
-    """Within the outermost context shelves keep what is put on them; behind it they are empty."""
+    """Within the context shelves keep what is put on them; behind the last of those that are open
+    at the same time, in any thread, they are empty."""
     global _keeping
-    before, _keeping = _keeping, True
+    with _lock:
+        _keeping += 1
     try:
         yield
     finally:
-        _keeping = before
-        for shelf in () if before else _shelves:
+        with _lock:
+            _keeping -= 1
+        for shelf in () if _keeping else _shelves:
             shelf.clear()
 
 
 def is_keeping() -> bool:
     """Whether this process keeps things from run to run."""
-    return _keeping
+    return _keeping > 0
 
 
 class Shelf(Generic[Item]):

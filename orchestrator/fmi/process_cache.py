@@ -42,7 +42,8 @@ _instances: Counter[str] = Counter()
 _reset: dict[tuple[str, str], Idle] = {}
 """By folder and name: an instance that was reset after a run without a fault."""
 _lock = Lock()
-_stay = False
+_staying = 0
+"""The contexts of `keep_unpacked` that are open, in all threads."""
 
 
 def describe_once(path: Path) -> Description:
@@ -68,16 +69,18 @@ def file_at(path: Path) -> File:
 
 @contextmanager
 def keep_unpacked() -> Iterator[None]:
-    """Within the outermost context, FMUs of this project stay unpacked until `trim` drops them, and
-    native ones instantiated."""
-    global _stay
-    before, _stay = _stay, True
+    """Until the last of the contexts that are open at the same time ends, in any thread, FMUs of
+    this project stay unpacked until `trim` drops them, and native ones instantiated."""
+    global _staying
+    with _lock:
+        _staying += 1
     try:
         with shelf.keep():
             yield
     finally:
-        _stay = before
-        trim(MAX_UNPACKED if before else 0)
+        with _lock:
+            _staying -= 1
+        trim(MAX_UNPACKED if _staying else 0)
 
 
 def unpack(description: Description, folder: str) -> str:
@@ -124,7 +127,7 @@ def keep_instance(folder: str, name: str, slave: Any, key: int) -> bool:
     """Keep an instance as it is after fmi2Reset, for the next of that name; False where none are
     kept."""
     with _lock:
-        if not _stay or (folder, name) in _reset:
+        if not _staying or (folder, name) in _reset:
             return False
         _reset[folder, name] = Idle(slave, key)
         return True
@@ -133,7 +136,7 @@ def keep_instance(folder: str, name: str, slave: Any, key: int) -> bool:
 def take_instance(folder: str, name: str) -> Idle | None:
     """An instance that was kept, which is the caller's from now on."""
     with _lock:
-        return _reset.pop((folder, name), None) if _stay else None
+        return _reset.pop((folder, name), None) if _staying else None
 
 
 def count_instances() -> int:
@@ -158,7 +161,7 @@ def leave(folder: str) -> bool:
             shutil.rmtree(folder, ignore_errors=True)
             return False
         _instances[folder] -= 1
-        if not _instances[folder] and not _stay:
+        if not _instances[folder] and not _staying:
             _remove(file)
         return _instances[folder] > 0
 

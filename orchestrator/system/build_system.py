@@ -65,10 +65,12 @@ def build_system(scene: Scene, starts: Mapping[str, Starts] | None = None) -> It
 
 @dataclass(frozen=True)
 class Assembled:
-    """A system with all that it follows from but start values: the scene without these, the common
-    settings of its blocks, and what their FMU files contain."""
+    """A system with all that it follows from but start values: the scene without these, its events
+    as text, in which 0.0 is not -0.0, nor 1 true, the common settings of its blocks, and what their
+    FMU files contain."""
 
     scene: Scene
+    events: str
     settings: Sequence[tuple[str, Mapping[str, Any]]]
     described: Sequence[Description]
     system: System
@@ -93,17 +95,19 @@ def _assemble_once(
         controller=None,
         controllers={},
     )
+    events = repr(scene.at)
     settings = [(b.name, without_start_values(b.block, b.settings)[0]) for b in planned.own]
     described = [describe_once(files[b.name]) for b in planned.own]
 
     def is_same(known: Assembled) -> bool:
-        return (known.described, known.settings, known.scene) == (described, settings, common)
+        own = known.events, known.described, known.settings, known.scene
+        return own == (events, described, settings, common)
 
     if known := _SYSTEMS.take(is_same):
         system = _with_starts(scene, planned, known.system)
     else:
         system = _assemble(scene, planned, time, files)
-    _SYSTEMS.put(known or Assembled(common, settings, described, system))
+    _SYSTEMS.put(known or Assembled(common, events, settings, described, system))
     return system
 
 

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -27,19 +28,18 @@ from hapticlink.orchestrator.system.step_sizes import STEP_SIZE, sizes
 LOG = logging.getLogger(__name__)
 """Says, at level INFO, which block is begun to be built, or taken from the cache."""
 
-_prefer_compiled = False
+_prefers_compiled = ContextVar("_prefers_compiled", default=False)
 
 
 @contextmanager
 def prefer_compiled() -> Iterator[None]:
     """Within the context blocks are native FMUs, which give the same bits as Python ones and take a
-    third of the time, where the cache has them."""
-    global _prefer_compiled
-    before, _prefer_compiled = _prefer_compiled, True
+    third of the time, where the cache has them; in this thread, not in others."""
+    before = _prefers_compiled.set(True)
     try:
         yield
     finally:
-        _prefer_compiled = before
+        _prefers_compiled.reset(before)
 
 
 def fmu_files(
@@ -71,7 +71,7 @@ def fmu_files(
         settings, packaging = block.settings, scene.packaging
         if starts is None and block in blocks.own:
             settings, _ = without_start_values(block.block, settings)
-        if _prefer_compiled and not block.engine and has_compiled(block.block, settings):
+        if _prefers_compiled.get() and not block.engine and has_compiled(block.block, settings):
             packaging = "native"
         if starts is not None:
             steps = sizes(timeline.of[block.name], timeline)
@@ -89,7 +89,8 @@ def fmu_files(
             "engine": block.engine,
         }
         compiled = packaging == "native" and not block.engine
-        made_of = block.block, settings, how, folder(), compiler_version() if compiled else ""
+        compiler = compiler_version() if compiled else ""
+        made_of = repr((block.block, settings, how, folder(), compiler))
         if path := _find_again(made_of):
             return path
         own = room / block.name  # two hands are two files of one name
@@ -109,11 +110,12 @@ def fmu_files(
         raise InputFault(str(error)) from error
 
 
-_FOUND: shelf.Shelf[tuple[Any, File]] = shelf.Shelf(MAX_UNPACKED)
-"""What files in the cache are made of: finding one takes a hash of that."""
+_FOUND: shelf.Shelf[tuple[str, File]] = shelf.Shelf(MAX_UNPACKED)
+"""What files in the cache are made of, as text, in which 0.0 is not -0.0, nor 1 True: finding one
+takes a hash of that, and of more."""
 
 
-def _find_again(made_of: Any) -> Path | None:
+def _find_again(made_of: str) -> Path | None:
     """The file that was found before for the same, if it has not changed since."""
     known = _FOUND.take(lambda item: item[0] == made_of)
     with suppress(OSError):

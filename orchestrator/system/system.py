@@ -209,12 +209,17 @@ class System:
 
 
 def _without_starts(system: System) -> tuple[System, list[Any]]:
-    """The system without start values and gains of springs, the names of those, and the number of
-    springs."""
+    """The system without start values and gains of springs, the names of those, the number of
+    springs, and the values of changes as text, in which 0.0 is not -0.0."""
     fmus = tuple(replace(fmu, starts=()) for fmu in system.fmus)
     energy = replace(system.energy, springs=())
     names = [[scalar.name for scalar, _ in fmu.starts] for fmu in system.fmus]
-    return replace(system, fmus=fmus, energy=energy), [*names, [len(system.energy.springs)]]
+    changed = repr([change.values for change in system.changes])
+    return replace(system, fmus=fmus, energy=energy), [
+        *names,
+        len(system.energy.springs),
+        changed,
+    ]
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@ runs give, to the byte."""
 
 import random
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.run import execute_plan, kept_runs
+from hapticlink.orchestrator.system import fmu_files
+from hapticlink.orchestrator.system.fmu_files import prefer_compiled
 
 BASE = ("packaging=native", "duration=0.25")
 KEYS: dict[str, list[str]] = {
@@ -42,6 +45,7 @@ BURSTS = ("hand.wrench=[1e308, 0.0, 0.0]",)
 """The next run of the same FMUs after a doStep that failed."""
 FAULTS = ("linkage.operational_point={ body = 'link2', at = [0.9, 0.0] }",)
 TIMES = ("timings", "run_time_s")
+AT = "at=[{{ time = 0.05, set = {{ 'hand.wrench' = [{}, 0.0, 0.0] }} }}]"
 
 
 @contextmanager
@@ -51,8 +55,8 @@ def nothing_kept() -> Iterator[None]:
         each.clear()
     process_cache.trim(0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(shelf, "_keeping", False)
-        patch.setattr(process_cache, "_stay", False)
+        patch.setattr(shelf, "_keeping", 0)
+        patch.setattr(process_cache, "_staying", 0)
         yield
 
 
@@ -109,6 +113,46 @@ def test_draws_of_gains_and_hands_of_other_scenes(scene: str, tmp_path: Path) ->
         alone = [content(scene, point, tmp_path / "run") for point in points]
     with process_cache.keep_unpacked():
         assert [content(scene, point, tmp_path / "run") for point in points] == alone
+
+
+ZEROS = (
+    ("pendulum", "linkage.start.pivot={}", "0.0", "-0.0"),
+    ("closed-loop-ideal", AT, "0.0", "-0.0"),
+    ("closed-loop-ideal", AT, "1.0", "1"),
+    ("closed-loop-ideal", AT, "1.0", "true"),  # which is refused
+)
+
+
+@pytest.mark.parametrize(("scene", "option", "one", "other"), ZEROS)
+def test_points_that_are_equal_but_not_the_same(
+    scene: str, option: str, one: str, other: str, tmp_path: Path
+) -> None:
+    points = [("packaging=native", "duration=0.1", option.format(v)) for v in (one, other, one)]
+    with nothing_kept():
+        alone = [content(scene, point, tmp_path / "run") for point in points]
+    assert alone[0] != alone[1]
+    with process_cache.keep_unpacked():
+        assert [content(scene, point, tmp_path / "run") for point in points] == alone
+
+
+def test_contexts_that_overlap_end_with_the_last_one() -> None:
+    """As in threads, of which the one that began first also ends first."""
+    with nothing_kept():
+        first, second = process_cache.keep_unpacked(), process_cache.keep_unpacked()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert shelf.is_keeping()
+        second.__exit__(None, None, None)
+        assert not shelf.is_keeping()
+        assert not process_cache._staying
+
+
+def test_another_thread_does_not_prefer_compiled_blocks() -> None:
+    with prefer_compiled(), ThreadPoolExecutor(1) as pool:
+        assert fmu_files._prefers_compiled.get()
+        assert not pool.submit(fmu_files._prefers_compiled.get).result()
+    assert not fmu_files._prefers_compiled.get()
 
 
 def test_what_is_kept_is_used_and_bounded(tmp_path: Path) -> None:
