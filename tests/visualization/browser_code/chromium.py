@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -96,3 +98,55 @@ def differ_without_topology(page: Page) -> None:
         "[data-chart='energy generated since the start'] figcaption b"
     ).first.inner_text()
     assert " | " in said
+
+
+COLLECT = """() => {
+  view.seen = [];
+  setInterval(() => {
+    const { t, handle: [x, y] } = view.frame ?? { t: -1, handle: [0, 0] };
+    if (t > (view.seen.at(-1)?.[0] ?? 0)) view.seen.push([t, x, y]);
+    else if (t < view.seen.at(-1)?.[0]) view.seen = [];
+  }, 4);
+}"""
+"""What the page has of the handle, frame by frame."""
+
+
+def has_its_first_minute(page: Page) -> None:
+    """Pulled at 60 Hz the linkage is steady, at 11 Hz it vibrates, and with a softer coupling at
+    that rate it does not: as the page says, and as the frames have it."""
+    page.until("!document.getElementById('first').hidden")
+    page.page.evaluate(COLLECT)
+
+    def said(what: str) -> None:
+        page.until(f"document.getElementById('said').textContent.includes('{what}')")
+
+    page.page.fill("#slow", "21")
+    page.until("document.getElementById('hertz').textContent === '60 Hz'")
+    page.pull(-0.02, 0.0)
+    page.run_for(2.0)
+    said("is steady")
+    assert page.get("document.getElementById('remedy').ariaPressed") == "false"
+    assert shaken(page) < 0.3
+    page.page.fill("#slow", "1")
+    page.until("document.getElementById('hertz').textContent === '11 Hz'")
+    said("vibrates")
+    assert shaken(page) > 0.5
+    assert page.get("document.getElementById('felt').className") == "light red"
+    page.page.evaluate("() => document.getElementById('remedy').click()")  # the mouse pulls on
+    page.until("document.getElementById('remedy').ariaPressed === 'true'")
+    page.run_for(2.5)
+    said("is steady")
+    assert shaken(page) < 0.3
+    assert page.get("document.getElementById('hertz').textContent") == "11 Hz"
+    page.page.mouse.up()
+    page.page.click("#restore")
+    page.until("document.getElementById('remedy').ariaPressed === 'false'")
+
+
+def shaken(page: Page) -> float:
+    """The RMS (mm) of the handle's motion above 3 Hz in the last second, by the page's frames."""
+    t, *place = np.array(page.get("view.seen")).T
+    even = np.arange(max(t[0], t[-1] - 2.0), t[-1], 0.01)
+    fast = butter(4, 3.0, "high", fs=100, output="sos")
+    moved = np.array([sosfiltfilt(fast, np.interp(even, t, each)) for each in place])
+    return 1e3 * float(np.sqrt((moved[:, -100:] ** 2).sum(axis=0).mean()))
