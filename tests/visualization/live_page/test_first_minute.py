@@ -21,6 +21,7 @@ from tests.visualization.browser_code.served_page import Served
 from tests.visualization.live_page.viewed_controls import begun, judged, set_by
 
 SERVED = "closed-loop-direct"
+OFFERED = "answer = firstMinute(given);"
 Begun = tuple[list[dict[str, Any]], dict[str, list[float]]]
 
 
@@ -52,7 +53,7 @@ def test_the_rates_are_from_60_to_10_hz_and_the_remedy_changes_what_it_says(
 @pytest.mark.parametrize("name", ["closed-loop-ideal", "enclosure", "sampled-spring"])
 def test_a_mechanism_at_the_haptic_rate_has_none(name: str) -> None:
     controls = begun(name)[0]
-    assert javascript("first_minute.js", "answer = firstMinute(given);", controls) is None
+    assert javascript("first_minute.js", OFFERED, controls) is None
 
 
 def test_slow_it_vibrates_in_the_mouse_and_mended_it_is_stable_in_all_hands(

@@ -1,4 +1,4 @@
-"""The controls of a scene as its page offers them, and how stable the scene is with some of them set."""
+"""The controls of a scene as its page offers them, and how stable it is with some of them set."""
 
 from __future__ import annotations
 
