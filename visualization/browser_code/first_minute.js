@@ -18,10 +18,14 @@ export function firstMinute(controls) {
   return { rate, rates, softer: scaled(controls, SOFTER), about };
 }
 
-// What is said of the handle, and of why: of its vibration, and of the control of the rate.
-export const felt = (vibration) => (vibration
-  ? `The handle vibrates: ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`
-  : "The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.");
+// What is said of the handle's vibration in a hand of some force.
+export function felt(vibration, force) {
+  if (vibration) return `The handle vibrates: ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`;
+  if (!force.some(Boolean)) return "No hand pulls: press on the picture and drag.";
+  return "The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.";
+}
+
+// Why, of the control of the rate.
 export const why = ({ value, max }) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
 the force on the hand ${Math.round(max)} times a second. In between, that force rests on where the linkage was: late as it is, it can feed a swing that it should damp.`;
 
@@ -70,12 +74,12 @@ export class FirstMinute {
   }
 
   // A frame of the run that is shown, at its time (s).
-  add(t, { handle }) {
+  add(t, { handle, F_hand }) {
     if (!this.offered) return;
     this.swings.add(t, handle);
-    const { vibration } = this.swings, words = felt(vibration);
+    const { vibration } = this.swings, words = felt(vibration, F_hand);
     if (words === this.felt.textContent) return;
     this.felt.textContent = words;
-    this.light.className = `light ${vibration ? "red" : "green"}`;
+    this.light.className = `light ${vibration ? "red" : F_hand.some(Boolean) ? "green" : ""}`;
   }
 }

@@ -126,6 +126,15 @@ def test_a_vibration_is_three_swings_of_a_millimetre_in_the_last_second(
         assert 0.8 * mm < found["mm"] <= mm
 
 
+def test_it_is_steady_only_in_a_hand() -> None:
+    """Whom nobody pulls, nobody feels; and what vibrates by itself does so."""
+    told = "answer = [null, { times: 5, mm: 6 }].flatMap((v) => given.map((f) => felt(v, f)));"
+    said = javascript("first_minute.js", told, [[0, 0, 0], [0, -0.1, 0]])
+    assert [each.split(":")[0] for each in said] == [
+        "No hand pulls", "The handle is steady", *2 * ["The handle vibrates"]
+    ]  # fmt: skip
+
+
 def test_a_run_that_begins_anew_has_not_swung() -> None:
     again = SWUNG + "swings.add(0, [0, 0]); answer = swings.vibration;"
     assert javascript("swings.js", again, {"hertz": 5, "mm": 6, "drift": 0}) is None
