@@ -35,8 +35,8 @@ OF_FILE: dict[str, tuple[str, tuple[int, int], tuple[float, float]]] = {
     "first_minute": (DIRECT, (1280, 800), (-0.02, 0.0)),
     "first_minute_narrow": (DIRECT, (400, 800), (-0.02, 0.0)),
 }  # fmt: skip
-"""By file, the link to the page in one file, which `hapticlink view SCENE --standalone` has written,
-the window (px), and where the mouse goes from the operational point (m)."""
+"""By file, the link to a page in one file, of `hapticlink view SCENE --standalone`, the window
+(px), and where the mouse goes from the operational point (m)."""
 
 
 def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") -> None:
