@@ -18,11 +18,14 @@ export function firstMinute(controls) {
   return { rate, rates, softer: scaled(controls, SOFTER), about };
 }
 
-// What is said of the handle's vibration in a hand of some force.
-export function felt(vibration, force) {
-  if (vibration) return `The handle vibrates: ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`;
-  if (!force.some(Boolean)) return "No hand pulls: press on the picture and drag.";
-  return "The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.";
+// What is said of the handle, and in which light: of its vibration, the hand's force, whether it was watched for long
+// enough, and whether the run has ended.
+export function felt(vibration, force, watched, ended) {
+  if (ended) return ["The run has ended: the line above the picture says why.", "red"];
+  if (vibration) return [`The handle vibrates: ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`, "red"];
+  if (!force.some(Boolean)) return ["No hand pulls: press on the picture and drag.", ""];
+  if (!watched) return ["A second is watched first.", ""];
+  return ["The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.", "green"];
 }
 
 // Why, of the control of the rate.
@@ -73,13 +76,12 @@ export class FirstMinute {
     this.why.textContent = why(now);
   }
 
-  // A frame of the run that is shown, at its time (s).
-  add(t, { handle, F_hand }) {
+  // A frame of the run that is shown, at its time (s), and whether that has ended.
+  add(t, { handle, F_hand }, ended) {
     if (!this.offered) return;
     this.swings.add(t, handle);
-    const { vibration } = this.swings, words = felt(vibration, F_hand);
-    if (words === this.felt.textContent) return;
-    this.felt.textContent = words;
-    this.light.className = `light ${vibration ? "red" : F_hand.some(Boolean) ? "green" : ""}`;
+    const { vibration, watched } = this.swings, [words, light] = felt(vibration, F_hand, watched, ended);
+    if (words !== this.felt.textContent) this.felt.textContent = words;
+    this.light.className = `light ${light}`;
   }
 }

@@ -75,6 +75,7 @@ const HANDLERS = {
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
+    if (view.frame) watch();
     if (message.ended) show({ energy: "red", levels: ["the run has ended"] }); // one that diverged at once never turned red
     $("record").textContent = message.recording ? "End recording" : "Record";
     note();
@@ -84,7 +85,7 @@ const HANDLERS = {
     view.frame = message;
     view.frames += 1;
     ending.add(message);
-    first_minute.add(message.t, (acts_on_b && message.b) || message);
+    watch();
     if (first) note();
     if (untouched) $("door").hidden = false;
     if (first && !message.directions) $("resists").hidden = true;
@@ -119,6 +120,9 @@ function show(change) {
   $("verdict").hidden = !map;
   $("verdict").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${map?.why ?? ""}`;
 }
+
+// What is seen of the handle of the run on which the controls act.
+function watch() { first_minute.add(view.frame.t, (acts_on_b && view.frame.b) || view.frame, view.state.ended); }
 
 // For how long something has been waited for.
 function waited(since) {

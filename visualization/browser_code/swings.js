@@ -27,10 +27,16 @@ export class Swings {
 
   // A run that begins anew is another one.
   add(t, point) {
-    if (!this.axes.length || t < this.t) this.axes = [0, 1].map((i) => new Axis(point[i]));
+    if (!this.axes.length || t < this.t) {
+      this.axes = [0, 1].map((i) => new Axis(point[i]));
+      this.since = t;
+    }
     this.t = t;
     this.axes.forEach((axis, i) => axis.add(t, point[i]));
   }
+
+  // Whether it has been seen for that long.
+  get watched() { return this.t - this.since >= WINDOW; }
 
   // How many `times` to and fro along that of x and y which has more, and by how much on average (`mm`); null where too few.
   get vibration() {

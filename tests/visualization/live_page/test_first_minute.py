@@ -127,12 +127,19 @@ def test_a_vibration_is_three_swings_of_a_millimetre_in_the_last_second(
 
 
 def test_it_is_steady_only_in_a_hand() -> None:
-    """Whom nobody pulls, nobody feels; and what vibrates by itself does so."""
-    told = "answer = [null, { times: 5, mm: 6 }].flatMap((v) => given.map((f) => felt(v, f)));"
-    said = javascript("first_minute.js", told, [[0, 0, 0], [0, -0.1, 0]])
-    assert [each.split(":")[0] for each in said] == [
-        "No hand pulls", "The handle is steady", *2 * ["The handle vibrates"]
-    ]  # fmt: skip
+    """That was watched for a second, of a run that goes on; and what vibrates by itself does so."""
+    told = "answer = given.map((each) => felt(...each));"
+    swings, nobody, hand = {"times": 5, "mm": 6}, [0, 0, 0], [0, -0.1, 0]
+    said = {
+        "No hand pulls": [None, nobody, True, None],
+        "A second is watched first.": [None, hand, False, None],
+        "The handle is steady": [None, hand, True, None],
+        "The handle vibrates": [swings, nobody, False, None],
+        "The run has ended": [None, hand, True, "the run has diverged"],
+    }
+    found = javascript("first_minute.js", told, [*said.values()])
+    assert [words.split(":")[0] for words, _ in found] == [*said]
+    assert [light for _, light in found] == ["", "", "green", "red", "red"]
 
 
 def test_a_run_that_begins_anew_has_not_swung() -> None:
