@@ -130,7 +130,7 @@ def has_its_first_minute(page: Page) -> None:
     rate = "document.getElementById('hertz').textContent === "
     steady = "view.seen.length && view.seen.at(-1)[0] - view.seen[0][0] > 3"
     steady += " && document.getElementById('said').textContent.includes('is steady')"
-    page.page.fill("#slow", "21")
+    page.page.fill("#slow", "22")
     page.until(f"{rate}'60 Hz'")
     page.pull(0.006, 0.012)
     page.run_for(2.0)
