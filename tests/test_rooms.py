@@ -39,7 +39,7 @@ CODE_LINES = {
     "analysis": 7082,
     "visualization": 3284,
     "api": 430,
-    "commands": 1390,
+    "commands": 1391,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

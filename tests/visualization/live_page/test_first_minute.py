@@ -163,9 +163,9 @@ def test_more_is_folded_until_it_is_asked_for_by_a_click_or_a_link(
 ) -> None:
     page = window(served.url)
     page.until("!document.getElementById('first').hidden")
-    assert not page.page.is_visible("[data-control='jitter']")
+    assert not page.page.is_visible("[data-control='controller.topology']")
     page.page.click("#more summary")
-    assert page.page.is_visible("[data-control='jitter']")
+    assert page.page.is_visible("[data-control='controller.topology']")
     for link, opened in (
         ("graphics.rate=20", False),
         ("graphics.rate=5", True),
