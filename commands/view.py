@@ -27,6 +27,8 @@ PORT = 8512
 """Of a page, where no other is asked for."""
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 """Variables of the environment that a screen sets, where it is neither Windows nor macOS."""
+FIRST = "closed-loop-direct"
+"""The scene that is shown where none is named: in it the rate is felt."""
 WAIT = 0.1
 """Time (s) between two looks for Ctrl-C."""
 Host = Annotated[
@@ -64,7 +66,7 @@ def view(
             help="Name of a shipped scene, path of a scene file or SSP, or folder of a run.",
             completer=completion.scenes,
         ),
-    ],
+    ] = FIRST,
     second: Second = None,
     /,
     *,
@@ -83,6 +85,7 @@ def view(
 
     For example:
 
+        hapticlink view
         hapticlink view closed-loop
         hapticlink view closed-loop --standalone demo.html
         hapticlink view runs/closed-loop

@@ -27,10 +27,16 @@ SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...]]] =
 OTHERS = {"two_users": ("left", ((0.012, -0.012),))}
 """By file, the point of the user who drags in a second window, and that one's path (m)."""
 
-ONE_FILE = "closed_loop.html"
-"""`hapticlink view closed-loop --standalone results/view/closed_loop.html` writes it."""
-OF_FILE = {"a_and_b": ("graphics.rate=10&b.controller.topology=false", (1360, 820))}
-"""By file, the settings in the link to the page in one file, and the window (px)."""
+DIRECT = "closed_loop_direct.html#graphics.rate=12"
+OF_FILE: dict[str, tuple[str, tuple[int, int], tuple[float, float]]] = {
+    "a_and_b": (
+        "closed_loop.html#graphics.rate=10&b.controller.topology=false", (1360, 820), (0.03, 0.03)
+    ),
+    "first_minute": (DIRECT, (1280, 800), (0.006, 0.012)),
+    "first_minute_narrow": (DIRECT, (400, 800), (0.006, 0.012)),
+}  # fmt: skip
+"""By file, the link to a page in one file, of `hapticlink view SCENE --standalone`, the window
+(px), and where the mouse goes from the operational point (m)."""
 
 
 def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") -> None:
@@ -52,11 +58,14 @@ def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") ->
 
 def of_file(browser: Any, name: str) -> None:
     """The page in one file, dragged."""
-    settings, (width, height) = OF_FILE[name]
+    link, (width, height), path = OF_FILE[name]
     page = browser.new_page(viewport={"width": width, "height": height})
-    page.goto(f"file://{OUT / ONE_FILE}#{settings}")
-    page.wait_for_function("() => view.frame?.b")
-    dragged(page, ((0.03, 0.03),))
+    page.goto(f"file://{OUT / link}")
+    if "&b." in link:
+        page.wait_for_function("() => view.frame?.b")
+    dragged(page, (path,))
+    if name.startswith("first_minute"):  # in this very picture
+        page.wait_for_function("() => document.getElementById('said').innerText.includes('vibrat')")
     page.screenshot(path=OUT / f"{name}.png")
     page.close()
 

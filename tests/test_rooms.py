@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5893,
+    "components": 5908,
     "fmus": 2816,
-    "orchestrator": 12996,
+    "orchestrator": 13009,
     "programs": 1021,
     "analysis": 7091,
     "visualization": 3329,
     "api": 435,
-    "commands": 1396,
+    "commands": 1397,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -14,7 +14,7 @@ const NAMES = {
 // Units of gains per inertia, in the words of what they render; those of their FMUs are 1/s2 and 1/s.
 const UNITS = { k_j: "N/m per kg", b_j: "N.s/m per kg" };
 // Rates (Hz) with a short common period with the haptic rate, for which stability is computed fast.
-const RATES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 25, 26, 28, 30, 32, 36, 40, 44, 48, 50, 56,
+export const RATES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 18, 20, 22, 24, 25, 26, 28, 30, 32, 36, 40, 44, 48, 50, 56,
   60, 64, 72, 75, 80, 90, 96, 100, 110, 120, 128, 144, 160, 180, 200];
 // A gain's name, and the user's where it is of a further one: hand_left.damping.
 const titled = (gain) => {

@@ -4,6 +4,7 @@ import { Charts } from "./charts.js";
 import { Controls } from "./controls.js";
 import { Ending } from "./ending.js";
 import { Energies, LIGHTS } from "./energies.js";
+import { FirstMinute } from "./first_minute.js";
 import { tags } from "./legend.js";
 import { addressOf, differing, messagesOf } from "./settings.js";
 import { loudness } from "./loudness.js";
@@ -24,6 +25,7 @@ const stage = new Stage($("scene"), $("legend"), (at, user, begins) => {
 const ending = new Ending($("ended"), () => act("reset"));
 const charts = new Charts($("charts"));
 const controls = new Controls($("controls"), (message) => { choose(null); change(message); });
+const first_minute = new FirstMinute($("first"), (message) => change(message));
 const view = { frame: null, levels: [], state: {}, frames: 0, refused: null, stage };
 window.view = view; // for tests and for the curious, in the browser's console
 let refusedUntil = 0, energies = [], sound = null;
@@ -64,6 +66,7 @@ const HANDLERS = {
     $("acts").hidden = !message.b;
     $("compare").ariaPressed = Boolean(message.b);
     controls.show(acting());
+    first_minute.show(acting());
     if (begins) follow();
     else note_address();
   },
@@ -72,6 +75,7 @@ const HANDLERS = {
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
+    if (view.frame) watch();
     if (message.ended) show({ energy: "red", levels: ["the run has ended"] }); // one that diverged at once never turned red
     $("record").textContent = message.recording ? "End recording" : "Record";
     note();
@@ -81,6 +85,7 @@ const HANDLERS = {
     view.frame = message;
     view.frames += 1;
     ending.add(message);
+    watch();
     if (first) note();
     if (untouched) $("door").hidden = false;
     if (first && !message.directions) $("resists").hidden = true;
@@ -116,6 +121,9 @@ function show(change) {
   $("verdict").title = `Small motions about the start pose, in a hand that holds the handle there (lifted map). ${map?.why ?? ""}`;
 }
 
+// What is seen of the handle of the run on which the controls act.
+function watch() { first_minute.add(view.frame.t, (acts_on_b && view.frame.b) || view.frame, view.state.ended); }
+
 // For how long something has been waited for.
 function waited(since) {
   const seconds = Math.floor((performance.now() - since) / 1e3);
@@ -143,9 +151,11 @@ function received(message) { HANDLERS[message.type]?.(message); }
 function lost(why) { $("note").textContent = why; }
 window.addEventListener("error", ({ message }) => lost(`This page has failed: ${message}`));
 
-// The presets of the scene, each a button that says what it changes.
+// What the scene shows first, before "More"; or its presets, each a button that says what it changes.
 function offer() {
-  const found = presets(start);
+  const is_first = first_minute.begin(start), found = is_first ? [] : presets(start);
+  $("more").open = !is_first;
+  $("more").querySelector("summary").hidden = !is_first;
   $("presets").hidden = !found.length;
   $("presets").replaceChildren(...found.map(({ name, about, messages }) => {
     const button = document.createElement("button"), small = document.createElement("small");
@@ -168,6 +178,7 @@ function restore() { choose(null); restored(acting(), start).forEach(change); }
 function follow() {
   const { "": a, "b.": b, why } = messagesOf(location.hash, start);
   for (const message of a) run.send(message);
+  if (b.length || !a.every((message) => first_minute.has(message))) $("more").open = true;
   if (b.length) {
     run.compare(true);
     for (const message of b) run.send({ ...message, b: true });
@@ -194,7 +205,14 @@ for (const what of ["step", "reset", "record"]) $(what).onclick = () => act(what
 $("restore").onclick = restore;
 $("compare").onclick = () => run.compare(!shown.b);
 $("acts").onclick = () => { acts_on_b = !acts_on_b; HANDLERS.controls(shown); };
-$("hear").onchange = () => sound.hear($("hear").value || null);
+$("hear").onchange = () => {
+  $("listen").ariaPressed = $("hear").value !== "";
+  sound.hear($("hear").value || null);
+};
+$("listen").onclick = () => {
+  $("hear").value = $("hear").value ? "" : "force";
+  $("hear").onchange();
+};
 document.addEventListener("pointerdown", () => ending.hide(), true);
 document.addEventListener("keydown", (event) => {
   if (!event.repeat) ending.hide();
@@ -235,5 +253,5 @@ function draw() {
 }
 // The run is in this file, as its program, or behind the server that the page is from.
 const run = ($("program") ? startWorker : connectToServer)({ received, opened: note, lost });
-$("hear").hidden = !run.listen;
+$("hear").hidden = $("listen").hidden = !run.listen;
 draw();

@@ -106,6 +106,8 @@ onmessage = ({ data: message }) => {
   const handler = HANDLERS[message.type];
   if (handler) { handler(message); return; }
   const is_hand = message.type === "hand", on = is_hand ? runs : [runs[message.b ? 1 : 0]];
-  try { for (const run of on) run?.apply(message); } catch (error) { postMessage({ type: "refused", why: error.message }); }
+  try { for (const run of on) run?.apply(message); } catch (error) {
+    if (!state.ended) postMessage({ type: "refused", why: error.message }); // the next run has what is set behind an end
+  }
   if (!is_hand && runs.length) tell();
 };

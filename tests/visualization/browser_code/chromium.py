@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -96,3 +98,62 @@ def differ_without_topology(page: Page) -> None:
         "[data-chart='energy generated since the start'] figcaption b"
     ).first.inner_text()
     assert " | " in said
+
+
+COLLECT = """() => {
+  view.seen = [];
+  setInterval(() => {
+    const { t, handle: [x, y] } = view.frame ?? { t: -1, handle: [0, 0] };
+    if (t > (view.seen.at(-1)?.[0] ?? 0)) view.seen.push([t, x, y]);
+    else if (t < view.seen.at(-1)?.[0]) view.seen = [];
+  }, 4);
+}"""
+"""What the page has of the handle, frame by frame."""
+
+
+VIBRATES = """() => {
+  const [, mm] = document.getElementById("said").textContent.match(/vibrates.* by (.+) mm/) ?? [];
+  if (!(mm >= 2)) return false;
+  view.vibrated = [...view.seen]; // before it grows further
+  document.getElementById("remedy").click();
+  return true;
+}"""
+"""Whether the page says so, of 2 mm or more; then the remedy is pressed, and the mouse pulls on."""
+
+
+def has_its_first_minute(page: Page) -> None:
+    """Pulled at 60 Hz the linkage is steady, at 11 Hz it vibrates, and with a softer coupling at
+    that rate it does not: as the page says, and as the frames have it."""
+    page.until("!document.getElementById('first').hidden")
+    page.page.evaluate(COLLECT)
+    pressed = "document.getElementById('remedy').ariaPressed === "
+    rate = "document.getElementById('hertz').textContent === "
+    steady = "view.seen.length && view.seen.at(-1)[0] - view.seen[0][0] > 3"
+    steady += " && document.getElementById('said').textContent.includes('is steady')"
+    page.page.fill("#slow", "22")
+    page.until(f"{rate}'60 Hz'")
+    page.pull(0.006, 0.012)
+    page.run_for(2.0)
+    page.until(steady)
+    assert page.get(f"{pressed}'false'")
+    assert shaken(page.get("view.seen")) < 0.2
+    page.page.fill("#slow", "1")
+    page.page.wait_for_function(VIBRATES, timeout=120_000)
+    assert shaken(page.get("view.vibrated")) > 0.4
+    page.until(f"{pressed}'true'")
+    page.get("view.seen = []")
+    page.until(steady)
+    assert shaken(page.get("view.seen")) < 0.2
+    assert page.get(f"{rate}'11 Hz'")
+    page.page.mouse.up()
+    page.page.click("#restore")
+    page.until(f"{pressed}'false'")
+
+
+def shaken(seen: list[list[float]]) -> float:
+    """The RMS (mm) of a motion above 3 Hz in the last second of times (s) and places (m)."""
+    t, *place = np.array(seen).T
+    even = np.arange(max(t[0], t[-1] - 2.0), t[-1], 0.01)
+    fast = butter(4, 3.0, "high", fs=100, output="sos")
+    moved = np.array([sosfiltfilt(fast, np.interp(even, t, each)) for each in place])
+    return 1e3 * float(np.sqrt((moved[:, -100:] ** 2).sum(axis=0).mean()))

@@ -15,7 +15,12 @@ from hapticlink.orchestrator.open_scene import load
 from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 from hapticlink.visualization.standalone import page as standalone_page
 from tests.shared_fixtures import status
-from tests.visualization.browser_code.chromium import AT, Page, differ_without_topology
+from tests.visualization.browser_code.chromium import (
+    AT,
+    Page,
+    differ_without_topology,
+    has_its_first_minute,
+)
 from tests.visualization.browser_code.javascript import NODE
 from tests.visualization.live_page.test_controls import POINTS
 
@@ -182,6 +187,21 @@ def test_a_page_is_compiled_once_until_its_scene_changes(
         compiled.append("page")
     assert compiled == ["wasm32-wasi", "page", "page", "wasm32-wasi", "page"]
     assert pages[0] == pages[1] != pages[2]
+
+
+def test_the_first_minute_of_a_mechanism_at_the_graphics_rate(
+    window: Window, tmp_path: Path
+) -> None:
+    """As served; and it is heard from there, too."""
+    file = tmp_path / "direct.html"
+    assert status("view", "--standalone", file) == 0  # the scene that needs no name
+    page = window(f"file://{file}")
+    has_its_first_minute(page)
+    page.page.click("#listen")
+    page.until("view.sound.context?.state === 'running'")
+    assert page.get("document.getElementById('hear').value") == "force"
+    page.page.click("#listen")
+    page.until("!view.sound.context")
 
 
 LISTEN = """(() => {

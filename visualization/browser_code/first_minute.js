@@ -1,0 +1,87 @@
+// What a scene shows first whose mechanism runs at the graphics rate: that rate, what it does to the handle, and a remedy.
+import { RATES } from "./controls.js";
+import { scaled } from "./presets.js";
+import { set } from "./settings.js";
+import { Swings } from "./swings.js";
+
+const SLOWEST = 10, FASTEST = 60; // Hz; from 12 Hz down the mouse's hand sees closed-loop-direct vibrate
+// Factors on the coupling, the same damping ratio but for rounding, with which all hands are stable at all these rates.
+const SOFTER = { K_pc: 0.1, B_pc: 0.3 };
+
+// The control of the rate, the rates (Hz) to choose from, and the messages that make the coupling softer (none where it
+// has no gains that the page may change) with what they are `about`; null for a scene whose mechanism does not run at the graphics rate.
+export function firstMinute(controls) {
+  const rate = controls.find(({ key }) => key === "graphics.rate");
+  if (!rate || !controls.some(({ key }) => /\.[xv] -> /.test(key))) return null;
+  const rates = RATES.filter((hertz) => hertz >= SLOWEST && hertz <= Math.min(FASTEST, rate.max));
+  const about = `stiffness ${SOFTER.K_pc} times the scene's, damping ${SOFTER.B_pc} times: the handle follows less closely`;
+  return { rate, rates, softer: scaled(controls, SOFTER), about };
+}
+
+// What is said of the handle, and in which light: of its vibration, the hand's force, whether it was watched for long
+// enough, and whether the run has ended.
+export function felt(vibration, force, watched, ended) {
+  if (ended) return ["The run has ended: the line above the picture says why.", "red"];
+  if (vibration) return [`The handle vibrates: ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`, "red"];
+  if (!force.some(Boolean)) return ["No hand pulls: press on the picture and drag.", ""];
+  if (!watched) return ["A second is watched first.", ""];
+  return ["The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.", "green"];
+}
+
+// Why, of the control of the rate.
+export const why = ({ value, max }) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
+the force on the hand ${Math.round(max)} times a second. In between, that force rests on where the linkage was: late as it is, it can feed a swing that it should damp.`;
+
+export class FirstMinute {
+  // `send` is given what is changed.
+  constructor(host, send) {
+    this.host = host;
+    this.send = send;
+    this.swings = new Swings();
+    const $ = (id) => host.querySelector(`#${id}`);
+    [this.slider, this.hertz, this.light, this.felt, this.remedy, this.why] = ["slow", "hertz", "felt", "said", "remedy", "why"].map($);
+  }
+
+  // Whether the scene is one that shows it.
+  begin(controls) {
+    this.offered = firstMinute(controls);
+    this.host.hidden = !this.offered;
+    if (!this.offered) return false;
+    const { rate, rates, softer, about } = this.offered;
+    Object.assign(this.slider, { min: 0, max: rates.length - 1, step: 1 });
+    this.slider.oninput = () => this.send(set(rate.key, rates[this.slider.value]));
+    this.remedy.hidden = !softer.length;
+    this.remedy.querySelector("small").textContent = about;
+    this.remedy.onclick = () => {
+      const pressed = this.remedy.ariaPressed === "true";
+      for (const { key, value } of softer) this.send(set(key, pressed ? 1 : value));
+    };
+    return true;
+  }
+
+  // Whether it shows what a setting changes.
+  has({ key, value }) {
+    if (!this.offered) return false;
+    const { rate, rates, softer } = this.offered;
+    return key === rate.key ? value >= rates[0] && value <= rates.at(-1) : softer.some((each) => each.key === key && each.value === value);
+  }
+
+  show(controls) {
+    if (!this.offered) return;
+    const { rate, rates, softer } = this.offered, of = new Map(controls.map((control) => [control.key, control]));
+    const now = of.get(rate.key), place = rates.findLastIndex((hertz) => hertz <= now.value);
+    if (!this.slider.matches(":active")) this.slider.value = Math.max(place, 0);
+    this.hertz.textContent = this.slider.ariaValueText = now.value ? `${+now.value.toPrecision(3)} Hz` : "varying";
+    this.remedy.ariaPressed = softer.every(({ key, value }) => of.get(key)?.value === value);
+    this.why.textContent = why(now);
+  }
+
+  // A frame of the run that is shown, at its time (s), and whether that has ended.
+  add(t, { handle, F_hand }, ended) {
+    if (!this.offered) return;
+    this.swings.add(t, handle);
+    const { vibration, watched } = this.swings, [words, light] = felt(vibration, F_hand, watched, ended);
+    if (words !== this.felt.textContent) this.felt.textContent = words;
+    this.light.className = `light ${light}`;
+  }
+}
