@@ -14,6 +14,7 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.components.specs.hand import Hand
+from hapticlink.orchestrator.scene.overrides import as_command_line
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ class Stability:
                 f"rendering small motions grow at {self.margin.alone:.3g} 1/s"
             )
         for remedy in self.remedies:
-            options = " ".join(f"--set '{option}'" for option in remedy.options)
+            options = " ".join(map(as_command_line, remedy.options))
             how = f"decays at {'' if remedy.stable else 'only '}{-remedy.growth:.2g} 1/s"
             if math.isinf(remedy.growth):
                 how = "nothing grows by more than a drift"

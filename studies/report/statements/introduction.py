@@ -63,7 +63,7 @@ def _abstract(runs: Runs) -> Iterator[Statement]:
     )
     ranks = []
     for link in LINKS:
-        option = f"linkage.operational_point={{body = 'link{link}', at = [0.01, 0.0]}}"
+        option = f'linkage.operational_point={{body="link{link}", at=[0.01, 0.0]}}'
         run = runs("five-bar", "duration=0.1", "mechanism.directions=true", option)
         ranks.append(3 - int(run.haptics["virtual_mechanism.n_constraints"][0]))
     yield compare(
