@@ -36,7 +36,7 @@ CODE_LINES = {
     "fmus": 2816,
     "orchestrator": 12996,
     "programs": 1021,
-    "analysis": 7082,
+    "analysis": 7081,
     "visualization": 3284,
     "api": 430,
     "commands": 1390,
