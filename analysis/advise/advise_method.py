@@ -34,6 +34,7 @@ from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.scene.overrides import as_command_line
 from hapticlink.orchestrator.scene.scene import Scene
 
 ALIKE = 1.1
@@ -115,7 +116,7 @@ class Advice:
                 f"{short(min(own))} to {short(max(own))} mm"
             )
         yield f"take {self.taken.line}"
-        yield from (f"  --set '{option}'" for option in self.taken.method.options)
+        yield from (f"  {as_command_line(option)}" for option in self.taken.method.options)
         for name, found in (("within the spread", self.ties), ("others", self.others)):
             if found:
                 yield f"{name}:"

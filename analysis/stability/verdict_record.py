@@ -15,7 +15,11 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.components.specs.hand import Hand
+<<<<<<< HEAD
 from hapticlink.orchestrator.results.html_table import html_table
+=======
+from hapticlink.orchestrator.scene.overrides import as_command_line
+>>>>>>> w-reader
 
 
 @dataclass(frozen=True)
@@ -171,7 +175,7 @@ class Stability:
                 f"rendering small motions grow at {self.margin.alone:.3g} 1/s"
             )
         for remedy in self.remedies:
-            options = " ".join(f"--set '{option}'" for option in remedy.options)
+            options = " ".join(map(as_command_line, remedy.options))
             how = f"decays at {'' if remedy.stable else 'only '}{-remedy.growth:.2g} 1/s"
             if math.isinf(remedy.growth):
                 how = "nothing grows by more than a drift"

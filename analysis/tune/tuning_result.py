@@ -125,5 +125,4 @@ class Tuned:
                 f"{gains} gains: along the run, {far}, "
                 f"at most {1e3 * run['energy_peak']:.3g} mJ generated at the user's port"
             )
-        for option in overrides.write_options(self.gains):
-            yield f"--set '{option}'" if "[" in option else f"--set {option}"
+        yield from map(overrides.as_command_line, overrides.write_options(self.gains))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from pathlib import PurePath
@@ -85,15 +86,15 @@ def parse(option: str) -> tuple[tuple[str, ...], Any]:
 
 
 def as_command_line(option: str) -> str:
-    """The option as it stands on a command line; `--swap` for an FMU that replaces a block."""
+    """The option as it is pasted into a shell; `--swap` for an FMU that replaces a block."""
     try:
         names, value = parse(option)
     except InputFault:
         names, value = (), None
     swaps = (["replaces", "path"], ["replaces", "engine"])
     if names == ("fmu", "+") and isinstance(value, dict) and [*value] in swaps:
-        return f"--swap {'='.join(map(str, value.values()))}"
-    return f"--set {option}"
+        return f"--swap {shlex.quote('='.join(map(str, value.values())))}"
+    return f"--set {shlex.quote(option)}"
 
 
 def _key(option: str) -> tuple[tuple[str, ...], str, str]:

@@ -177,6 +177,18 @@ def acceleration_error(results: Results) -> float:
     return float(np.abs(device - mechanism).max() / np.abs(mechanism).max())
 
 
+def resisted_acceleration(results: Results, length_scale: float) -> tuple[float, float]:
+    """RMS of the mechanism's acceleration a_bias + Lambda^-1 (F_h - F_drift) along the direction
+    that it resists always, and of the whole (m/s2, rotation times the length scale)."""
+    haptics, scale = results.haptics, np.array((1, 1, length_scale))
+    mobility = haptics["virtual_mechanism.Lambda_inv"] * np.outer(scale, scale)
+    wrench = (haptics["hand.F"] - haptics["controller.F_drift"]) / scale
+    whole = haptics["virtual_mechanism.a_bias"] * scale
+    whole = whole + np.einsum("kij,kj->ki", mobility, wrench)
+    along = np.einsum("ki,ki->k", np.linalg.eigh(mobility)[1][:, :, 0], whole)
+    return float(rms(along)), float(rms(np.linalg.norm(whole, axis=1)))
+
+
 def free_work(results: Results, length_scale: float) -> tuple[float, float]:
     """Share of F_T that acts on what is free, |(1 - P_c) S^-1 F_T| / |S^-1 F_T|, with the P_c of
     the mechanism at that instant (F_T was made with that of the graphics frames): the median and

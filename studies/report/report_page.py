@@ -69,10 +69,7 @@ class Runs:
 
 def command(scene: str, *options: str) -> str:
     """The command line of a run."""
-    quoted = (as_command_line(option) for option in options)
-    return " ".join(
-        ["hapticlink run", scene, *(f"--set '{o[6:]}'" if " " in o[6:] else o for o in quoted)]
-    )
+    return " ".join(["hapticlink run", scene, *map(as_command_line, options)])
 
 
 def premises(name: str, results: Results) -> str:

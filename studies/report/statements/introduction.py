@@ -22,7 +22,7 @@ from studies.report.statements.statement import (
     misprinted,
     tested,
 )
-from studies.report.systems import DIRECTIONS, OFF, ON, STATED_6
+from studies.report.systems import DIRECTIONS, OFF, ON, STATED_6, VARYING_6
 
 LINKS = range(1, 5)
 POLES = "components/device/test_discretisation.py::test_poles_go_where_the_map_says"
@@ -56,22 +56,23 @@ def _abstract(runs: Runs) -> Iterator[Statement]:
     null = np.linalg.eigvalsh(found.Lambda_inv)
     yield compare(
         "abstract",
-        "and the directions of motion that the virtual joints resist",
+        "a technique gives the directions of motion at the hand that the virtual joints resist",
         abs(null[0]) < 1e-9 * null[-1],
         f"eigenvalues of Lambda^-1: {null[0]:.0e}, {null[1]:.3g}, {null[2]:.4g}: one direction",
         "pytest tests/components/dynamics/test_constrained_directions.py",
     )
-    ranks = []
-    for link in LINKS:
-        option = f"linkage.operational_point={{body = 'link{link}', at = [0.01, 0.0]}}"
-        run = runs("five-bar", "duration=0.1", "mechanism.directions=true", option)
-        ranks.append(3 - int(run.haptics["virtual_mechanism.n_constraints"][0]))
+    points = (f'linkage.operational_point={{body="link{i}", at=[0.01, 0.0]}}' for i in LINKS)
+    held = [("duration=0.1", DIRECTIONS, point) for point in points]
+    ranks = [
+        3 - int(runs("five-bar", *options).haptics["virtual_mechanism.n_constraints"][0])
+        for options in held
+    ]
     yield compare(
         "abstract; 1.4; B.1",
         "users can operate the mechanism from any link that they choose",
         min(ranks) >= 1,
         f"held at link 1, 2, 3, 4 the hand has {', '.join(map(str, ranks))} free directions",
-        command("five-bar", "duration=0.1", "mechanism.directions=true", option),
+        "; ".join(command("five-bar", *options) for options in held),
     )
     on, off = (tracking(STATED_6.run(runs, way))[1].max() for way in (ON, OFF))
     yield compare(
@@ -81,7 +82,25 @@ def _abstract(runs: Runs) -> Iterator[Statement]:
         on < off / 10,
         f"handle and operational point at most {on:.2g} mm apart, {off:.0f} mm without the "
         "topology controller",
-        STATED_6.command(ON),
+        f"{STATED_6.command(ON)}; {STATED_6.command(OFF)}",
+    )
+    yield leave(
+        "abstract; 1.4; B.1",
+        "virtual prototyping and training for surgery need linkages with closed loops in the hand",
+        "applications, outside of what is computed",
+    )
+    wired = STATED_6.run(runs, ON).record.connections
+    into, out = (
+        {c.split(" -> ")[end].partition(".")[2] for c in wired if _is_device(c, end)}
+        for end in (1, 0)
+    )
+    yield compare(
+        "1.1",
+        "a haptic device sends signals and receives them, unlike screens and speakers",
+        "F_motor" in into and "x" in out,
+        f"`haptic_device` gets {', '.join(sorted(into - {'x_start'}))}, "
+        f"gives {', '.join(sorted(out))}",
+        "hapticlink info closed-loop",
     )
     yield leave("1.1", "how the field of haptics came to be, and its three areas", "history")
     yield leave(
@@ -90,6 +109,10 @@ def _abstract(runs: Runs) -> Iterator[Statement]:
         "a drawing of others; this project has no audio",
     )
     yield leave("figure 1.2", "examples of haptic devices", "photographs")
+
+
+def _is_device(connection: str, end: int) -> bool:
+    return connection.split(" -> ")[end].startswith("haptic_device.")
 
 
 def _setup(runs: Runs) -> Iterator[Statement]:
@@ -103,7 +126,7 @@ def _setup(runs: Runs) -> Iterator[Statement]:
         f"{haptics['haptic_device.x_true'].shape[1]} coordinates of the handle, apparent inertia "
         f"{np.linalg.eigvalsh(haptics['haptic_device.M'][0])[0]:.2g} kg.m2 to "
         f"{np.linalg.eigvalsh(haptics['haptic_device.M'][0])[-1]:.2g} kg (dimensions assumed)",
-        "pytest tests/components/device/test_pantograph.py",
+        f"{STATED_6.command(ON)}; pytest tests/components/device/test_pantograph.py",
     )
     yield tested(
         "1.2",
@@ -144,7 +167,7 @@ def _setup(runs: Runs) -> Iterator[Statement]:
         "1.2",
         "the graphics run at 10 to 60 Hz; 1.3.4 says 10 to 50 Hz",
         "the two sections differ; figures are made at 30 Hz and at 10 to 50 Hz, tables at 10 to 60",
-        STATED_6.command(ON),
+        f"{STATED_6.command(ON)}; {VARYING_6.command(ON)}; hapticlink study",
     )
     yield leave(
         "1.3",
@@ -215,8 +238,8 @@ def _walls(runs: Runs) -> Iterator[Statement]:
         "an ideal spring is lossless",
         kept[-1] / kept[0] < 1.2,
         f"sampled at 4000 Hz the energy changes by {100 * (kept[-1] / kept[0] - 1):.2g} % in "
-        f"{fast['time'][-1]:g} s, at 20 Hz by {100 * (total[-1] / total[0] - 1):.3g} %",
-        command("sampled-spring", "haptics.rate=4000"),
+        f"{fast['time'][-1]:g} s, at 20 Hz by {100 * (total[-1] / total[0] - 1):.0f} %",
+        f"{command('sampled-spring', 'haptics.rate=4000')}; {shown}",
     )
     yield compare(
         "1.3.2; figure 1.5",
@@ -228,7 +251,7 @@ def _walls(runs: Runs) -> Iterator[Statement]:
     )
     yield compare(
         "1.3.2",
-        "it always does",
+        "a virtual spring behind a zero-order hold generates energy always",
         np.all(np.diff(total) >= -1e-9 * total[-1]),
         f"in each of {len(dx)} samples, by 1/2 K dx^2, at least {np.diff(total).min():.1e} J",
         shown,
@@ -251,7 +274,7 @@ def _walls(runs: Runs) -> Iterator[Statement]:
     )
     yield compare(
         "1.3.2",
-        "damping has to be large enough against oscillation",
+        "damping of a wall has to be large enough against oscillation",
         low < best,
         f"largest stable stiffness of a wall on {m} kg at 512 Hz: {low:.0f} N/m with B T/m = 0.02, "
         f"{best:.0f} with 0.83",
@@ -260,7 +283,7 @@ def _walls(runs: Runs) -> Iterator[Statement]:
     frequency = _frequency(m, T, 1.95 * m / T)
     yield compare(
         "1.3.2",
-        "too much of it makes oscillations of high frequency",
+        "too much damping of a wall makes oscillations of high frequency",
         high < best and frequency > 100,
         f"{high:.0f} N/m with B T/m = 1.95, where the mode that gets unstable has "
         f"{frequency:.0f} Hz",
@@ -275,6 +298,28 @@ def _walls(runs: Runs) -> Iterator[Statement]:
         f"damper of 2 N.s/m up to {passive[1]:.0f}",
         limit_test,
     )
+    lowest = lowest_generating(1 / T)
+    yield compare(
+        "1.3.2",
+        "a sampled damper produces energy usually under excitation of high frequency",
+        lowest > 100,
+        "moved as a sine, with the velocity from differences and the force held, it produces "
+        f"energy from {lowest:.0f} Hz up: above a quarter of the rate, 512 Hz",
+        "pytest tests/studies/report/test_statements.py::"
+        "test_a_sampled_damper_produces_energy_above_a_quarter_of_the_rate",
+    )
+
+
+def lowest_generating(rate: float) -> float:
+    """Lowest whole frequency (Hz) of a sine below half the rate (Hz) at which a damper produces
+    energy that takes its velocity from differences of samples and holds its force: the sum over
+    samples of F dx, here of unit damping and amplitude, over ten seconds."""
+    t = np.arange(int(10 * rate)) / rate
+    for frequency in range(1, int(rate / 2)):
+        dx = np.diff(np.sin(2 * np.pi * frequency * t + 0.3))
+        if np.sum(dx[:-1] * dx[1:]) < 0:
+            return float(frequency)
+    raise AssertionError("a held damper produces energy at no frequency")
 
 
 def _frequency(m: float, T: float, B: float) -> float:
@@ -293,7 +338,7 @@ def _systems_and_rates(runs: Runs) -> Iterator[Statement]:
         "linkages of present setups are open, in independent coordinates, without constraints",
         not serial.loop,
         f"scene `serial`: {len(serial.joint)} joints, {len(serial.loop)} closures",
-        "hapticlink info serial",
+        command("serial", "duration=0.1"),
     )
     yield compare(
         "1.3.3",

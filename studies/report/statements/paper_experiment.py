@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,12 +13,13 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.results.read_results import Results
 from studies.report import appendix_a, measures
 from studies.report.chapter6 import describe_end
-from studies.report.report_page import Runs
+from studies.report.report_page import Runs, command
 from studies.report.statements.experiment import both_ways, push
 from studies.report.statements.statement import Statement, compare, leave, misprinted
-from studies.report.systems import IDEAL_B6, OF_SECTION_B6, OFF, ON, STATED_B6, VARYING_B6
+from studies.report.systems import IDEAL_B6, OF_SECTION_B6, OFF, ON, STATED_B6, VARYING_B6, System
 
 INFO = "hapticlink info closed-loop-b1"
+SETTINGS = command("closed-loop-b1", "duration=0.1")
 LENGTHS = (0.045, 0.045, 0.021, 0.060)
 TABLE_B_1 = {"mass": (1.0, 1.0, 1.0, 0.5), "inertia": (0.0021, 0.0021, 0.0021, 0.00105)}
 BOTH = (STATED_B6, IDEAL_B6)
@@ -32,8 +33,8 @@ def statements(runs: Runs) -> Iterator[Statement]:
     yield from _conclusions(runs)
 
 
-def _commands(way: str) -> str:
-    return "; ".join(system.command(way) for system in BOTH)
+def _commands(way: str, systems: Sequence[System] = BOTH) -> str:
+    return "; ".join(system.command(way) for system in systems)
 
 
 def _setting(runs: Runs) -> Iterator[Statement]:
@@ -42,7 +43,7 @@ def _setting(runs: Runs) -> Iterator[Statement]:
     assert linkage
     start = on.haptics["virtual_mechanism.q"][0]
     text = "F_h = (-0.5 N, 0, -0.0025 N.m) on the centre of mass of link 2"
-    yield push("B.6", text, on, INFO)
+    yield push("B.6", text, on, SETTINGS)
     yield leave(
         "B.6, note 1",
         "a constant wrench is the worst user for stability",
@@ -63,8 +64,8 @@ def _setting(runs: Runs) -> Iterator[Statement]:
         "B.6",
         "k_j = 200 N/m/kg, b_j = 50 N/(m/s)/kg",
         (law.stiffness, law.damping) == (200, 50),
-        f"{law.stiffness:g}, {law.damping:g}",
-        INFO,
+        f"{law.stiffness:g}, {law.damping:g}, the defaults",
+        "hapticlink schema --markdown",
     )
     for text, printed, found, remark in (
         ("K_pc = (100, 100 N/m, 0.5 N.m/rad)", (100, 100, 0.5), coupling.stiffness, ""),
@@ -83,7 +84,7 @@ def _setting(runs: Runs) -> Iterator[Statement]:
         ),
     ):
         own = tuple(found)
-        yield compare("B.6", text, own == printed, f"{own}{remark}", INFO)
+        yield compare("B.6", text, own == printed, f"{own}{remark}", SETTINGS)
     contact = open_scene.load("enclosure").contacts
     assert contact
     stated = contact.stiffness, contact.damping
@@ -92,7 +93,7 @@ def _setting(runs: Runs) -> Iterator[Statement]:
         "k_contact = 15000 Nm, b_contact = 300 N.s/m",
         f"N/m: a stiffness of points; scene `enclosure` has {stated[0]:g} N/m and "
         f"{stated[1]:g} N.s/m",
-        "hapticlink info enclosure",
+        command("enclosure", "duration=0.1"),
     )
     ratio = stated[0] / coupling.stiffness[0], stated[1] / coupling.damping[0]
     yield compare(
@@ -100,7 +101,7 @@ def _setting(runs: Runs) -> Iterator[Statement]:
         "K_pc and B_pc are much weaker than contacts",
         min(ratio) > 3,
         f"by {ratio[0]:.0f} and {ratio[1]:.2g}",
-        "hapticlink info enclosure",
+        f"{command('enclosure', 'duration=0.1')}; {SETTINGS}",
     )
     gaps = {
         kind: STATED_B6.run(runs, ON, f"mechanism.stabilization={kind}")
@@ -114,7 +115,7 @@ def _setting(runs: Runs) -> Iterator[Statement]:
         gaps["none"] < 2 * gaps["baumgarte"],
         f"without it the loop opens by {1e3 * gaps['none']:.2g} mm, with it by "
         f"{1e3 * gaps['baumgarte']:.2g} mm",
-        STATED_B6.command(ON, "mechanism.stabilization=none"),
+        f"{STATED_B6.command(ON, 'mechanism.stabilization=none')}; {STATED_B6.command(ON)}",
     )
     of_links = {key: tuple(getattr(body, key) for body in linkage.body) for key in TABLE_B_1}
     yield compare(
@@ -122,22 +123,24 @@ def _setting(runs: Runs) -> Iterator[Statement]:
         "lengths, masses and inertias of the links",
         of_links == TABLE_B_1,
         "scene `closed-loop-b1` has them",
-        INFO,
+        SETTINGS,
     )
-    yield misprinted("table B.1", "its last row is m1, I1", "it is that of link 4", INFO)
+    yield misprinted(
+        "table B.1", "the last row is that of m1 and I1", "it is that of link 4", SETTINGS
+    )
     rods = [
         12 * i / (m * length**2)
         for i, m, length in zip(TABLE_B_1["inertia"], TABLE_B_1["mass"], LENGTHS, strict=True)
     ]
     yield compare(
         "table B.1",
-        "it is the mechanism of Table 6.1",
+        "the experiment of B.6 is that of chapter 6, so its mechanism is that of Table 6.1",
         TABLE_B_1["mass"] == appendix_a.M,
         f"inertias are {TABLE_B_1['inertia'][0] / appendix_a.J[0]:.0f} to "
         f"{TABLE_B_1['inertia'][2] / appendix_a.J[2]:.0f} times larger ({min(rods):.2g} to "
         f"{max(rods):.2g} times those of rods), m3 is {TABLE_B_1['mass'][2]:g} instead of "
         f"{appendix_a.M[2]:g} kg",
-        INFO,
+        f"{SETTINGS}; {command('five-bar', 'duration=0.1')}",
     )
     text = "two manipulations: constraints by stiffness, and by impedance control"
     yield both_ways("B.6", text, STATED_B6, runs)
@@ -177,7 +180,7 @@ def _readings_of_k_j(runs: Runs) -> Iterator[Statement]:
             f"k_j and b_j are per kilogram {text}",
             f"the report does not say of what; so read, {apart:.3g} mm apart as "
             f"stated, {end}, and {ideal:.3g} mm idealised",
-            STATED_B6.command(option),
+            f"{STATED_B6.command(option)}; {IDEAL_B6.command(option)}",
         )
 
 
@@ -199,7 +202,7 @@ def _constraints(runs: Runs) -> Iterator[Statement]:
     }
     yield compare(
         "B.6; figure B.6(a)",
-        "and throughout impedance control",
+        "at least one constraint throughout impedance control",
         min(least.values()) >= 1,
         _said(least, "at least {}"),
         _commands(OFF),
@@ -208,10 +211,11 @@ def _constraints(runs: Runs) -> Iterator[Statement]:
     free = int(np.linalg.matrix_rank(mobility, tol=1e-9 * np.linalg.norm(mobility)))
     yield compare(
         "B.6",
-        "since the operational point is on a link with too few degrees of freedom",
+        "at least one constraint, since the operational point is on a link with too few degrees of "
+        "freedom",
         free == 2,
         f"link 2 has {free} of the plane's three: the rank of Lambda^-1 at the start",
-        INFO,
+        IDEAL_B6.command(ON),
     )
     forces = {name: measures.by_count(r).multipliers for name, r in on.items()}
     yield compare(
@@ -271,14 +275,14 @@ def _trajectories(runs: Runs) -> Iterator[Statement]:
         "under stiffness control the device follows the operational point",
         all(g[ON] < 20 for g in gap.values()),
         on,
-        _commands(ON),
+        _commands(ON, OF_SECTION_B6),
     )
     yield compare(
         "B.6; figure B.6(b)",
-        "under impedance control they drift apart",
+        "under impedance control device and operational point drift apart",
         all(g[OFF] > 5 * g[ON] for g in gap.values()),
         off,
-        _commands(OFF),
+        f"{_commands(OFF, OF_SECTION_B6)}; {_commands(ON, OF_SECTION_B6)}",
     )
     paths = [STATED_B6.run(runs, way).haptics["virtual_mechanism.x"] for way in (ON, OFF)]
     rows = min(map(len, paths))
@@ -287,8 +291,8 @@ def _trajectories(runs: Runs) -> Iterator[Statement]:
         "B.6",
         "the operational point moves otherwise under the other controller",
         between > 5,
-        f"by up to {between:.0f} mm",
-        _commands(OFF),
+        f"by up to {between:.0f} mm as stated",
+        f"{STATED_B6.command(ON)}; {STATED_B6.command(OFF)}",
     )
     ends = {s.name: s.run(runs, OFF) for s in OF_SECTION_B6}
     yield compare(
@@ -299,18 +303,18 @@ def _trajectories(runs: Runs) -> Iterator[Statement]:
             for r in ends.values()
         ),
         "; ".join(f"{name}: {describe_end(r)}" for name, r in ends.items()),
-        _commands(OFF),
+        _commands(OFF, OF_SECTION_B6),
     )
     first = {name: measures.count(r).episodes[0][0] for name, r in ends.items()}
     yield compare(
         "B.6, note 3",
-        "and just after the loop's constraint becomes active",
+        "the experiment ends just after the loop's constraint becomes active",
         all(r.haptics["time"][-1] - first[name] < 0.3 for name, r in ends.items()),
         "; ".join(
             f"{name}: active from {first[name]:.2f} s, ends at {r.haptics['time'][-1]:.2f} s"
             for name, r in ends.items()
         ),
-        _commands(OFF),
+        _commands(OFF, OF_SECTION_B6),
     )
     count = measures.count(IDEAL_B6.run(runs, ON))
     yield compare(
@@ -330,12 +334,12 @@ def _conclusions(runs: Runs) -> Iterator[Statement]:
         "the ability to restrict the hand as closed loops require is validated",
         on < off / 5,
         f"{on:.3g} mm against {off:.0f} mm as stated",
-        _commands(ON),
+        f"{STATED_B6.command(ON)}; {STATED_B6.command(OFF)}",
     )
     varied = VARYING_B6.run(runs, ON)
     yield compare(
-        "B.7",
-        "with frames as they vary in the setup, too",
+        "1.3.4; B.7",
+        "the hand is held on a setup whose frames vary from 10 to 50 Hz",
         varied.record.end.reason == "duration",
         describe_end(varied),
         VARYING_B6.command(ON),

@@ -13,7 +13,7 @@ from studies.report import appendix_a, chapter4, measures
 from studies.report.chapter6 import FULL, LENGTH_SCALE
 from studies.report.graphics_copy import PULLED
 from studies.report.report_page import Runs, command
-from studies.report.statements.experiment import TOPOLOGY
+from studies.report.statements.experiment import SETTINGS_6, TOPOLOGY
 from studies.report.statements.statement import (
     Statement,
     compare,
@@ -93,7 +93,7 @@ def _structure(runs: Runs) -> Iterator[Statement]:
         "users can touch single objects and serial linkages today",
         len(sizes) == 2 and sizes[0] == 1 < sizes[1],
         f"scenes `single-body` and `serial`, which has {sizes[-1]} bodies and no closure",
-        "hapticlink info serial",
+        command("serial", "duration=0.1"),
     )
     yield compare(
         "4.2; figure 4.1",
@@ -149,7 +149,7 @@ def _device(runs: Runs) -> Iterator[Statement]:
         "encoders at the base joints resolve 0.09 degrees",
         abs(degrees - 0.09) < 1e-12,
         f"{degrees:.3g} degrees, {360 / degrees:.0f} counts a turn",
-        INFO,
+        SETTINGS_6,
     )
     error = haptics["haptic_device.F_hand_observed"] - haptics["hand.F"]
     late = haptics["time"] > 0.2
@@ -163,7 +163,7 @@ def _device(runs: Runs) -> Iterator[Statement]:
     )
     yield leave(
         "4.2.1",
-        "and the acceleration",
+        "the observer finds the acceleration, too",
         "the device has no such output; the equations of the observer are not given",
         "pytest tests/components/device/test_observer.py",
     )
@@ -231,16 +231,48 @@ def _impedance(runs: Runs) -> Iterator[Statement]:
         "zero acceleration alone does not hold the hand on its constraints",
         min(gap.values()) > 20,
         f"apart without the topology controller: {said}",
-        STATED_6.command(OFF),
+        f"{STATED_6.command(OFF)}; {IDEAL_6.command(OFF)}",
     )
     yield compare(
         "4.2.1",
-        "numerical drift and the device's limited stiffness are what lets the hand leave them",
+        "numerical drift and the device's limited stiffness are what lets the hand leave its "
+        "constraints under impedance control",
         gap["idealised"] < 20,
         f"also without encoders and with ideal motors ({gap['idealised']:.0f} mm): what "
         f"drives them apart is mostly the neglected velocity terms; with these sent "
         f"{tracking(IDEAL_6.run(runs, OFF, FULL))[1].max():.2g} mm",
-        IDEAL_6.command(OFF, FULL),
+        f"{IDEAL_6.command(OFF)}; {IDEAL_6.command(OFF, FULL)}",
+    )
+    yield compare(
+        "4.2.1",
+        "the impedance controller depends on two systems, the mechanism and the hardware",
+        are_connected(
+            STATED_6.run(runs, ON),
+            "virtual_environment.Lambda_inv -> controller.Lambda_inv",
+            "haptic_device.M -> controller.M",
+            "haptic_device.c -> controller.c",
+        ),
+        "Lambda^-1 of the one, M_d and C_d v of the other",
+        INFO,
+    )
+    along, whole = measures.resisted_acceleration(on, LENGTH_SCALE)
+    yield compare(
+        "4.2.1",
+        "the mechanism's acceleration is zero along directions that its joints resist",
+        along < 0.01 * whole,
+        f"Lambda^-1 F alone is: in motion the acceleration along them is {along:.2g} of "
+        f"{whole:.2g} m/s2 RMS (rotation times the mean link length), by velocity terms",
+        shown,
+    )
+    sizes = measures.neglected(on)
+    yield compare(
+        "4.2.1",
+        "(4.6) applies Coriolis and centripetal forces of the mechanism, too, since the device "
+        "follows its acceleration",
+        sizes.bias[0] < 0.1 * sizes.rendered[0],
+        f"(4.4) has no such term: {sizes.bias[0]:.2g} m/s2 RMS are left out, "
+        f"{sizes.rendered[0]:.2g} rendered; C_d is that of the device",
+        shown,
     )
     yield leave("figure 4.3", "the control structure of the device block", "a drawing", INFO)
 
@@ -258,11 +290,11 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
             FELT,
         ),
         "connections of `virtual_mechanism`, of F_env in scene `enclosure`",
-        INFO,
+        "hapticlink info enclosure",
     )
     yield compare(
         "4.2.2; figure 4.4",
-        "it is a haptics and a graphics block that a controller connects",
+        "the simulation is a haptics and a graphics block that a controller connects",
         {"virtual_mechanism", "virtual_environment"} <= {*results.record.fmus},
         "`virtual_mechanism` at 512 Hz, `virtual_environment` at the graphics rate",
         INFO,
@@ -283,11 +315,11 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
     )
     yield compare(
         "4.2.2",
-        "the mechanism filters such changes as a second-order system does",
+        "the mechanism filters changes of its inertia as a second-order system does",
         inertia[60] < inertia[10] / 6,
         f"the deviation falls about with the first power of the "
         f"rate: by {inertia[10] / inertia[60]:.2g} from 10 to 60 Hz",
-        IDEAL_6.command(ON, FRESH),
+        "; ".join(IDEAL_6.command(ON, f"graphics.rate={rate}") for rate in (10, 60, 512)),
     )
     yield leave(
         "4.2.2",
@@ -306,9 +338,24 @@ def _simulation(runs: Runs) -> Iterator[Statement]:
     )
     off, frames = count_folded(pulled)
     error = pulled.graphics["virtual_environment.q_error"]
+    frames_at = np.searchsorted(pulled.haptics["time"], pulled.graphics["time"] - 1e-12)
+    reference = pulled.haptics["virtual_mechanism.x"][
+        frames_at.clip(max=len(pulled.haptics["time"]) - 1)
+    ]
+    apart = pulled.graphics["virtual_environment.x"] - reference
+    gap = 1e3 * np.hypot(apart[:, 0], apart[:, 1])
     yield compare(
-        "4.2.2; 4.2.5",
-        "a PD controller on the hand's position drives the graphics copy to the simulation",
+        "4.2.2",
+        "x_S is the reference of the graphics block, whose PD controller drives the error of the "
+        "hand's position to zero",
+        gap.max() < 0.5,
+        f"it follows behind: median {np.median(gap):.2g} mm, at most {gap.max():.2g} mm and "
+        f"{np.abs(apart[:, 2]).max():.2g} rad",
+        STATED_6.command(ON, PULLED),
+    )
+    yield compare(
+        "4.2.5",
+        "the graphics controller drives the mechanism in the graphics to that in the haptics",
         off == 0,
         f"pulled so, it folds to the other assembly in {off} of "
         f"{frames} frames; its joints are up to {error.max():.2g} rad off",
@@ -329,18 +376,18 @@ def _teleoperation(runs: Runs) -> Iterator[Statement]:
     results = STATED_6.run(runs, ON)
     yield tested(
         "4.2.3; figure 4.5",
-        "two force channels feed F_h and F_env forward, two position "
-        "channels make F_drift by a PD controller",
+        "the four channels: two feed F_h and F_env forward, two of "
+        "positions make F_drift by a PD controller",
         "F_drift = K_pc (x_S - x_D) + B_pc (v_S - v_D), + on the device and - on the mechanism",
         WHOLE_LAW,
     )
     held, loose = _drifts(runs)
     yield compare(
         "4.2.3",
-        "it prevents the drift between device and simulation",
+        "four-channel control prevents the drift between device and simulation",
         held < loose / 5,
         f"{held:.2g} mm apart with it, {loose:.0f} mm without",
-        STATED_6.command(ON, "controller.teleoperation=false"),
+        f"{STATED_6.command(ON)}; {STATED_6.command(ON, 'controller.teleoperation=false')}",
     )
     full = {
         s.name: (tracking(s.run(runs, ON))[1].max(), tracking(s.run(runs, ON, FULL))[1].max())
@@ -351,10 +398,10 @@ def _teleoperation(runs: Runs) -> Iterator[Statement]:
     )
     yield compare(
         "4.2.3",
-        "the drift comes from numerical errors and delays",
+        "the drift between device and simulation comes from numerical errors and delays",
         all(b > 0.7 * a for a, b in full.values()),
         f"most of it comes from the velocity terms that (5.1) neglects; {said}",
-        STATED_6.command(ON, FULL),
+        "; ".join(s.command(ON, *more) for s in (STATED_6, IDEAL_6) for more in ((), (FULL,))),
     )
     sizes = measures.neglected(results)
     middle, _ = chapter4.ratio(runs("enclosure", *chapter4.STATED, chapter4.SHOWN))
@@ -369,7 +416,7 @@ def _teleoperation(runs: Runs) -> Iterator[Statement]:
     k_j, values = channel_stiffness(results)
     yield compare(
         "4.2.3",
-        "therefore its PD controller is weak",
+        "the PD controller of the four channels is weak, to keep F_drift small",
         values[0] < k_j / 10,
         f"per inertia {values[0]:.0f} and {values[1]:.0f} 1/s2 against {k_j:.0f} of the "
         "topology controller",
@@ -394,11 +441,14 @@ def _topology(runs: Runs) -> Iterator[Statement]:
             "virtual_environment.P_c -> controller.P_c",
         ),
         "with both velocities, M_d and P_c",
-        LAW,
+        INFO,
+    )
+    yield misprinted(
+        "4.2.4", "F_T is the output of the HD block", "of the topology controller, its input", INFO
     )
     yield compare(
         "4.2.4",
-        "it is much stiffer than the position channels",
+        "the topology controller is much stiffer than the position channels",
         k_j > 5 * values[0],
         f"per inertia {k_j:.0f} 1/s2 against {values[0]:.0f} and {values[1]:.0f}, the "
         "eigenvalues of Lambda^-1 K_pc for Table 6.1",
@@ -413,18 +463,18 @@ def _topology(runs: Runs) -> Iterator[Statement]:
     )
     yield compare(
         "4.2.4; figure 4.7",
-        "it acts along the singular directions of Lambda^-1 only",
+        "the topology controller acts along the singular directions of Lambda^-1 only",
         max(a for a, _ in shares.values()) < 0.01,
         f"its directions are a frame old; of F_T act on what is free then: {said}",
         "; ".join(s.command(ON) for s in (STATED_6, IDEAL_6)),
     )
     yield compare(
         "4.2.4",
-        "it is needed since impedance control cannot restrict the hand",
+        "the topology controller is needed since impedance control cannot restrict the hand",
         tracking(STATED_6.run(runs, OFF))[1].max() > 10 * tracking(results)[1].max(),
         f"{tracking(STATED_6.run(runs, OFF))[1].max():.0f} mm without, "
         f"{tracking(results)[1].max():.2g} mm with it",
-        STATED_6.command(OFF),
+        f"{STATED_6.command(ON)}; {STATED_6.command(OFF)}",
     )
 
 
@@ -442,7 +492,8 @@ def _summary(runs: Runs) -> Iterator[Statement]:
         "four-channel control renders contacts and takes out drift",
         are_connected(_touching(runs), FELT) and held < loose,
         f"F_env reaches the device; {held:.2g} mm apart, {loose:.0f} mm without it: see 4.2.3",
-        "hapticlink run enclosure",
+        f"{command('enclosure', *chapter4.STATED, chapter4.SHOWN)}; {STATED_6.command(ON)}; "
+        f"{STATED_6.command(ON, 'controller.teleoperation=false')}",
     )
     yield compare(
         "4.2.5",

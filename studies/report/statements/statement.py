@@ -41,7 +41,7 @@ def leave(place: str, text: str, why: str, command: str = "-") -> Statement:
 
 def equation(place: str, text: str, error: float, test: str) -> Statement:
     """An equation that is met to a relative error, and the test that proves it."""
-    return compare(place, text, error < ROUNDING, f"met to {error:.0e}", test_command(test))
+    return compare(place, text, error < ROUNDING, f"met {to(error)}", test_command(test))
 
 
 def tested(place: str, text: str, shown: str, test: str) -> Statement:
@@ -54,7 +54,7 @@ def misprint(
 ) -> Statement:
     """An equation whose printed form misses by `printed` of itself; with the remedy by
     `corrected`."""
-    number = f"as printed off by {printed:.2g} of it; with {remedy} met to {corrected:.0e}"
+    number = f"as printed off by {100 * printed:.0f} %; with {remedy} met {to(corrected)}"
     if printed < ROUNDING or corrected > SLOPE:
         raise ValueError(f"{place}: not the misprint that it is taken for: {number}")
     return misprinted(place, text, number, test_command(test))
@@ -63,6 +63,11 @@ def misprint(
 def misprinted(place: str, text: str, number: str, command: str) -> Statement:
     """A statement that contradicts itself or another one, as it is printed, and what is meant."""
     return Statement(place, text, "differs", number, command, misprint=True)
+
+
+def to(error: float) -> str:
+    """How well something is met, by its relative error."""
+    return f"to {error:.0e}" if error else "exactly"
 
 
 def test_command(test: str) -> str:

@@ -12,8 +12,9 @@ HEAD = """# All statements of the report
 
 Every equation, figure, table, gain and claim of the traineeship report *Haptic manipulation of
 virtual linkages with closed loops*, in other words than its own, compared with what was found. The
-numbers are computed by `hapticlink reproduce`; the command beside each shows it. What is found *by
-the test* agrees as long as the test beside it passes. *As stated* and
+numbers are computed by `hapticlink reproduce` from the runs of the commands beside them, whose
+folders have the settings (`run.json`) and signals (`haptics.csv`, `graphics.csv`), and by the tests
+beside them. What is found *by the test* agrees as long as that test passes. *As stated* and
 *idealised* are the two systems of [the figures](README.md). As CSV:
 [statements.csv](statements.csv).
 """

@@ -3,6 +3,7 @@ with its key, its place, the range and the unit."""
 
 import math
 import re
+import shlex
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
@@ -182,7 +183,7 @@ def test_numbers_of_shipped_scenes_out_of_range(data):
         read_and_check.from_source(Source(name, tables(name), {}, (option,)))
     found = {re.sub(r" \(\w+\)", "", f.key): f for f in refused.value.findings}
     finding = found[key(number)]
-    assert finding.option == f"--set {option}"
+    assert shlex.split(finding.option) == ["--set", option]
     limits, unit = number.quantity.range, number.quantity.unit
     assert f"{value!r:.90} is out of range" in finding.message.replace("...", "")
     assert (limits if limits != "finite" else "finite number") in finding.message

@@ -1,6 +1,7 @@
 """Options as Python values, of scenes by name and of Scene objects alike."""
 
 import pickle
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -101,3 +102,12 @@ def test_a_scene_made_in_python_is_checked():
     made = replace(open_scene.load("five-bar"), hold="zho")
     with pytest.raises(SceneFault, match="no hold 'zho'; did you mean 'zoh'"):
         open_scene.load(made)
+
+
+@given(st.text(st.characters(exclude_categories=("Cs",))), st.text("ab. []{}\"'$`*=,", max_size=20))
+def test_what_is_printed_can_be_pasted_into_a_shell(key, value):
+    """The shell gives back the words of which the text was made."""
+    option = f"{key}={value}"
+    assert shlex.split(overrides.as_command_line(option)) == ["--set", option]
+    (swap,) = overrides.write_options({"fmu.+": {"replaces": "hand", "path": value}})
+    assert shlex.split(overrides.as_command_line(swap)) == ["--swap", f"hand={value}"]

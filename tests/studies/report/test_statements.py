@@ -3,6 +3,7 @@ numbers of those that differ are what runs give."""
 
 import csv
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,14 @@ import pytest
 
 from hapticlink.commands import _commands
 from studies.report import measures
+from studies.report.chapter6 import LENGTH_SCALE
 from studies.report.report_page import Runs
-from studies.report.statements import every_statement, paper_experiment, rendering
+from studies.report.statements import (
+    every_statement,
+    introduction,
+    paper_experiment,
+    rendering,
+)
 from studies.report.statements.statement import misprint
 from studies.report.systems import IDEAL_6, IDEAL_B6, OFF, ON, STATED_6, STATED_B6
 from tests.docs.test_examples import parsed
@@ -81,10 +88,14 @@ def test_only_what_cannot_be_compared_has_no_command(table):
     assert {row["verdict"] for row in table if row["command"] == "-"} == {"cannot be compared"}
 
 
-def test_every_command_can_be_parsed(table):
+def test_every_command_can_be_pasted_into_a_shell(table):
+    """One program, without operators or patterns of the shell outside of quotes; its words, keys
+    and values are accepted."""
     _commands([])
     for command in commands(table):
-        if not command.startswith("pytest "):
+        words = shlex.split(command)
+        assert shlex.join(words) == command
+        if words[0] != "pytest":
             parsed(command)
 
 
@@ -118,6 +129,24 @@ def test_the_table_is_that_of_the_runs(table, runs):
 def test_a_slowly_updated_inertia_has_an_influence(runs):
     """4.2.2, against a copy at the haptic rate."""
     assert rendering.inertia_by_rate(runs) == pytest.approx({10: 67, 30: 21, 60: 13}, abs=1)
+
+
+@pytest.mark.parametrize("rate", [128.0, 512.0, 1000.0])
+def test_a_sampled_damper_produces_energy_above_a_quarter_of_the_rate(rate):
+    """1.3.2: its work over a sine goes as cos(2 pi f / rate)."""
+    assert introduction.lowest_generating(rate) == pytest.approx(rate / 4, abs=1)
+
+
+def test_the_mechanism_accelerates_along_what_it_resists(runs):
+    """4.2.1, against the rate of the recorded velocity along the null direction."""
+    results = IDEAL_6.run(runs, ON)
+    haptics, scale = results.haptics, np.array((1, 1, LENGTH_SCALE))
+    n = np.linalg.svd(haptics["virtual_mechanism.Lambda_inv"] * np.outer(scale, scale))[0][:, :, 2]
+    rate = np.gradient(haptics["virtual_mechanism.v"], haptics["time"], axis=0) * scale
+    expected = np.sqrt(np.mean(np.sum(n * rate, axis=1) ** 2)), np.linalg.norm(rate) / len(n) ** 0.5
+    found = measures.resisted_acceleration(results, LENGTH_SCALE)
+    assert found == pytest.approx(expected, rel=0.05)
+    assert found[0] > 0.2 * found[1]
 
 
 def test_multipliers_are_not_zero_with_one_constraint(runs):
