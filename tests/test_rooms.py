@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5893,
+    "components": 5908,
     "fmus": 2816,
     "orchestrator": 12996,
     "programs": 1021,
