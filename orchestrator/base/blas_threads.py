@@ -8,12 +8,14 @@ that are linked with it; where there is another BLAS, nothing is changed.
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from threading import Lock
+from threading import Lock, get_ident
 from typing import NamedTuple
 
 LINKED = ("numpy.linalg._umath_linalg", "scipy.linalg._fblas")
@@ -33,7 +35,8 @@ class Blas(NamedTuple):
 
 
 _lock = Lock()
-_inside = 0
+_inside = Counter[int]()
+"""The contexts that are open, by thread."""
 _before: list[tuple[Blas, int]] = []
 """The libraries that are limited, each with its threads without the limit."""
 
@@ -43,9 +46,9 @@ def one_blas_thread() -> Iterator[None]:
     """Within the context, BLAS computes in the thread that calls it, in all threads of the process;
     after the last of the contexts that are open at the same time it has as many as before the
     first. Also a decorator of functions."""
-    global _inside
+    thread = get_ident()
     with _lock:
-        _inside += 1
+        _inside[thread] += 1
         for library in loaded_blas():
             if (threads := library.get()) > 1:
                 _before.append((library, threads))
@@ -54,10 +57,31 @@ def one_blas_thread() -> Iterator[None]:
         yield
     finally:
         with _lock:
-            _inside -= 1
-            while _before and not _inside:
-                library, threads = _before.pop()
-                library.set(threads)
+            _inside[thread] -= 1
+            _restore_behind_last()
+
+
+def _restore_behind_last() -> None:
+    """Forget threads without a context; where there is none left, restore the numbers."""
+    for thread in [thread for thread, count in _inside.items() if not count]:
+        del _inside[thread]
+    while _before and not _inside:
+        library, threads = _before.pop()
+        library.set(threads)
+
+
+def _go_on_in_child() -> None:
+    """In a forked process there is the thread that forked alone, and its contexts."""
+    for thread in _inside.keys() - {get_ident()}:
+        del _inside[thread]
+    _restore_behind_last()
+    _lock.release()
+
+
+if sys.platform != "win32":
+    os.register_at_fork(
+        before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_go_on_in_child
+    )
 
 
 def loaded_blas() -> Iterator[Blas]:

@@ -147,6 +147,7 @@ def count_instances() -> int:
 def _remove(file: File) -> None:
     """Removes an unpacked FMU in which no instance is in use."""
     folder = _unpacked.pop(file)
+    _instances.pop(folder, None)
     for place in [place for place in _reset if place[0] == folder]:
         _reset.pop(place).slave.freeInstance()
     shutil.rmtree(folder, ignore_errors=True)

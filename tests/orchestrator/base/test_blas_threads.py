@@ -1,11 +1,12 @@
 """Analyses compute in one thread of BLAS, and leave its threads as they were."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from threading import Barrier
+from threading import Barrier, Event
 from typing import Any
 
 import pytest
@@ -139,3 +140,52 @@ def test_no_other_thread_of_the_process_computes() -> None:
     command = [sys.executable, "-c", PROBE]
     done = subprocess.run(command, env=free, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["True", "0", "True"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_forked_process_has_the_contexts_of_the_thread_that_forked(before: list[int]) -> None:
+    """Another thread may be anywhere in a context of its own meanwhile: it is not there."""
+
+    def is_right_in_child(expected: list[int]) -> bool:
+        child = os.fork()
+        if child == 0:
+            signal.alarm(10)  # ends a child that waits for a lock which nobody holds
+            right = threads() == expected
+            with one_blas_thread():
+                right &= threads() == [1] * len(before)
+            os._exit(0 if right and threads() == expected else 3)
+        return os.waitpid(child, 0)[1] == 0
+
+    entered, leave = Event(), Event()
+
+    def hold() -> None:
+        with one_blas_thread():
+            entered.set()
+            leave.wait()
+
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(hold)
+        entered.wait()
+        assert is_right_in_child(before)
+        with one_blas_thread():
+            assert is_right_in_child([1] * len(before))
+        leave.set()
+        other.result()
+        with one_blas_thread():
+            pass
+    assert threads() == before
+
+    stop = Event()
+
+    def enter_and_leave() -> None:
+        while not stop.is_set():
+            with one_blas_thread():
+                pass
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(enter_and_leave)
+        try:
+            assert all(is_right_in_child(before) for _ in range(20))
+        finally:
+            stop.set()
+    assert threads() == before
