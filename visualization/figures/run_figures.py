@@ -325,7 +325,8 @@ def _source(block: str) -> str:
     _, hold, of = block.rpartition("hold of ")
     if hold:
         signal, on, where = of.partition(" on ")
-        return f"hold of the {labels.signal(signal)}{on}{where}"
+        user, colon, words = labels.signal(signal).rpartition(": ")
+        return f"{user}{colon}hold of the {words}{on}{where}"
     return SOURCES.get(block, block)
 
 

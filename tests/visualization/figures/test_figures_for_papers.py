@@ -178,3 +178,19 @@ def test_lines_of_a_title_are_even_and_keep_numbers_with_their_units() -> None:
 )
 def test_axes_of_a_sweep_are_in_words(key: str, label: str) -> None:
     assert sweep_figure.axis(key) == label
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ("hold of controller.F_motor", "hold of the motor force"),
+        ("hold of controller.left.F_motor", "left: hold of the motor force"),
+        (
+            "hold of controller.F_drift on the mechanism",
+            "hold of the coupling force on the mechanism",
+        ),
+        ("drift", "virtual coupling, F_drift"),
+    ],
+)
+def test_sources_of_energy_are_in_words(block: str, said: str) -> None:
+    assert run_figures._source(block) == said
