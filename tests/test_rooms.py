@@ -37,7 +37,7 @@ CODE_LINES = {
     "orchestrator": 12996,
     "programs": 1021,
     "analysis": 7082,
-    "visualization": 3331,
+    "visualization": 3333,
     "api": 435,
     "commands": 1396,
 }

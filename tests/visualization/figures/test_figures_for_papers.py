@@ -147,6 +147,14 @@ def test_nothing_stands_beyond_the_page(scene: str) -> None:
         assert not outside(figure), name
 
 
+def test_no_two_curves_of_a_figure_look_alike() -> None:
+    """Of seven sources of energy, one more than there are colours."""
+    figure = run_figures.figures(run_once("enclosure", ["duration=0.3"]))["user_port"]
+    lines = [line for line in figure.axes[0].lines if not line.get_label().startswith("_")]
+    looks = {(line.get_color(), line.get_linestyle(), line.get_linewidth()) for line in lines}
+    assert len(looks) == len(lines) > len(CURVES) + 3
+
+
 def test_titles_are_above_their_axes_and_below_the_edge() -> None:
     found = run_once("closed-loop-ideal", ["graphics.rate=10", "controller.topology=false"])
     for name, figure in run_figures.figures(found).items():  # with the reason of an early end
