@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import cycle
+from itertools import cycle, product
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -325,7 +325,8 @@ def _source(block: str) -> str:
     _, hold, of = block.rpartition("hold of ")
     if hold:
         signal, on, where = of.partition(" on ")
-        return f"hold of the {labels.signal(signal)}{on}{where}"
+        user, colon, words = labels.signal(signal).rpartition(": ")
+        return f"{user}{colon}hold of the {words}{on}{where}"
     return SOURCES.get(block, block)
 
 
@@ -344,10 +345,12 @@ def _port(results: Results, port: UserPort) -> Figure:
     figure, axes = titled_axes(results, title, "time (s)", label)
     axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="generated in all")
     axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label="put in by the hand")
-    for name, energy in port.blocks_J.items():
-        if np.abs(energy).max() > DRAWN * np.abs(port.generated_J).max():
-            source = plain(fill(_source(name), 32))
-            axes.plot(port.time_s, 1e3 * energy, lw=1.2, label=source)
+    least = DRAWN * np.abs(port.generated_J).max()
+    drawn = {name: e for name, e in port.blocks_J.items() if np.abs(e).max() > least}
+    looks = product(("-", "-."), CURVES)
+    for (name, energy), (dash, colour) in zip(drawn.items(), cycle(looks)):
+        source = plain(fill(_source(name), 32))
+        axes.plot(port.time_s, 1e3 * energy, dash, color=colour, lw=1.2, label=source)
     most = 1e3 * tolerated_energy(port.hand_work_J)
     axes.axhline(most, color="k", ls="--", lw=0.8, label=f"tolerated: {short(most)} mJ")
     low, high = axes.get_ylim()

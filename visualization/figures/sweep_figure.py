@@ -140,12 +140,13 @@ def _is_there(path: Path, shown: str) -> bool:
 
 
 def _axes(wide: bool) -> tuple[Figure, Any]:
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
+    from matplotlib import rc_context
 
     from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
-    inside = ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12)
-    figure = ShownFigure(figsize=(8.4 if wide else 6.4, 4.6), layout=inside)
+    around: Any = {"figure.constrained_layout.h_pad": 0.12, "figure.constrained_layout.w_pad": 0.12}
+    with rc_context(around):
+        figure = ShownFigure(figsize=(8.4 if wide else 6.4, 4.6), layout="constrained")
     axes = figure.add_subplot()
     axes.grid(alpha=0.3)
     return figure, axes

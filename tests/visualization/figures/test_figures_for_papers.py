@@ -147,6 +147,14 @@ def test_nothing_stands_beyond_the_page(scene: str) -> None:
         assert not outside(figure), name
 
 
+def test_no_two_curves_of_a_figure_look_alike() -> None:
+    """Of seven sources of energy, one more than there are colours."""
+    figure = run_figures.figures(run_once("enclosure", ["duration=0.3"]))["user_port"]
+    lines = [line for line in figure.axes[0].lines if not line.get_label().startswith("_")]
+    looks = {(line.get_color(), line.get_linestyle(), line.get_linewidth()) for line in lines}
+    assert len(looks) == len(lines) > len(CURVES) + 3
+
+
 def test_titles_are_above_their_axes_and_below_the_edge() -> None:
     found = run_once("closed-loop-ideal", ["graphics.rate=10", "controller.topology=false"])
     for name, figure in run_figures.figures(found).items():  # with the reason of an early end
@@ -178,3 +186,19 @@ def test_lines_of_a_title_are_even_and_keep_numbers_with_their_units() -> None:
 )
 def test_axes_of_a_sweep_are_in_words(key: str, label: str) -> None:
     assert sweep_figure.axis(key) == label
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ("hold of controller.F_motor", "hold of the motor force"),
+        ("hold of controller.left.F_motor", "left: hold of the motor force"),
+        (
+            "hold of controller.F_drift on the mechanism",
+            "hold of the coupling force on the mechanism",
+        ),
+        ("drift", "virtual coupling, F_drift"),
+    ],
+)
+def test_sources_of_energy_are_in_words(block: str, said: str) -> None:
+    assert run_figures._source(block) == said
