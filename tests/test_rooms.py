@@ -34,10 +34,10 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 5908,
     "fmus": 2816,
-    "orchestrator": 13009,
+    "orchestrator": 13023,
     "programs": 1021,
-    "analysis": 7091,
-    "visualization": 3329,
+    "analysis": 7090,
+    "visualization": 3333,
     "api": 435,
     "commands": 1397,
 }

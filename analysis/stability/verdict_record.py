@@ -15,11 +15,8 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.components.specs.hand import Hand
-<<<<<<< HEAD
 from hapticlink.orchestrator.results.html_table import html_table
-=======
 from hapticlink.orchestrator.scene.overrides import as_command_line
->>>>>>> w-reader
 
 
 @dataclass(frozen=True)
