@@ -149,7 +149,7 @@ def test_nothing_stands_beyond_the_page(scene: str) -> None:
 
 def test_no_two_curves_of_a_figure_look_alike() -> None:
     """Of seven sources of energy, one more than there are colours."""
-    figure = run_figures.figures(run_once("enclosure", ["duration=0.3"]))["user_port"]
+    figure = run_figures.figures(run_once("enclosure"))["user_port"]
     lines = [line for line in figure.axes[0].lines if not line.get_label().startswith("_")]
     looks = {(line.get_color(), line.get_linestyle(), line.get_linewidth()) for line in lines}
     assert len(looks) == len(lines) > len(CURVES) + 3
