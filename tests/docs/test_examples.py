@@ -88,7 +88,7 @@ NOT_RUN = {
         "is of somebody else's file; tests/orchestrator/ssp/test_set_files.py",
 }  # fmt: skip
 """Commands that are parsed, with their scene, keys and values, but not run; the reason."""
-UNTIL_STOPPED = re.compile("hapticlink (view (?!.*--export)|serve )")
+UNTIL_STOPPED = re.compile(r"hapticlink (view\b(?!.*--export)|serve )")
 """Commands that run until Ctrl-C, parsed but not run; tests/visualization/live_page."""
 TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""
