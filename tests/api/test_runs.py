@@ -254,7 +254,7 @@ def test_what_a_killed_run_has_written_can_be_looked_at(bar: Path, tmp_path: Pat
     assert same(found, whole)
     assert "not ended" in repr(found)
     axes = found.figures()["mechanism"].axes[0]
-    assert "until the last row so far at 0.25 s" in axes.get_title().replace("\n", " ")
+    assert "until the last row so far at 0.25\xa0s" in axes.get_title().replace("\n", " ")
 
 
 def test_a_folder_without_a_table_of_its_run_is_refused(bar: Path, tmp_path: Path) -> None:

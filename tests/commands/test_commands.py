@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -228,13 +229,13 @@ def test_a_run_is_told_before_its_figures_are_drawn(
     """All but the names of its files, which are told when they are there; once each, as without
     figures. What is read by a program comes at once."""
     before: list[str] = []
-    drawn = run_figures.pngs
+    drawn = run_figures.files
 
-    def pngs(results: read_results.Results) -> Iterator[tuple[str, bytes]]:
+    def files_of(results: read_results.Results, *formats: Any) -> Iterator[tuple[str, bytes]]:
         before.append(capsys.readouterr().out)
-        return drawn(results)
+        return drawn(results, *formats)
 
-    monkeypatch.setattr(run_figures, "pngs", pngs)
+    monkeypatch.setattr(run_figures, "files", files_of)
     assert status("run", bar, "--out", tmp_path / "a") == 0
     after = capsys.readouterr().out
     *told, files = summary.print_lines(made := hl.load(tmp_path / "a"), bar.stem)

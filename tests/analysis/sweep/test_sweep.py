@@ -498,7 +498,7 @@ def test_energies_are_drawn_in_mj(metric: str) -> None:
     axes = found.axes[0]
     assert axes.get_ylabel().endswith(" (mJ)")
     assert list(axes.lines[0].get_ydata()) == [1.0, 2.0]
-    assert "down to 1 mJ" in axes.get_title()
+    assert "down to 1\xa0mJ" in axes.get_title()
 
 
 # --- a cluster --------------------------------------------------------------------------------

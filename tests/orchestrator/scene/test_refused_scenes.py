@@ -3,6 +3,8 @@
 coupling, what happens at given times. Several faults of one file, with their lines, are in
 test_scene.py."""
 
+import shlex
+
 import pytest
 
 from hapticlink.orchestrator import open_scene
@@ -272,7 +274,8 @@ def test_what_is_refused(scene, options, message):
 )
 @pytest.mark.parametrize("key", ["haptics.rate", "graphics.rate", "duration", "graphics.phase"])
 def test_rates_and_times_out_of_any_range(key, value):
-    assert f"--set {key}={value}: {key}: " in refused("closed-loop-ideal", f"{key}={value}")
+    option = f"{key}={value}"
+    assert f"--set {shlex.quote(option)}: {key}: " in refused("closed-loop-ideal", option)
 
 
 def test_a_key_that_is_gone_says_what_to_do() -> None:

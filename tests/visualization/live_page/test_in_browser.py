@@ -108,7 +108,8 @@ REACHED = """[...document.querySelectorAll('button, select, input, summary')].fi
 def test_every_button_and_control_of_a_phone_can_be_reached(served: Served, window: Window) -> None:
     page = window(served.url, 390, 844)
     for fold in page.page.query_selector_all("summary"):
-        fold.click()
+        if fold.is_visible():
+            fold.click()
     assert len(page.page.query_selector_all("button, select, input, summary")) > 15
     assert page.get(REACHED) == []
     assert page.get("document.documentElement.scrollWidth") == 390
