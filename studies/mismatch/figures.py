@@ -21,7 +21,7 @@ class Point(NamedTuple):
 
 Panel = tuple[str, Mapping[str, Mapping[str, Point]]]
 """A heading, and points by line and rate."""
-COLOURS = (BLUE, ORANGE, GREEN, "#cc79a7")
+COLOURS = (BLUE, ORANGE, GREEN, "#cc79a7", "#333333")
 """Of the lines that a figure names; all others are grey."""
 APART = 90.0
 """Where on the axis the rate that varies is drawn, with no line to it."""

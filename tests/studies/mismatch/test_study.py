@@ -290,6 +290,7 @@ def short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("COLUMNS", SHORT),
         ("FEW", SHORT),
         ("OF_MATRICES", ("zoh",)),
+        ("OF_MOTION", ("zoh", "foh")),
         ("COMPARED", ("zoh",)),
         ("LIKELY", ("zoh", "foh")),
     ):

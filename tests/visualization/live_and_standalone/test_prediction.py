@@ -41,6 +41,9 @@ def test_the_light_turns_red_before_anyone_drags(page: Served) -> None:
         before = window.get("view.map.why")
         for port, target in HELD.items():
             name = f"holds.virtual_mechanism.{port} -> controller.{target}"
+            window.get(
+                "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
+            )
             window.page.select_option(f'[data-control="{name}"]', "foh")
         window.until("view.map.said === 'computing'")
         window.page.wait_for_function("view.map.verdict === 'unstable'", timeout=1e3 * QUICK)
