@@ -7,14 +7,14 @@ perturbations M, a column each, and their errors D follow (linear_period.py)
     M <- J M,   D <- J D + E M
 
 J is that of central differences of 1e-6 max(1, |z|) of the operation itself, E is half the
-difference of its slopes to both sides; copies and holds without a regime have one side and E = 0.
-A hold that is a polynomial in time is carried by that (polynomial_holds.py).
-For a doStep and a get of an FMU with a graph, J
-is exact (graph_slopes.py), and E is its difference from these where that is larger; entries that
-have a slope in one way only, or another one to each side, keep those by differences. The graph is
-evaluated at all points of these at once, where at z it has the result of the FMU. Slopes at the
-same numbers, with the same age of samples, are the same, so that around a state of rest each
-operation is differentiated once; those of a block of the package in all scenes with its file.
+difference of its slopes to both sides; copies and linear holds have one side and E = 0. A hold that
+is a polynomial in time is carried by that (polynomial_holds.py). For a doStep and a get of an FMU
+with a graph, J is exact (graph_slopes.py), and E is its difference from these where that is larger;
+entries that have a slope in one way only, or another one to each side, keep those by differences.
+The graph is evaluated at all points of these at once, where at z it has the result of the FMU.
+Slopes at the same numbers, with the same age of samples, are the same, so that around a state of
+rest each operation is differentiated once; those of a block of the package in all scenes with its
+file.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ class ForwardSensitivity:
         that are iterated and holds with whole numbers of their own."""
         if isinstance(operation, OfHold):
             own = self._simulation.holds[operation.connection].own
-            return own is None and self._is_linear(operation.connection)
+            return own is None and self._is_smooth(operation.connection)
         return not isinstance(operation, Repeat)
 
     def applied(
@@ -259,9 +259,10 @@ class ForwardSensitivity:
         return J
 
     def _linear(self, operation: Instruction) -> bool:
-        """Whether it copies numbers, or is one of a hold without a regime."""
+        """Whether it copies numbers, or evaluates a hold that is linear in what it reads."""
         if isinstance(operation, Evaluate | Blend):
-            return self._is_linear(operation.connection)
+            name = operation.connection
+            return self._is_smooth(name) and is_linear(self._simulation.holds[name])
         return isinstance(operation, Set | Push)
 
     def _copies(self, operation: Instruction) -> bool:
@@ -270,7 +271,7 @@ class ForwardSensitivity:
             return is_linear(self._simulation.holds[operation.connection])
         return isinstance(operation, Set)
 
-    def _is_linear(self, connection: str) -> bool:
+    def _is_smooth(self, connection: str) -> bool:
         """Whether the hold of a connection has no regime, as those that observe energy have."""
         hold = self._simulation.system.connection[connection].hold
         return HOLDS[hold or ""].needs not in ("power", "spring")
@@ -384,7 +385,7 @@ class ForwardSensitivity:
                 guid = self._simulation.system.fmu[operation.fmu].description.guid
                 key = operation, guid, setter.where.tobytes(), factors, *sizes
                 return key, self.work.slopes.setdefault(key, [])
-        if isinstance(operation, Push) and self._is_linear(operation.connection):
+        if isinstance(operation, Push) and self._is_smooth(operation.connection):
             hold = self._simulation.holds[operation.connection]
             if not hold.own:
                 parts, order = hold.parts, np.argsort(hold.places).tobytes()
@@ -459,7 +460,7 @@ class ForwardSensitivity:
             case Repeat(body=body):
                 fmus = {op.fmu for op in flat(body) if isinstance(op, Step)}
                 return Reach(StateVector(simulation, fmus, set(blocks(simulation))), every, every)
-            case OfHold(connection) if not self._is_linear(connection):
+            case OfHold(connection) if not self._is_smooth(connection):
                 shared = set(blocks(simulation)) - set(simulation.holds)
                 state = StateVector(simulation, set(), {connection} | shared)
                 return Reach(state, every, every)

@@ -30,7 +30,7 @@ OF_SAMPLES = ("samples", "lead")
 def is_polynomial(hold: CompiledHold) -> bool:
     """Whether the value of a hold is a polynomial in time through its samples."""
     row = hold.row
-    return row.push in OF_SAMPLES and row.degree is not None and row.needs != "gradient"
+    return row.push in OF_SAMPLES and row.degree is not None and not hold.parts.coordinates
 
 
 def degree_of(hold: CompiledHold) -> int:
@@ -40,8 +40,8 @@ def degree_of(hold: CompiledHold) -> int:
 
 
 def is_linear(hold: CompiledHold) -> bool:
-    """Whether that value is linear in the samples."""
-    return not hold.parts.matrix
+    """Whether the value of a hold without a regime is linear in what it reads."""
+    return not hold.parts.matrix and not hold.parts.coordinates
 
 
 def sample_arrives(hold: CompiledHold, tick: int) -> bool:

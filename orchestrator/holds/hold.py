@@ -64,7 +64,8 @@ class Hold(ABC):
     """Degree of the value as a polynomial in time within a step of the target; 0 if it is constant,
     None if it varies as no polynomial. Read twice: where it is not 0, `run.json` tells that the
     value varies within a step; and of a row of the table whose `push` keeps samples and nothing
-    else, a stability analysis takes the value for that polynomial between two samples."""
+    else and that needs no gradient, a stability analysis takes the value for that polynomial
+    between two samples."""
     interpolates: ClassVar[bool] = False
     """Whether it interpolates once the sample of the step's end is known (coupling "iterated")."""
     downsamples: ClassVar[bool] = False

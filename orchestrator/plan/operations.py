@@ -15,6 +15,7 @@ from fractions import Fraction
 from typing import ClassVar, NamedTuple
 
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
+from hapticlink.orchestrator.system import ports
 from hapticlink.orchestrator.system.system import System
 
 
@@ -140,7 +141,8 @@ class _Evaluation(OfHold):
 
     def signals(self, system: System) -> SignalUse:
         held = (("held", self.connection),)
-        return SignalUse(held, held)
+        by = ports.coordinates(system.connection[self.connection], system)
+        return SignalUse((*held, ("sources", by.name)) if by else held, held)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from fractions import Fraction
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.holds.hold import Hold, HoldContext
 from hapticlink.orchestrator.holds.table import HoldRow
@@ -109,7 +108,7 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
         frames=system.fmu[connection.source].frames,
         displacement=displacement,
         velocity=velocity,
-        coordinates=_coordinates(connection, signals) if kind.needs == "gradient" else None,
+        coordinates=_coordinates(connection, signals),
         spring=of,
         row=of.ports.index(f"{connection.target}.{connection.target_port}") if of else 0,
     )
@@ -150,22 +149,15 @@ def _motion(connection: Connection, signals: SignalVector) -> tuple[Reader, Read
     return moved, Reader(signals, places.tolist(), work)
 
 
-def _coordinates(connection: Connection, signals: SignalVector) -> Reader:
-    """Reads what the input of the source, in which the gradient is, would get at the moment. Raises
-    InputFault where it is not fed by one connection."""
-    fmu = connection.source
-    description = signals.system.fmu[fmu].description
-    by = next(g.by for g in description.gradients.values() if g.of == connection.source_port)
-    fed = [c for c in signals.system.into(fmu) if c.inputs == description.port(by, "input")]
-    if len(fed) != 1:
-        raise InputFault(
-            f"hold of {connection.name}: its gradient is in {fmu}.{by}, which is not fed by one "
-            "connection as a whole: take another hold"
-        )
-    conversions = [s.conversion for s in fed[0].inputs]
+def _coordinates(connection: Connection, signals: SignalVector) -> Reader | None:
+    """Reads what the input of the source, in which the gradient is, would get at the moment."""
+    fed = ports.coordinates(connection, signals.system)
+    if fed is None:
+        return None
+    conversions = [s.conversion for s in fed.inputs]
     return Reader(
         signals,
-        signals.sources(fed[0]),
+        signals.sources(fed),
         np.array([c.factor for c in conversions]),
         np.array([c.offset for c in conversions]),
     )

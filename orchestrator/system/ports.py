@@ -105,3 +105,20 @@ def companion_outputs(
     }
     find = related.get(HOLDS[name].needs or "") if name else None
     return (find(c.outputs) or ()) if find else ()
+
+
+def coordinates(c: Connection, system: System) -> Connection | None:
+    """The connection into the source with the coordinates in which it declares the gradient of this
+    connection's port; None where its hold needs no gradient. Raises InputFault where these are not
+    fed by one connection as a whole."""
+    if c.needs != "gradient":
+        return None
+    description = system.fmu[c.source].description
+    by = next(g.by for g in description.gradients.values() if g.of == c.source_port)
+    fed = [i for i in system.into(c.source) if i.inputs == description.port(by, "input")]
+    if len(fed) != 1:
+        raise InputFault(
+            f"hold of {c.name}: its gradient is in {c.source}.{by}, which is not fed by one "
+            "connection as a whole: take another hold"
+        )
+    return fed[0]

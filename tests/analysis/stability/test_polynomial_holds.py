@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hapticlink.analysis.stability import forward_sensitivity
+from hapticlink.analysis.stability.forward_sensitivity import ForwardSensitivity
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.polynomial_holds import advanced_powers, slopes_of_powers
@@ -40,6 +41,10 @@ def test_a_hold_goes_on_from_its_powers_to_the_interpolating_polynomial(name: st
             np.testing.assert_allclose(value, expected, rtol=1e-9, atol=1e-9)
 
 
+def leading(period: LinearPeriod) -> list[complex]:
+    return [mode.z for mode in modes(period.linear, period.map_.period)[:6]]
+
+
 @pytest.mark.parametrize(
     "changes",
     [
@@ -56,10 +61,6 @@ def test_a_period_is_that_in_which_each_evaluation_is_differentiated(
     changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     options = SCENE | changes
-
-    def leading(period: LinearPeriod) -> list[complex]:
-        return [mode.z for mode in modes(period.linear, period.map_.period)[:6]]
-
     with resting("closed-loop-direct", options) as place:
         found, differentiated = leading(place.period({})), place.map.work.counts["differentiated"]
         fused = leading(place.period({}).fused(["hand"]))
@@ -69,3 +70,24 @@ def test_a_period_is_that_in_which_each_evaluation_is_differentiated(
         assert place.map.work.counts["differentiated"] > differentiated
     assert found == pytest.approx(anew, abs=1e-7)
     assert fused == pytest.approx(found, abs=1e-9)
+
+
+@pytest.mark.parametrize("rate", [60, 20])
+def test_along_the_coordinates_of_a_gradient_a_hold_has_slopes(
+    rate: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def found() -> list[complex]:
+        options = SCENE | {"hold": "model", "graphics.rate": rate}
+        with resting("closed-loop-ideal", options) as place:
+            return leading(place.period({}))
+
+    declared = found()
+    is_smooth = ForwardSensitivity._is_smooth
+    monkeypatch.setattr(
+        ForwardSensitivity,
+        "_is_smooth",  # others read and write all signals
+        lambda self, name: (
+            not self._simulation.holds[name].parts.coordinates and is_smooth(self, name)
+        ),
+    )
+    assert declared == pytest.approx(found(), abs=1e-7)
