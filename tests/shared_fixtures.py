@@ -18,6 +18,7 @@ from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus import lock
 from hapticlink.fmus.build_fmu import build
 from hapticlink.fmus.native import compiler
+from hapticlink.orchestrator.base import shelf
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.description import describe
@@ -40,7 +41,7 @@ def own_temporary_folder(
 @pytest.fixture
 def emptied_temporary_folder(own_temporary_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """That folder, for a test that looks at what its runs leave there: no FMU stays unpacked."""
-    monkeypatch.setattr(process_cache, "_staying", 0)
+    monkeypatch.setattr(shelf, "_keeping", 0)
     return own_temporary_folder
 
 

@@ -1,7 +1,7 @@
 """Figures with titled axes, of a size that README pages and slides can show.
 
-Margins are fixed and figures are drawn once: Matplotlib's layout engines measure every text twice,
-and `savefig` draws twice, which together takes longer than the rest of a short run.
+Margins are fixed and figures are drawn once: for one of Matplotlib's layout engines `savefig` draws
+twice and measures every text twice, which takes longer than the rest of a short run.
 """
 
 from __future__ import annotations

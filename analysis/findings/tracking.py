@@ -55,10 +55,8 @@ class Tracking(NamedTuple):
                 yield name, float(values[at]), float(self.time_s[at]), rms(values)
 
     def __repr__(self) -> str:
-        lines = (
-            f"{n}: {m:.4g} at most, at {t:.4g} s, {r:.4g} RMS" for n, m, t, r in self._summary()
-        )
-        return "\n".join(lines) or "no samples"
+        line = "{}: {:.4g} at most, at {:.4g} s, {:.4g} RMS"
+        return "\n".join(line.format(*row) for row in self._summary()) or "no samples"
 
     def _repr_html_(self) -> str:
         return html_table(("", "at most", "at (s)", "RMS"), self._summary())

@@ -42,8 +42,6 @@ _instances: Counter[str] = Counter()
 _reset: dict[tuple[str, str], Idle] = {}
 """By folder and name: an instance that was reset after a run without a fault."""
 _lock = Lock()
-_staying = 0
-"""The contexts of `keep_unpacked` that are open, in all threads."""
 
 
 def describe_once(path: Path) -> Description:
@@ -71,16 +69,11 @@ def file_at(path: Path) -> File:
 def keep_unpacked() -> Iterator[None]:
     """Until the last of the contexts that are open at the same time ends, in any thread, FMUs of
     this project stay unpacked until `trim` drops them, and native ones instantiated."""
-    global _staying
-    with _lock:
-        _staying += 1
     try:
         with shelf.keep():
             yield
     finally:
-        with _lock:
-            _staying -= 1
-        trim(MAX_UNPACKED if _staying else 0)
+        trim(MAX_UNPACKED if shelf.is_keeping() else 0)
 
 
 def unpack(description: Description, folder: str) -> str:
@@ -127,7 +120,7 @@ def keep_instance(folder: str, name: str, slave: Any, key: int) -> bool:
     """Keep an instance as it is after fmi2Reset, for the next of that name; False where none are
     kept."""
     with _lock:
-        if not _staying or (folder, name) in _reset:
+        if not shelf.is_keeping() or (folder, name) in _reset:
             return False
         _reset[folder, name] = Idle(slave, key)
         return True
@@ -136,7 +129,7 @@ def keep_instance(folder: str, name: str, slave: Any, key: int) -> bool:
 def take_instance(folder: str, name: str) -> Idle | None:
     """An instance that was kept, which is the caller's from now on."""
     with _lock:
-        return _reset.pop((folder, name), None) if _staying else None
+        return _reset.pop((folder, name), None) if shelf.is_keeping() else None
 
 
 def count_instances() -> int:
@@ -162,7 +155,7 @@ def leave(folder: str) -> bool:
             shutil.rmtree(folder, ignore_errors=True)
             return False
         _instances[folder] -= 1
-        if not _instances[folder] and not _staying:
+        if not _instances[folder] and not shelf.is_keeping():
             _remove(file)
         return _instances[folder] > 0
 

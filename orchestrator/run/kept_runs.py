@@ -20,9 +20,15 @@ from hapticlink.orchestrator.base import plugins, shelf
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.compiled.regions import Regions, is_structure, of_type
+from hapticlink.orchestrator.run.compiled.regions import (
+    Regions,
+    find_embedded,
+    is_structure,
+    of_type,
+    size,
+)
+from hapticlink.orchestrator.run.compiled.structures import POINTERS
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.system import System
 
@@ -37,7 +43,7 @@ class StartMemory:
 
     def __init__(self, simulation: Simulation) -> None:
         regions = [region for each in _roots(simulation) for region in each.all]
-        self._memory = [_words(r.address, r.end - r.address) for r in regions]
+        self._memory = [_words(r.address, r.end) for r in regions]
         self._before = [memory.copy() for memory in self._memory]
         self._pointers = [_pointers(r.type, r.count) for r in regions]
 
@@ -77,9 +83,9 @@ def _roots(simulation: Simulation) -> Iterator[Regions]:
         yield Regions([root], {"n_outputs": outputs})
 
 
-def _words(address: int, size: int) -> Words:
-    """The memory at an address, of fields of 8 bytes each."""
-    words = (ctypes.c_uint64 * (size // 8)).from_address(address)
+def _words(address: int, end: int) -> Words:
+    """The memory from an address to another, of fields of 8 bytes each."""
+    words = (ctypes.c_uint64 * ((end - address) // 8)).from_address(address)
     return np.frombuffer(memoryview(words), np.uint64)
 
 
@@ -87,18 +93,17 @@ def _pointers(type_: str, count: int) -> NDArray[np.intp]:
     """The places of the pointers among the words of a region."""
     if not is_structure(type_):
         return np.zeros(0, np.intp)
-    size, places = ctypes.sizeof(of_type(type_)) // 8, [*_pointers_within(type_, 0)]
-    return np.array([size * i + place for i in range(count) for place in places], np.intp)
+    words, places = size(type_) // 8, [*_pointers_within(type_, 0)]
+    return np.array([words * i + place for i in range(count) for place in places], np.intp)
 
 
 def _pointers_within(type_: str, first: int) -> Iterator[int]:
     kind = of_type(type_)
-    for name, field in kind._fields_:
-        place = first + getattr(kind, name).offset // 8
-        if name in structures.POINTERS.get(type_, {}):
-            yield place
-        elif issubclass(field, ctypes.Structure):
-            yield from _pointers_within(field.__name__, place)
+    for name in POINTERS.get(type_, {}):
+        yield first + getattr(kind, name).offset // 8
+    for name, field in find_embedded(type_):
+        if issubclass(field, ctypes.Structure):
+            yield from _pointers_within(field.__name__, first + getattr(kind, name).offset // 8)
 
 
 @dataclass(frozen=True)

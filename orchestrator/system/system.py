@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import Description
@@ -208,18 +207,15 @@ class System:
         return tuple(c for c in self.connections if c.source == name and not c.initial)
 
 
-def _without_starts(system: System) -> tuple[System, list[Any]]:
+def _without_starts(system: System) -> tuple[object, ...]:
     """The system without start values and gains of springs, the names of those, the number of
     springs, and the values of changes as text, in which 0.0 is not -0.0."""
     fmus = tuple(replace(fmu, starts=()) for fmu in system.fmus)
     energy = replace(system.energy, springs=())
     names = [[scalar.name for scalar, _ in fmu.starts] for fmu in system.fmus]
     changed = repr([change.values for change in system.changes])
-    return replace(system, fmus=fmus, energy=energy), [
-        *names,
-        len(system.energy.springs),
-        changed,
-    ]
+    rest = replace(system, fmus=fmus, energy=energy)
+    return rest, names, len(system.energy.springs), changed
 
 
 @dataclass(frozen=True)

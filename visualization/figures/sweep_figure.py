@@ -24,7 +24,6 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_files
 from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import headline, plain
-from hapticlink.visualization.figure_files import encode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,7 +126,7 @@ def write_figure(
     drawn = draw(rows, keys, metric)
     if drawn is None:
         return []
-    made = (encode(drawn, kind, DPI, {STAMPS[kind][0]: shown}) for kind in formats)
+    made = (figure_files.encode(drawn, kind, DPI, {STAMPS[kind][0]: shown}) for kind in formats)
     return figure_files.write(zip(names, made, strict=True), folder)
 
 

@@ -56,7 +56,6 @@ def nothing_kept() -> Iterator[None]:
     process_cache.trim(0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(shelf, "_keeping", 0)
-        patch.setattr(process_cache, "_staying", 0)
         yield
 
 
@@ -145,7 +144,6 @@ def test_contexts_that_overlap_end_with_the_last_one() -> None:
         assert shelf.is_keeping()
         second.__exit__(None, None, None)
         assert not shelf.is_keeping()
-        assert not process_cache._staying
 
 
 def test_another_thread_does_not_prefer_compiled_blocks() -> None:
