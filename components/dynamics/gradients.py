@@ -1,12 +1,13 @@
-"""Matrices of the copy at coordinates that it predicts, with their gradients there: what the hold
-`model` goes on from at the coordinates of the moment.
+"""Matrices of the graphics copy of the mechanism at coordinates that it predicts, with their
+gradients there: what the hold `model` goes on from at the coordinates of the moment.
 
-What is read at t_n is known at t_n + h and used until t_n + 2 h. In the middle of that time the
-mechanism is, to first order, at
+What is read at t_n, where a frame of length h begins, is known at t_n + h and used until t_n + 2 h.
+In the middle of that time the mechanism is, to first order, at
 
     q_predicted = q + 3/2 h qd
 
-With a = D^-1 (J' + W' lambda) and W a = 0 the mobility is J a, and its gradient is the one of
+With the inertia matrix D, the Jacobians J of the operational point and W of the closures, and
+a = D^-1 (J' + W' lambda), where lambda makes W a = 0, the mobility is J a. Its gradient is that of
 
     J a + (J a)' + lambda' W a + (lambda' W a)' - a' D a
 
