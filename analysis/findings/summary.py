@@ -299,6 +299,8 @@ def _contacts(results: Results, measures: Measures) -> Iterator[str]:
 
 def _real_time(report: Mapping[str, Any]) -> Iterator[str]:
     yield deadlines(report)
+    if skipped := report.get("skipped"):
+        yield f"{skipped} ticks were skipped, as hardware does not catch up with what is past"
     if moved := report["moved"]:
         yield (
             f"warning: the schedule was moved by {short(moved)} s in all: the machine was too "

@@ -28,7 +28,7 @@ from hapticlink.orchestrator.run import kept_runs
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
 from hapticlink.orchestrator.run.kept_runs import KeptRun, StartMemory
-from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, with_ends
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
 
@@ -131,7 +131,8 @@ def run(
                 system, plan = plan.system, kept.plan
                 kept.begin_again(system, results, stack)
             else:
-                simulation = Simulation(plan.system, results, stack, opened)
+                pace = real_time.pace if real_time else None
+                simulation = Simulation(plan.system, results, stack, opened, pace)
                 if real_time:
                     stack.enter_context(real_time.of(plan, simulation))
                 loop = CompiledLoop(plan, simulation)
@@ -139,7 +140,7 @@ def run(
                 memory = StartMemory(simulation) if keeps else None
                 simulation.start()
                 coming = loop.events.coming()
-                loop.events.prepare(with_ends(coming) if real_time else coming)
+                loop.events.prepare(real_time.kinds(coming) if real_time else coming)
                 if memory:
                     memory.take_pointers()
                     kept = KeptRun(plan, simulation, loop, memory, opened)

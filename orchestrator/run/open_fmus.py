@@ -45,9 +45,14 @@ def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
 class LoadedFmus:
     """The FMUs of a system, loaded: `instances` by name, each of which fills its outputs among the
     `signals`; `stack` closes them. isolated: as of the function. log_path: the file that what they
-    log is written to."""
+    log is written to. Raises InputFault for one that drives hardware, if not `in_real_time`."""
 
-    def __init__(self, system: System, stack: ExitStack, log_path: str = "") -> None:
+    def __init__(
+        self, system: System, stack: ExitStack, log_path: str = "", in_real_time: bool = False
+    ) -> None:
+        if hardware := [u.name for u in system.fmus if u.hardware and not in_real_time]:
+            what = f"{', '.join(hardware)}: hardware = true"
+            raise InputFault(f"{what}: it is moved by runs in real time alone (--real-time)")
         self.system, self.signals = system, SignalVector(system)
         self.isolated = find_isolated(system.fmus)
         self.instances: dict[str, Instance] = {}

@@ -2,8 +2,9 @@
 
 The event of tick k is due at origin + t_k. Of the events of the haptic clock, lateness is the time
 from there to the event's beginning, step time that from its beginning to its completion; a deadline
-is missed where it is complete after the next one is due. Where an event begins more than MOST after
-it was due, as after the machine was suspended, the schedule moves instead of being caught up with.
+is missed where it is complete after the next one is due. Events that are late are caught up with;
+with hardware in the loop, ticks that are past are skipped instead. Where an event begins more than
+MOST after it was due, as after the machine was suspended, the schedule moves.
 """
 
 from __future__ import annotations
@@ -57,6 +58,11 @@ class Pace:
         clock, wait = (_CLOCK(self.clock), _WAIT(self.wait)) if self._given else own
         self.c.fill(clock=clock, wait=wait)
 
+    def skip_late(self, most: float) -> None:
+        """Let haptic ticks that are past be skipped, and the schedule move where an event is more
+        than `most` (s) late."""
+        self.c.skips, self.c.most = 1, round(1e9 * most)
+
     def now(self) -> int:
         return self.clock()
 
@@ -83,6 +89,7 @@ class Pace:
             "priority": self.priority,
             "ticks": c.ticks,
             "deadlines_missed": c.missed,
+            "skipped": c.skipped,
             "moved": c.moved * 1e-9,
             "step_time": quantiles(self.steps, c.longest),
             "lateness": quantiles(self.lateness, c.latest),

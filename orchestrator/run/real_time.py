@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi.description import VARIABLE_STEP
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.run import concurrent_fmus
@@ -13,6 +15,10 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.concurrent_fmus import Side, ThreadWorker, Worker
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.system.system import Fmu, System
+
+SKIPPED = 8
+"""Haptic ticks of hardware that are skipped at once; where it is later, the schedule moves."""
 
 
 class Ended(Exception):
@@ -43,8 +49,12 @@ class RealTimeRun:
     def of(self, plan: Plan, simulation: Simulation) -> Iterator[None]:
         """Context of the run of a simulation, which has no loop yet; threads end with it."""
         self._simulation = simulation
-        simulation.pace = self.pace
         simulation.beside, self._in_loop = concurrent_fmus.find_concurrent(plan)
+        hardware = [fmu for fmu in plan.system.fmus if fmu.hardware]
+        self._require_skipping(plan.system, hardware)
+        haptics = plan.system.timeline.clocks[0]
+        if any(fmu.clock == haptics.name for fmu in hardware):
+            self.pace.skip_late(simulation.seconds(SKIPPED * haptics.longest))
         for clock in dict.fromkeys(simulation.beside.values()):
             fmus = [fmu for fmu in plan.system.fmus if simulation.beside.get(fmu.name) == clock]
             longer = all(fmu.description.varies_step for fmu in fmus)
@@ -54,6 +64,33 @@ class RealTimeRun:
         finally:
             left = (side.close() for side in simulation.sides.values())
             self._abandoned = [name for name in left if name]
+
+    def _require_skipping(self, system: System, hardware: Iterable[Fmu]) -> None:
+        """Raises InputFault where ticks of hardware cannot be skipped."""
+        haptics = system.timeline.clocks[0].name
+        for fmu in hardware:
+            if why := self._in_loop.get(fmu.name):
+                raise InputFault(
+                    f"{fmu.name}: hardware in the haptic loop is at its rate; this is at "
+                    f"{fmu.clock}, and not beside the loop: {why}"
+                )
+            fixed = [
+                other.name
+                for other in system.fmus
+                if other.clock == fmu.clock and not other.description.varies_step
+            ]
+            if fixed:
+                raise InputFault(
+                    f"{fmu.name}: ticks of hardware that are late are skipped, by a longer step of "
+                    f"every FMU at {'its rate' if fmu.clock != haptics else 'the haptic rate'}, "
+                    f"which {', '.join(fixed)} cannot take ({VARIABLE_STEP} is not true)"
+                )
+
+    def kinds(self, coming: Iterable[Event]) -> set[Event]:
+        """The kinds of events that are likely beside wall clocks, of which those of the plan are
+        `coming`."""
+        haptics = self._simulation.system.timeline.clocks[0].name
+        return with_skips(haptics, with_ends(coming)) if self.pace.c.skips else with_ends(coming)
 
     def turn(self, loop: CompiledLoop) -> None:
         """Raises FmuFault where an FMU beside the loop hangs, and whatever the turn raises."""
@@ -77,6 +114,19 @@ class RealTimeRun:
             "changes": self.changes,
             "abandoned": self._abandoned,
         }
+
+
+def with_skips(haptics: str, kinds: set[Event]) -> set[Event]:
+    """Kinds of events, and the same where the haptic clock goes on over ticks that are past."""
+
+    def longer(kind: Event, n: int) -> Event:
+        firings = (
+            f._replace(dticks=n * f.dticks) if f.clock == haptics and not f.final else f
+            for f in kind.firings
+        )
+        return kind._replace(firings=tuple(firings))
+
+    return {longer(kind, n) for kind in kinds for n in range(1, SKIPPED + 2)}
 
 
 def with_ends(coming: Iterable[Event]) -> set[Event]:

@@ -84,6 +84,8 @@ class RecordedArrivals(RealTimeRun):
         before = run_record.read_record(text_files.read_json(folder / "run.json"), folder)
         if not before.real_time:
             raise InputFault(f"{folder}: no run in real time, so that it has no arrivals")
+        if hardware := [fmu.name for fmu in scene.fmu if fmu.hardware]:
+            raise InputFault(f"{', '.join(map(str, hardware))}: hardware is not moved once more")
         plain = scene.tables()
         keys = [k for k in before.scene if k not in OF_A_RUN]
         if differing := [k for k in keys if not _same(before.scene[k], plain.get(k))]:

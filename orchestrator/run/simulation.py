@@ -51,12 +51,17 @@ class Simulation(LoadedFmus):
     """
 
     def __init__(
-        self, system: System, results: RunResults, stack: ExitStack, opened: ExitStack | None = None
+        self,
+        system: System,
+        results: RunResults,
+        stack: ExitStack,
+        opened: ExitStack | None = None,
+        pace: Pace | None = None,
     ) -> None:
         self.library = library = load()
-        super().__init__(system, opened or stack, results.log_path)
+        super().__init__(system, opened or stack, results.log_path, pace is not None)
         (opened or stack).callback(self._dismiss)
-        self.pace: Pace | None = None
+        self.pace = pace
         self.beside: Mapping[str, str] = {}
         self.sides: dict[str, Side] = {}
         self.arrivals: dict[str, Recorder] = {}
@@ -70,7 +75,9 @@ class Simulation(LoadedFmus):
         self.step_checks = {
             fmu.name: StepCheck(library, self.instances[fmu.name])
             for fmu in (() if repeated else system.fmus)
-            if fmu.name not in self.isolated and StepCheck.possible(fmu.description)
+            if fmu.name not in self.isolated
+            and not fmu.hardware  # which goes no step back
+            and StepCheck.possible(fmu.description)
         }
         self.loop = structures.Loop()
         self.loop.fill(system.timeline.base, "numerator", "denominator")

@@ -70,6 +70,9 @@ class ForeignFmu:
     """For an output, the output that is its time derivative, where the FMU does not declare it."""
     isolate: bool = False
     """Runs it in a process of its own."""
+    hardware: bool = False
+    """It drives hardware: it runs in real time only, and ticks that are late are skipped
+    ([real time](real-time.md#hardware))."""
 
     def __post_init__(self) -> None:
         if self.replaces and not self.name:

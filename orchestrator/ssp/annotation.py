@@ -25,7 +25,7 @@ from hapticlink.orchestrator.ssp.names import (
     SSD,
 )
 
-OF_AN_FMU = ("rate", "timing", "tolerance", "isolate", "derivatives")
+OF_AN_FMU = ("rate", "timing", "tolerance", "isolate", "hardware", "derivatives")
 
 
 def read_run_annotation(path: FilePath, root: Element) -> dict[str, Any]:

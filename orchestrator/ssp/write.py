@@ -207,7 +207,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
     tables["fmu"] = {
         u.name: {"rate": as_json(rates[u.name]), "timing": u.description.timing}
         | ({"tolerance": tolerances[u.name]} if u.name in tolerances else {})
-        | ({"isolate": True} if u.isolate else {})
+        | {key: True for key in ("isolate", "hardware") if getattr(u, key)}
         | ({"derivatives": derivatives[u.name]} if u.name in derivatives else {})
         for u in system.fmus
     }

@@ -143,7 +143,10 @@ def _assemble(
     if not exported:
         ours = [_started(fmu, block) for fmu, block in zip(ours, planned.own, strict=True)]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
-    foreign = (Fmu(t.name, about, of[t.name], starts, t.isolate) for t, about, starts, _ in tables)
+    foreign = (
+        Fmu(t.name, about, of[t.name], starts, t.isolate, t.hardware)
+        for t, about, starts, _ in tables
+    )
     every = sorted((*ours, *foreign), key=lambda u: order.get(u.name, len(order)))
     alone = (replace(u, isolate=u.isolate or scene.isolate) for u in every)
     fmus = tuple(with_sizes(u, time) for u in alone)

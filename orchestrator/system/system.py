@@ -29,14 +29,16 @@ class ServedAt:
 
 @dataclass(frozen=True)
 class Fmu:
-    """One FMU of the system, the clock that it steps at, its start values, and whether it runs in
-    a process of its own. recorded_only: outputs that are only read for the rows of a table."""
+    """One FMU of the system, the clock that it steps at, its start values, whether it runs in
+    a process of its own, and whether it drives hardware. recorded_only: outputs that are only read
+    for the rows of a table."""
 
     name: str
     description: Description
     clock: str
     starts: Starts = ()
     isolate: bool = False
+    hardware: bool = False
     recorded_only: frozenset[str] = frozenset()
     served: ServedAt | None = None
     """Where it runs, if that is on another computer."""

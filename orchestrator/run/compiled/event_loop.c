@@ -125,6 +125,10 @@ static int next_event(Loop *l, Events *e) {
                 fires = 1;
             }
         }
+        if (e->pace && e->pace->skips && e->clocks->next > e->clocks->at) {
+            const int code = pace_skip(l, e);
+            if (code) return code;
+        }
         e->tick = tick;
         if (fires) return find_kind(l, e);
         if (turn_is_due(e, e->pace->clock())) return PAUSE;

@@ -292,8 +292,9 @@ typedef struct {
     int64_t (*clock)(void);
     void (*wait)(int64_t until);
     int64_t origin, most;                 /* when tick 0 is due; lateness that moves it */
-    int64_t reached, due, begun;          /* the last tick that was waited for; of the event */
-    int64_t ticks, missed, moved;
+    int64_t skips;                        /* whether ticks that are past are skipped */
+    int64_t reached, due, deadline, begun; /* the last tick that was waited for; of the event */
+    int64_t ticks, missed, skipped, moved;
     int64_t latest, longest;
     int64_t *lateness, *steps;            /* histograms */
 } Pace;
@@ -406,6 +407,7 @@ int meter_fold(Meter *m); /* adds rows to the sums and drops them; whether that 
 void meter_work(const Meter *m, double work[2]);
 double meter_energy(const Meter *m);
 int pace_wait(const Loop *l, Events *e, int64_t tick);
+int pace_skip(const Loop *l, Events *e);
 void pace_begin(const Loop *l, Events *e);
 void pace_end(const Loop *l, Events *e, int64_t time);
 int64_t now(void);

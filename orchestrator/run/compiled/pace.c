@@ -33,11 +33,34 @@ int pace_wait(const Loop *l, Events *e, int64_t tick) {
     return 0;
 }
 
+/* Hardware does not get the ticks that it has missed one right after the other: the haptic clock's
+ * next communication point is the first one that is not past, or the run's last. STARTS where its
+ * window ends before that. */
+int pace_skip(const Loop *l, Events *e) {
+    Clock *c = e->clocks;
+    const int64_t time = e->pace->clock();
+    if (time - due(l, e->pace, c->starts[c->at]) > e->pace->most) return 0; /* the schedule moves */
+    while (c->starts[c->next] < e->end && due(l, e->pace, c->starts[c->next]) <= time) {
+        if (c->next + 1 == c->n) {
+            e->at.what = 0;
+            return STARTS;
+        }
+        c->next++;
+    }
+    return 0;
+}
+
 /* The haptic clock's event begins. */
 void pace_begin(const Loop *l, Events *e) {
     Pace *p = e->pace;
+    const Clock *c = e->clocks;
     p->begun = p->clock();
     p->due = due(l, p, e->tick);
+    p->deadline = due(l, p, c->starts[c->at + 1]);
+    const int64_t skipped = c->next - c->at - 1;
+    p->ticks += skipped;
+    p->missed += skipped;
+    p->skipped += skipped;
     const int64_t late = p->begun - p->due;
     p->lateness[bin(late)]++;
     if (late > p->latest) p->latest = late;
@@ -49,9 +72,9 @@ void pace_begin(const Loop *l, Events *e) {
 /* It is complete; its deadline is the next one's beginning. */
 void pace_end(const Loop *l, Events *e, int64_t time) {
     Pace *p = e->pace;
-    const int64_t took = time - p->begun, period = (int64_t)(1e9 * tick_time(l, e->key[1] / 2));
+    const int64_t took = time - p->begun;
     p->steps[bin(took)]++;
     if (took > p->longest) p->longest = took;
-    p->missed += time - p->due > period;
+    p->missed += time > p->deadline;
     p->ticks++;
 }

@@ -114,6 +114,98 @@ def test_deadlines_that_are_missed_are_counted(tmp_path):
     assert clock.time == 250 * MS + int(153e9 / 512)
 
 
+HARDWARE = "hardware = true\n"
+
+
+def hardware_scene(folder: Path, more: str = HARDWARE, **options: bool) -> Path:
+    """A device's FMU, which notes the tick and the length of each step, in a loop at 512 Hz."""
+    note = "self.y = 1000.0 * round(512 * time) + round(512 * size)"
+    python_fmu(folder, "Device", note, **options)
+    return scene(folder, fmu_table("device", "Device", more), 512, 0.3)
+
+
+FIXED = {"canHandleVariableCommunicationStepSize": False}
+
+
+@pytest.mark.parametrize(
+    ("late", "skips", "missed"),
+    [
+        ({}, {}, 0),
+        ({101 * MS: 1 * MS}, {}, 0),  # tick 52, due at 101.6 ms: complete before the next is due
+        ({101 * MS: 3 * MS}, {52: 2}, 2),
+        # The last time until after the end, so that the last tick is late, too.
+        ({101 * MS: 5 * MS, 107 * MS: 2 * MS, 290 * MS: 15 * MS}, {52: 3, 55: 2, 149: 4}, 10),
+    ],
+    ids=["in time", "within a period", "one", "several"],
+)
+def test_hardware_is_not_given_the_ticks_that_are_past(tmp_path, late, skips, missed):
+    """It goes on to the first tick that is not past, or the last one of the run."""
+    path = hardware_scene(tmp_path)
+    run = simulate(path, tmp_path / "out", (), real_time=WallClock(late=late).run()).run
+    assert run["fault"] is None
+    begun, want = 0, []
+    while begun < 153:
+        want.append((begun, skips.get(begun, 1)))
+        begun += want[-1][1]
+    rows = read_table(tmp_path / "out" / "haptics.csv")
+    assert (rows["time"][1:] * 512).tolist() == [begun + length for begun, length in want]
+    assert rows["device.y"][1:].tolist() == [1000.0 * begun + length for begun, length in want]
+    told, skipped = run["real_time"], sum(skips.values()) - len(skips)
+    assert (told["ticks"], told["skipped"]) == (154, skipped)
+    assert told["deadlines_missed"] == missed
+    assert told["moved"] == 0.0
+
+
+def test_hardware_that_is_very_late_begins_anew_at_its_rate(tmp_path):
+    """Beyond eight periods the schedule moves by the lateness."""
+    path, clock = hardware_scene(tmp_path), WallClock(late={101 * MS: 16 * MS})
+    told = simulate(path, tmp_path / "out", (), real_time=clock.run()).run["real_time"]
+    assert (told["skipped"], told["deadlines_missed"], told["moved"]) == (0, 1, 0.016)
+    assert clock.time == 16 * MS + int(153e9 / 512)
+
+
+def test_ticks_past_are_caught_up_with_where_no_hardware_is(tmp_path):
+    path = hardware_scene(tmp_path, "")
+    clock = WallClock(late={101 * MS: 5 * MS})
+    told = simulate(path, tmp_path / "out", (), real_time=clock.run()).run["real_time"]
+    assert (told["ticks"], told["skipped"], told["deadlines_missed"]) == (154, 0, 2)
+    rows = read_table(tmp_path / "out" / "haptics.csv")
+    assert np.array_equal(rows["time"], np.arange(154) / 512)
+
+
+def test_longer_steps_have_the_frames_between_them(tmp_path):
+    """Frames at 60 Hz beside a loop whose ticks are skipped keep their times."""
+    python_fmu(tmp_path, "Frames")
+    path = hardware_scene(tmp_path)
+    path.write_text(path.read_text() + fmu_table("frames", "Frames", "rate = 60\n"))
+    clock = WallClock(late={99 * MS: 4 * MS})  # over the frame at 100 ms
+    told = simulate(path, tmp_path / "out", (), real_time=clock.run()).run["real_time"]
+    assert told["skipped"] == 2
+    samples = read_table(tmp_path / "out" / "60hz_samples.csv")
+    assert np.array_equal(samples["time"], np.arange(len(samples["time"])) / 60)
+    assert told["samples"]["60hz"]["taken"] == 17
+
+
+@pytest.mark.parametrize(
+    ("more", "options", "paced", "message"),
+    [
+        (HARDWARE, {}, False, "device: hardware = true: it is moved by runs in real time"),
+        (HARDWARE, FIXED, True, "which device cannot take"),
+        (
+            HARDWARE + "rate = 64\ntiming = 'sampled'\n",
+            {},
+            True,
+            "device: hardware in the haptic loop is at its rate; .* due within the instant",
+        ),
+    ],
+)
+def test_hardware_whose_ticks_cannot_be_skipped_is_refused(tmp_path, more, options, paced, message):
+    path = hardware_scene(tmp_path, more, **options)
+    run = simulate(path, tmp_path / "out", (), real_time=WallClock().run() if paced else None)
+    assert run.results.haptics["time"].size == 0
+    assert re.search(message, str(run.outcome.fault))
+
+
 def test_quantiles_are_within_a_bin_of_those_of_the_numbers():
     numbers = np.random.default_rng(1).lognormal(9.0, 2.0, 4000).astype(int)
     ends = [pace._upper(i) for i in range(pace.BINS)]
