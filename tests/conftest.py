@@ -25,6 +25,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+COLLECTED = pytest.StashKey[set[str]]()
+"""Files, tests and cases that were collected."""
 WAITING = ("tests/visualization", "tests/docs/test_examples", "tests/orchestrator/network")
 """Tests that wait for a page, a command or a clock come first: others run meanwhile."""
 
@@ -37,11 +39,15 @@ def pytest_xdist_auto_num_workers() -> int:
 
 @pytest.hookimpl(tryfirst=True)  # before tests are selected by their marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    slow = set(SLOW.read_text().splitlines())
+    slow, collected = set(SLOW.read_text().splitlines()), set[str]()
     for item in items:
         name = item.nodeid.removeprefix("tests/")
-        if slow & {name, name.partition("[")[0], name.partition("::")[0]}:
+        names = {name, name.partition("[")[0], name.partition("::")[0]}
+        collected |= names
+        if slow & names:
             item.add_marker("slow")
+    if items:
+        items[0].config.stash[COLLECTED] = collected
     items.sort(key=lambda item: not item.nodeid.startswith(WAITING))
 
 
@@ -58,5 +64,6 @@ from tests.shared_fixtures import (  # noqa: E402, F401
     fmus_of_a_room_unpacked_once,
     fmus_unpacked_once,
     own_temporary_folder,
+    shared_folder,
     stamped,
 )

@@ -56,14 +56,29 @@ def fmus_unpacked_once() -> Iterator[None]:
 COMPILED = compiler._compile
 
 
-@pytest.fixture(scope="session", autouse=True)
-def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """The same C text for the same system is compiled once, by whichever process of the tests needs
-    it first; fmus/test_native_fmu_entries.py has tests of the compiler itself."""
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all processes of these tests have. Pytest removes it with the others of a
+    session, that of a session that was killed, too: but for the last three."""
     base = tmp_path_factory.getbasetemp()
     shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    kept = shared / "compiled"
-    kept.mkdir(exist_ok=True)
+    (shared / "compiled").mkdir(exist_ok=True)
+    return shared / "compiled"
+
+
+def made_once(path: Path, make: Callable[[Path], object]) -> Path:
+    """A file of that folder, made by whichever process needs it first."""
+    with lock.hold_lock(path.with_name(f"{path.name}.lock"), lambda: None):
+        if not path.exists():
+            make(part := path.with_name(f"{path.name}.part"))
+            part.replace(path)
+    return path
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once(shared_folder: Path) -> Iterator[None]:
+    """The same C text for the same system is compiled once; fmus/test_native_fmu_entries.py has
+    tests of the compiler itself."""
 
     def compiled(
         source: Iterable[Path], folder: Path, target: str, options: Sequence[str]
@@ -74,12 +89,11 @@ def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         texts = [path.read_bytes() for path in (*files, *sorted(headers))]
         flags = [target, *(option for option in options if not option.startswith("-I"))]
         key = sha256(b"\0".join([*texts, *map(str.encode, flags)])).hexdigest()
-        with lock.hold_lock(kept / f"{key}.lock", lambda: None):
-            if not (kept / key).exists():
-                made = COMPILED(files, folder, target, options)
-                (kept / f"{key}.part").write_bytes(made)
-                (kept / f"{key}.part").replace(kept / key)
-        return (kept / key).read_bytes()
+        made = made_once(
+            shared_folder / key,
+            lambda part: part.write_bytes(COMPILED(files, folder, target, options)),
+        )
+        return made.read_bytes()
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compiler, "_compile", compiled)

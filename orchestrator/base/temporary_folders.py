@@ -11,6 +11,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 from hapticlink.fmus.plain_folder import find_unpacking_folder
@@ -28,6 +29,7 @@ def _prefix() -> str:
 def make_folder() -> str:
     """Creates a temporary folder `hapticlink-<machine>-<process>-<random>`, which the caller has to
     remove, where FMUs can be unpacked."""
+    _clear_once()
     return tempfile.mkdtemp(prefix=f"{_prefix()}{os.getpid()}-", dir=find_unpacking_folder())
 
 
@@ -42,12 +44,19 @@ def temporary_folder() -> Iterator[Path]:
 @contextmanager
 def folder_if_needed() -> Iterator[Path]:
     """The path of a temporary folder, which whoever needs it creates within the context."""
+    _clear_once()
     path = Path(tempfile.gettempdir(), f"{_prefix()}{os.getpid()}-{os.urandom(8).hex()}")
     try:
         yield path
     finally:
         if path.exists():
             shutil.rmtree(path, ignore_errors=True)
+
+
+@cache
+def _clear_once() -> None:
+    """Before the first folder of a process, which may be a script without a command."""
+    clear()
 
 
 def clear(ended: int | None = None) -> None:

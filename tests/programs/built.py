@@ -1,11 +1,13 @@
 """Programs of scenes for tests: compiled by the machine's own compiler without optimisation, each C
 file once, since another hold or rate changes the data of a scene alone."""
 
+from __future__ import annotations
+
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from fmpy import platform, platform_tuple, sharedLibraryExtension
 from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator import open_scene
 from hapticlink.programs.build import OPTIONS, program_files
+from tests.shared_fixtures import made_once
 
 DATA_OF = {"program.c": "scene.h", "fmi3.c": "fmi3_rest.h"}
 """The C files that depend on the scene, with the headers that hold its data."""
@@ -25,9 +28,8 @@ needs_compiler = pytest.mark.skipif(
 )
 
 
-@cache
-def _folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix="hapticlink-programs-", dir="/tmp"))
+folder: Path
+"""Where they are kept, as `conftest.py` says."""
 
 
 def program(
@@ -40,12 +42,12 @@ def program(
 @cache
 def _program(scene: str, options: tuple[str, ...], without: str | None, fmi: int) -> Path:
     files = program_files(open_scene.load(scene, options), "program", without, fmi)
-    folder = Path(tempfile.mkdtemp(dir=_folder()))
+    room = Path(tempfile.mkdtemp(dir=folder))
     shared = ("-shared", "-Wl,-Bsymbolic")
-    library = linked(str(COMPILER), sources(files), folder / "library", FLAGS, shared).read_bytes()
+    library = linked(str(COMPILER), sources(files), room / "library", FLAGS, shared).read_bytes()
     place = platform if fmi == 2 else platform_tuple
     whole = {**files, f"binaries/{place}/program{sharedLibraryExtension}": library}
-    return write_fmu(whole, folder, "program")
+    return write_fmu(whole, room, "program")
 
 
 def sources(files: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -66,7 +68,7 @@ def linked(
     shared = sorted(foreign | headers_alone)
     headers = b"".join(sources[n] for n in shared if not n.startswith("fmi3"))
     objects = []
-    with tempfile.TemporaryDirectory(dir=_folder()) as name:
+    with tempfile.TemporaryDirectory(dir=folder) as name:
         room = Path(name)
         for file, content in sources.items():
             (room / file).parent.mkdir(parents=True, exist_ok=True)
@@ -75,13 +77,15 @@ def linked(
             uses = sources[DATA_OF[file]] if file in DATA_OF else b""
             how = map(str.encode, (compiler, *flags))
             key = sha256(b"\0".join([sources[file], headers, uses, *how]))
-            kept = _folder() / f"{key.hexdigest()}.o"
-            if not kept.exists():
-                _run(compiler, *flags, "-c", "-o", str(kept), str(room / file))
-            objects.append(str(kept))
-        _run(compiler, *flags, *link, "-o", str(target), *objects, "-lm")
+            objects.append(
+                made_once(
+                    folder / f"{key.hexdigest()}.o",
+                    partial(_run, compiler, *flags, "-c", room / file, "-o"),
+                )
+            )
+        _run(compiler, *flags, *link, "-o", target, *objects, "-lm")
     return target
 
 
-def _run(*command: str) -> None:
+def _run(*command: str | Path) -> None:
     subprocess.run(command, check=True, capture_output=True, text=True)

@@ -253,19 +253,29 @@ def test_a_crash_of_the_whole_run_loses_no_row_and_leaves_no_folder(tmp_path, cr
     assert not folders()
 
 
-def test_a_command_removes_the_folders_of_dead_processes_and_no_others(tmp_path):
-    name = "hapticlink.orchestrator.base.temporary_folders"
-    made = f"import {name} as folders; print(folders.make_folder()); {{}}"
+FOLDERS = "import hapticlink.orchestrator.base.temporary_folders as folders"
+RUNS_LATER = {
+    "a command": [*COMMAND, "--version"],
+    "a script": [
+        *(sys.executable, "-c"),
+        f"{FOLDERS}\nwith folders.temporary_folder(): pass",
+    ],
+}
+
+
+@pytest.mark.parametrize("later", RUNS_LATER.values(), ids=RUNS_LATER)
+def test_what_runs_later_removes_the_folders_of_dead_processes_and_no_others(later):
+    own = Path(temporary_folders.make_folder())
     kill = "__import__('os').kill(__import__('os').getpid(), 9)"
-    script = [sys.executable, "-c", "import sys; " + made.format(f"sys.stdout.flush(); {kill}")]
+    made = f"{FOLDERS}; print(folders.make_folder(), flush=True); {kill}"
+    script = [sys.executable, "-c", made]
     dead = Path(subprocess.run(script, capture_output=True, text=True, check=False).stdout.strip())
     elsewhere = dead.with_name(f"hapticlink-elsewhere-{dead.name[20:]}")
-    others = [Path(temporary_folders.make_folder()), elsewhere]
     elsewhere.mkdir()
     assert dead.is_dir()
-    subprocess.run([*COMMAND, "--version"], check=True, capture_output=True)
+    subprocess.run(later, check=True, capture_output=True)
     assert not dead.exists()
-    for other in others:
+    for other in (own, elsewhere):
         other.rmdir()
 
 
