@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -105,9 +106,14 @@ FILES = _files()
 """The files of the package by their module, `("fmus", "native", "compile")`."""
 
 
-def imports(path: Path) -> Iterator[Module]:
+@cache
+def imports(path: Path) -> list[Module]:
     """The modules of the project that a file imports anywhere in it, by either statement, or names
     in a string; () or a module of one name that is no building is the API."""
+    return [*_imports(path)]
+
+
+def _imports(path: Path) -> Iterator[Module]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             named = [tuple(name.name.split(".")) for name in node.names]

@@ -107,7 +107,14 @@ def compiler_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 RUNNING = (
-    *("tests/analysis/", "tests/api/", "tests/commands/", "tests/docs/", "tests/programs/"),
+    *(
+        "tests/orchestrator/",
+        "tests/analysis/",
+        "tests/api/",
+        "tests/commands/",
+        "tests/docs/",
+        "tests/programs/",
+    ),
     *("tests/reference/", "tests/studies/", "tests/visualization/"),
 )
 """Rooms of tests that run scenes for their numbers."""

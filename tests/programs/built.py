@@ -28,7 +28,7 @@ needs_compiler = pytest.mark.skipif(
 )
 
 
-folder: Path
+folder = Path()
 """Where they are kept, as `conftest.py` says."""
 
 

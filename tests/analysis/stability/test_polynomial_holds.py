@@ -72,9 +72,9 @@ def test_a_period_is_that_in_which_each_evaluation_is_differentiated(
     assert fused == pytest.approx(found, abs=1e-9)
 
 
-@pytest.mark.parametrize("rate", [60, 20])
+@pytest.mark.parametrize("rate", ["1024/17", "512/26"])  # periods of 17 and 26 ticks
 def test_along_the_coordinates_of_a_gradient_a_hold_has_slopes(
-    rate: int, monkeypatch: pytest.MonkeyPatch
+    rate: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def found() -> list[complex]:
         options = SCENE | {"hold": "model", "graphics.rate": rate}

@@ -124,7 +124,7 @@ def outside(figure: Figure) -> list[str]:
     """What of a figure is drawn beyond its edges: axes with titles, names and ticks in view, and
     legends."""
     canvas = FigureCanvasAgg(figure)
-    canvas.draw()
+    figure.draw_without_rendering()
     width, height = figure.bbox.size
     found = []
     for artist in (*figure.axes, *figure.legends, *figure.texts):

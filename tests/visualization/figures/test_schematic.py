@@ -69,6 +69,7 @@ def test_a_drawing_says_where_signals_come_from_and_how_they_are_held() -> None:
     assert "k_j = 200 1/s2" in said
 
 
+@cache
 def _components(scene: str) -> dict[str, Component]:
     return {b.name: component(b.block, b.settings) for b in blocks(hl.scene(scene)).built}
 
