@@ -1,7 +1,8 @@
-"""The report's experiment in real time, beside an empty timer loop of the same rate.
+"""The report's experiment in real time, beside an empty timer loop of the same rate, and beside
+cyclictest of the same rate and priority where it is installed.
 
-The empty loop is the loop in C without an operation, in a thread of the same process: what it
-misses is the machine's.
+The empty loop is the loop in C without an operation, in a thread of the same process that has the
+normal priority. What cyclictest misses is the machine's.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from benchmarks import cyclictest
 from benchmarks.page import Progress, load_average, system, table
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.run import real_time_priority
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.library import load
 from hapticlink.orchestrator.run.compiled.loop import Events
@@ -66,7 +69,10 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     seconds = QUICK if quick else SECONDS
     empty, load = EmptyLoop(seconds), load_average()
     options = ["packaging=native", f"duration={seconds}", f"haptics.rate={RATE}"]
-    with temporary_folders.temporary_folder() as room:
+    with (
+        cyclictest.beside(RATE, real_time_priority.PRIORITY) as latencies,
+        temporary_folders.temporary_folder() as room,
+    ):
         results = simulate(
             SCENE,
             room,
@@ -82,20 +88,36 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     figure = real_time(results, curves, f"an empty loop beside it misses {missed(beside)}")
     assert figure
     figure.savefig(folder / "real_time.png", dpi=150)
-    return page(report, beside, seconds, load, command)
+    return page(report, beside, latencies[0] if latencies else None, seconds, load, command)
 
 
 def missed(report: Report) -> str:
     return f"{report['deadlines_missed'] or 'none'}"
 
 
-def page(ours: Report, empty: Report, seconds: int, load: float, command: str) -> str:
-    """The page: deadlines missed by both loops, and the table of their times."""
+def page(
+    ours: Report,
+    empty: Report,
+    latencies: cyclictest.Latencies | None,
+    seconds: int,
+    load: float,
+    command: str,
+) -> str:
+    """The page: deadlines missed by both loops and by cyclictest, and the table of their times."""
+    priority = real_time_priority.PRIORITY
     rows = {
         "step time of the haptic loop": ours["step_time"],
         "lateness of the haptic loop": ours["lateness"],
         "lateness of the empty loop": empty["lateness"],
     }
+    machine = []
+    if latencies:
+        rows["lateness of cyclictest"] = latencies.quantiles()
+        later = latencies.later_than(ours["period"])
+        machine = [
+            f"`cyclictest` at priority {priority} in the same time woke later than a period "
+            f"{later or 'not once'} of {latencies.wakings} times."
+        ]
     samples = ours["samples"]["graphics"]
     lines = [
         "# Real time",
@@ -103,10 +125,12 @@ def page(ours: Report, empty: Report, seconds: int, load: float, command: str) -
         f"In {seconds} s at {RATE} Hz the haptic loop of `{SCENE}` with native FMUs missed "
         f"{missed(ours)} of {ours['ticks']} deadlines, an empty timer loop beside it "
         f"{missed(empty)} of {empty['ticks']}.",
+        *machine,
         "",
         "![Share of ticks whose step time and lateness exceed a time](real_time.png)",
         "",
-        f"Made by `{command}`, on {system()} and a load average of {load:.1f} before. "
+        f"Made by `{command}`, on {system()} and a load average of {load:.1f} before; the loop's "
+        f"scheduler: {ours['priority']['scheduler']}. "
         f"Milliseconds; the deadline of a tick is the next one, {short(1e3 * ours['period'])} ms "
         "after it was due. Rows are recorded, the "
         f"graphics clock runs in a thread: {samples['late']} of its {samples['taken']} samples "

@@ -20,6 +20,7 @@ from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.plan.operations import Event, Firing, OfFmu, Step
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.run import real_time_priority
 from hapticlink.orchestrator.run.compiled import structures
 
 GRACE = 2.0
@@ -53,6 +54,7 @@ class ThreadWorker:
         self._jobs.put((job, done))
 
     def _work(self) -> None:
+        real_time_priority.raise_beside()
         while calls := self._jobs.get():
             for call in calls:
                 call()

@@ -2,8 +2,9 @@
 
 On Linux: SCHED_FIFO (sched(7)), above every normal thread and below the kernel's own; memory that
 is locked, so that no page is fetched in the middle of a step (mlockall(2)); and a core of its own
-where the machine was started with `isolcpus`. Threads and processes that the loop starts keep the
-normal priority: a graphics block beside it never delays it.
+where the machine was started with `isolcpus`. Threads that take steps beside the loop have the
+priority below it: one that the machine stops while it holds the interpreter would stop the loop.
+Other threads, and processes that the loop starts, keep the normal priority.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 PRIORITY = 20
@@ -31,6 +32,15 @@ def raise_priority() -> Iterator[dict[str, str]]:
         return
     with ExitStack() as undo:
         yield {"scheduler": _scheduler(undo), "memory": _memory(undo), "core": _core(undo)}
+
+
+def raise_beside() -> None:
+    """Give a thread beside the loop the priority below it, where the user may, and where it has
+    none yet, as under `chrt`."""
+    if sys.platform == "linux" and not os.sched_getparam(0).sched_priority:
+        with suppress(OSError):
+            lower = os.sched_param(PRIORITY - 1)
+            os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, lower)
 
 
 def _scheduler(undo: ExitStack) -> str:

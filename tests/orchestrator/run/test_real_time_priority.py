@@ -7,6 +7,7 @@ import threading
 import pytest
 
 from hapticlink.orchestrator.run import real_time_priority
+from hapticlink.orchestrator.run.concurrent_fmus import ThreadWorker
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="sched(7) is of Linux")
 
@@ -24,6 +25,26 @@ def test_the_thread_has_the_priority_and_its_threads_do_not():
     assert beside == [os.SCHED_OTHER]
     after = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getaffinity(0)
     assert after == before
+
+
+def test_steps_beside_the_loop_have_the_priority_below_it():
+    """At the normal one the machine would stop them while they hold the interpreter, and with it
+    the loop."""
+    worker, done = ThreadWorker(), threading.Event()
+    found: list[tuple[int, int]] = []
+
+    def policy() -> None:
+        found.append((os.sched_getscheduler(0), os.sched_getparam(0).sched_priority))
+
+    worker.submit(policy, done.set)
+    assert done.wait(60)
+    worker.close(60)
+    with real_time_priority.raise_priority() as got:
+        own = os.sched_getparam(0).sched_priority
+    if got["scheduler"].startswith("SCHED_FIFO"):
+        assert found == [(os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, own - 1)]
+    else:
+        assert found[0][1] == os.sched_getparam(0).sched_priority
 
 
 def test_a_missing_right_is_a_reason_and_no_error(monkeypatch):
