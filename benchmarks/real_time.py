@@ -44,22 +44,19 @@ class EmptyLoop:
         events: Any = Events
         self._events = events(self, timeline, lambda event: (0, 0), self.pace)
         self._events.patience(NEVER)
-        self._thread: Thread | None = None
+        self._thread = Thread(target=self._events.run, args=(lambda tick: None,))
 
     def code(self, at: object, run: Callable[..., int], *arguments: int) -> int:
         """What a function of the loop returns."""
         return run(*arguments)
 
-    def start(self, *_: object) -> None:
-        """Start, once."""
-        if self._thread is None:
-            self.pace.c.origin = self.pace.now()
-            self._thread = Thread(target=self._events.run, args=(lambda tick: None,))
-            self._thread.start()
+    def start(self) -> None:
+        """Start, before the other loop, which would wait for the new thread's first turn."""
+        self.pace.c.origin = self.pace.now()
+        self._thread.start()
 
     def report(self) -> Report:
         """What became of it, once it has ended."""
-        assert self._thread
         self._thread.join()
         return self.pace.report()
 
@@ -73,12 +70,13 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
         cyclictest.beside(RATE, real_time_priority.PRIORITY) as latencies,
         temporary_folders.temporary_folder() as room,
     ):
+        empty.start()
         results = simulate(
             SCENE,
             room,
             options,
             lambda time: progress(SCENE, int(time), seconds),
-            real_time=RealTimeRun(empty.start),
+            real_time=RealTimeRun(),
         ).results
     report = results.record.real_time
     assert report, results.record.fault

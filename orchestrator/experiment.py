@@ -41,7 +41,7 @@ from hapticlink.orchestrator.run.compiled import library
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, require_concurrent
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
-from hapticlink.orchestrator.run.open_fmus import find_isolated
+from hapticlink.orchestrator.run.open_fmus import find_isolated, refuse_hardware
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.overrides import Options
@@ -171,6 +171,8 @@ def simulate(
             sides = dict.fromkeys(require_concurrent(plan).values())
             tables |= {f"{clock}_{SAMPLES}": COLUMNS for clock in sides}
             tables |= {f"{fmu.name}_{FRAMES}": FRAME for fmu in system.fmus if fmu.served}
+        else:
+            refuse_hardware(system.fmus)
         before = setup(read, plan, tables, _find_left_out(every, system))
         alone = find_isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]

@@ -107,15 +107,10 @@ def compiler_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 RUNNING = (
-    *(
-        "tests/orchestrator/",
-        "tests/analysis/",
-        "tests/api/",
-        "tests/commands/",
-        "tests/docs/",
-        "tests/programs/",
-    ),
+    *("tests/analysis/", "tests/api/", "tests/commands/", "tests/docs/", "tests/programs/"),
     *("tests/reference/", "tests/studies/", "tests/visualization/"),
+    *(f"tests/orchestrator/{room}/" for room in ("holds", "plan", "results", "run", "scene")),
+    *("tests/orchestrator/ssp/", "tests/orchestrator/system/"),
 )
 """Rooms of tests that run scenes for their numbers."""
 

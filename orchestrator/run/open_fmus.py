@@ -42,6 +42,13 @@ def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     return alone
 
 
+def refuse_hardware(fmus: Iterable[Fmu]) -> None:
+    """Raises InputFault for FMUs that drive hardware, outside of a run in real time."""
+    if hardware := [fmu.name for fmu in fmus if fmu.hardware]:
+        what = f"{', '.join(hardware)}: hardware = true"
+        raise InputFault(f"{what}: it is moved by runs in real time alone (--real-time)")
+
+
 class LoadedFmus:
     """The FMUs of a system, loaded: `instances` by name, each of which fills its outputs among the
     `signals`; `stack` closes them. isolated: as of the function. log_path: the file that what they
@@ -50,9 +57,8 @@ class LoadedFmus:
     def __init__(
         self, system: System, stack: ExitStack, log_path: str = "", in_real_time: bool = False
     ) -> None:
-        if hardware := [u.name for u in system.fmus if u.hardware and not in_real_time]:
-            what = f"{', '.join(hardware)}: hardware = true"
-            raise InputFault(f"{what}: it is moved by runs in real time alone (--real-time)")
+        if not in_real_time:
+            refuse_hardware(system.fmus)
         self.system, self.signals = system, SignalVector(system)
         self.isolated = find_isolated(system.fmus)
         self.instances: dict[str, Instance] = {}

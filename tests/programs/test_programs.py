@@ -345,3 +345,9 @@ def test_its_memory_is_its_own(fmi: int, tmp_path: Path) -> None:
             raise AssertionError(failed.stderr) from failed
         pytest.skip("the compiler has no sanitizers")
     life.lived([made], files["modelDescription.xml"].decode())
+
+
+def test_programs_of_tests_are_left_to_pytest(tmp_path_factory) -> None:
+    """Which removes folders of former sessions; those of processes that were killed, too."""
+    made = program("pendulum", (HALF,))
+    assert made.is_relative_to(tmp_path_factory.getbasetemp().parent)

@@ -10,12 +10,15 @@ from fractions import Fraction
 from pathlib import Path
 from time import perf_counter_ns
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+import hapticlink as hl
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.results.read_results import read_table
 from hapticlink.orchestrator.run import concurrent_fmus, pace
 from hapticlink.orchestrator.run.real_time import RealTimeRun
@@ -187,23 +190,48 @@ def test_longer_steps_have_the_frames_between_them(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("more", "options", "paced", "message"),
+    ("more", "options", "message"),
     [
-        (HARDWARE, {}, False, "device: hardware = true: it is moved by runs in real time"),
-        (HARDWARE, FIXED, True, "which device cannot take"),
+        (HARDWARE, FIXED, "which device cannot take"),
         (
             HARDWARE + "rate = 64\ntiming = 'sampled'\n",
             {},
-            True,
             "device: hardware in the haptic loop is at its rate; .* due within the instant",
         ),
     ],
 )
-def test_hardware_whose_ticks_cannot_be_skipped_is_refused(tmp_path, more, options, paced, message):
+def test_hardware_whose_ticks_cannot_be_skipped_is_refused(tmp_path, more, options, message):
     path = hardware_scene(tmp_path, more, **options)
-    run = simulate(path, tmp_path / "out", (), real_time=WallClock().run() if paced else None)
+    run = simulate(path, tmp_path / "out", (), real_time=WallClock().run())
     assert run.results.haptics["time"].size == 0
     assert re.search(message, str(run.outcome.fault))
+
+
+@pytest.fixture(scope="module")
+def device(tmp_path_factory) -> Path:
+    """A scene whose device is an FMU that drives hardware."""
+    folder = tmp_path_factory.mktemp("device")
+    hl.build("closed-loop-ideal", out=folder)
+    path = folder / "scene.toml"
+    swapped = '[[fmu]]\nreplaces = "haptic_device"\npath = "haptic_device.fmu"\nhardware = true\n'
+    path.write_text(f'extends = "closed-loop-ideal"\nduration = 0.3\n{swapped}')
+    return path
+
+
+def test_no_step_of_hardware_is_tried_twice(device, tmp_path):
+    clock = WallClock(late={101 * MS: 5 * MS})
+    run = simulate(device, tmp_path, (), real_time=clock.run()).run
+    assert run["fault"] is None
+    assert [*run["step_errors"]] == ["virtual_mechanism"]  # without `hardware` the device's, too
+    assert run["real_time"]["skipped"] == 2
+
+
+@pytest.mark.parametrize("act", [hl.run, hl.stability, hl.transparency])
+def test_nothing_but_a_run_in_real_time_moves_hardware(device, act, monkeypatch):
+    loaded = Mock(side_effect=AssertionError)
+    monkeypatch.setattr(InProcess, "_load", loaded)
+    with pytest.raises(hl.InputFault, match="haptic_device: hardware = true: it is moved by runs"):
+        act(device)
 
 
 def test_quantiles_are_within_a_bin_of_those_of_the_numbers():

@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import pytest
 
+import hapticlink as hl
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
@@ -29,6 +30,14 @@ def annotated(folder: Path, content: Any) -> str:
 def test_an_annotation_says_rates(tmp_path):
     path = annotated(tmp_path, {**RUN, "fmu": {"c": {"rate": 25}}})
     assert len(simulate(path, tmp_path / "out").results.tables["25hz"]["c.y"]) == 6
+
+
+def test_hardware_goes_into_an_ssp_and_comes_back(tmp_path):
+    read = open_scene.load(annotated(tmp_path, {**RUN, "fmu": {"c": {"hardware": True}}}))
+    hl.export(read, out=tmp_path / "again.ssp")
+    again = open_scene.load(str(tmp_path / "again.ssp"))
+    for scene in (read, again):
+        assert {f.name: f.hardware for f in scene.fmu} == {"a_b": False, "c": True}
 
 
 @pytest.mark.parametrize(
