@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import fields
+from functools import lru_cache
 from typing import Any
 
 from hapticlink.orchestrator.base.errors import InputFault
@@ -81,6 +82,7 @@ def _statements(text: str) -> Iterator[tuple[int, str]]:
             start, depth = token.end(), 0
 
 
+@lru_cache(1024)  # the same keys in each scene that is read
 def parts(dotted: str) -> tuple[str, ...]:
     """The names of a dotted key, quoted ones too. Raises ValueError."""
     node = loads(f"{dotted} = 0")
