@@ -45,8 +45,9 @@ class ForeignFmu:
     path: str | None = None
     """Its file, relative to the scene's file."""
     map: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
-    """By port of the block that it replaces, what the FMU calls it: a variable, or one for each
-    entry of a vector. Names that differ in brackets, underscores or case alone need none."""
+    """By port of the block that it replaces, what it is in the FMU: a variable, or one for each
+    entry of a vector, with a sign or factor where it has another one (`-tau_{x,y,z}`, `pos*0.001`).
+    Names that differ in brackets, underscores or case alone need none."""
     block: Annotated[str, BLOCKS.names()] | None = None
     """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)

@@ -176,7 +176,10 @@ def _assemble(
     written = choose_outputs(scene.record, system, problems)
     if problems:
         raise _faults(scene, problems)
-    mapped = {table.name: names for table, *_, names in tables}
+    mapped = {
+        table.name: {port: tuple(map(str, terms)) for port, terms in names.items()}
+        for table, *_, names in tables
+    }
     return replace(
         system,
         recording=Recording(written, scene.record.every),
