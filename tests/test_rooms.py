@@ -34,10 +34,10 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6018,
     "fmus": 2816,
-    "orchestrator": 13159,
+    "orchestrator": 13176,
     "programs": 1021,
     "analysis": 7089,
-    "visualization": 3333,
+    "visualization": 3334,
     "api": 435,
     "commands": 1398,
 }

@@ -103,7 +103,8 @@ class RecordTable:
 
     signals: Literal["all", "connected", "none"] | tuple[str, ...] = "all"
     """all: every output; connected: those that a connection reads; none: no table; or a list of
-    FMUs, of their outputs `fmu.port`, and of entries of these, `fmu.port[1]`."""
+    FMUs, for all of their outputs, of variables `fmu.port` and entries `fmu.port[1]`: outputs,
+    inputs, locals and parameters. `*` stands for anything: `plant.*` are all variables of one."""
     every: Annotated[int, Quantity("1", ge=1, le=1_000_000)] = 1
     """Every so many communication points of a rate, from the one at t = 0 on, it gets a row, and at
     the last one within the scene's duration."""
