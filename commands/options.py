@@ -41,8 +41,8 @@ Swap = Annotated[
 Map = Annotated[
     list[str] | None,
     repeatable(
-        "port=variable,... of an FMU of --swap whose variables have other names; with several "
-        "FMUs block.port=..."
+        "port=variable,... of an FMU of --swap whose variables have other names, signs or scales "
+        "(F=-tau_{x,y,z}, x=pos*0.001); with several FMUs block.port=..."
     ),
 ]
 Format = Annotated[
@@ -124,7 +124,9 @@ def _map(given: str, swaps: Sequence[str]) -> str:
         raise InputFault(
             f"--map {given}: write port=variable,... of a --swap, e.g. --map {example}"
         )
-    variables = overrides.text([name.strip() for name in names.split(",")], "--map")
+    # At commas outside of the braces of tau_{x,y} and of the brackets of M[1,2].
+    listed = re.split(r",(?![^{]*\})(?![^\[]*\])", names)
+    variables = overrides.text([name.strip() for name in listed], "--map")
     return f'fmu.{block}.map."{port.removeprefix(f"{block}.")}"={variables}'
 
 

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5908,
+    "components": 6018,
     "fmus": 2816,
-    "orchestrator": 13095,
+    "orchestrator": 13251,
     "programs": 1021,
     "analysis": 7091,
-    "visualization": 3333,
+    "visualization": 3334,
     "api": 435,
-    "commands": 1397,
+    "commands": 1398,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -17,6 +17,7 @@ from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
+from hapticlink.components.specs.paths import Interpolation
 from hapticlink.components.specs.quantities import (
     LinearDamping,
     LinearStiffness,
@@ -145,6 +146,17 @@ def _virtual_wall(
     )
 
 
+def _signal(
+    table: tuple[tuple[Annotated[float, Quantity("that of its column")], ...], ...] | None = None,
+    interpolation: Interpolation = "linear",
+    formula: str | tuple[str, ...] | None = None,
+    units: tuple[str, ...] = (),
+) -> Component:
+    from hapticlink.components.blocks.signal import signal
+
+    return signal(table, interpolation, formula, units)
+
+
 def _misfit(part: Any) -> str:
     """Why a part is no block, "" if it is one."""
     if why := no_function(part):
@@ -167,6 +179,7 @@ BLOCKS: Registry[Callable[..., Component]] = Registry(
         "hand": _hand,
         "discrete_equivalent": _discrete_equivalent,
         "virtual_wall": _virtual_wall,
+        "signal": _signal,
     },
     _misfit,
 )

@@ -189,8 +189,9 @@ class Description:
 
     @cached_property
     def outputs(self) -> tuple[Scalar, ...]:
-        """All outputs, type by type in the order of TYPES."""
-        outputs = [s for s in self.scalars if s.causality == "output"]
+        """What is read: all outputs, and what a scene records besides, type by type in the order of
+        TYPES."""
+        outputs = [s for s in self.scalars if s.causality == "output" or s.recorded]
         return tuple(sorted(outputs, key=lambda s: TYPES.index(s.type)))
 
 

@@ -57,6 +57,8 @@ class Scalar:
     """Of an enumeration: name and value of each."""
     clocks: frozenset[int] = frozenset()
     """References of the Clocks of which one has to be active when it is set or read."""
+    recorded: bool = False
+    """Whether it is read as the outputs are, and is none."""
 
     @cached_property
     def port(self) -> str:

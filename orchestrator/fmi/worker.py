@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -19,6 +20,7 @@ from hapticlink.orchestrator.base.process import leave_threads
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.units import SAME
 from hapticlink.orchestrator.fmi.variables import Scalar
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
@@ -59,8 +61,8 @@ class HostedFmu:
         self.instance.__enter__()
 
     def connect(self, names: Sequence[str]) -> int:
-        """The key of a setter of these inputs."""
-        scalars = [self._inputs[name] for name in names]
+        """The key of a setter of these inputs, whose values come converted."""
+        scalars = [replace(self._inputs[name], conversion=SAME) for name in names]
         self._setters.append(self.instance.connect(scalars, range(len(names))))
         return len(self._setters) - 1
 

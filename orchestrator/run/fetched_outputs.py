@@ -41,7 +41,7 @@ def _with(fmu: Fmu, often: set[str], rows: set[str], separate: bool) -> Fmu:
     outputs = [s for s in every if s.port in read | written]
     recorded_only = frozenset(s.name for s in outputs if separate and s.port not in read)
     outputs.sort(key=lambda s: s.name in recorded_only)
-    others = [s for s in fmu.description.scalars if s.causality != "output"]
+    others = [s for s in fmu.description.scalars if s not in every]
     return replace(
         fmu,
         description=replace(fmu.description, scalars=(*others, *outputs)),

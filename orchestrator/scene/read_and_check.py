@@ -27,6 +27,7 @@ from hapticlink.orchestrator.scene.refused_keys_and_values import (
 )
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
+from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals, written_path
 from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem, flat, flatten
 
 
@@ -54,12 +55,15 @@ def from_source(source: Source) -> Scene:
     set_by |= {overrides.apply(data, o): o for o in source.options if o not in of_family}
     origin = replace(source, tables=data, options=(), set_by=set_by)
 
+    moved: dict[int, int] = {}
+
     def refuse(problems: Iterable[Problem]) -> None:
-        if findings := [origin.finding(*problem) for problem in problems]:
-            raise SceneFault(source.name, findings)
+        if found := [origin.finding(written_path(path, moved), why) for path, why in problems]:
+            raise SceneFault(source.name, found)
 
     refuse(islice(find_unrepresentable(data), COUNTED))
     flatten(data)
+    data, moved = with_signals(data)
     wrong: list[Problem] = []
     for path, recorded in find_traces(data):
         with collect_problem(wrong, (*path, "rate")):
@@ -67,6 +71,9 @@ def from_source(source: Source) -> Scene:
             recorded["rate"] = read_frame_times(FilePath(file))
     for path, holder, key in [*find_recorded_tables(data)]:
         with collect_problem(wrong, (*path, key)):
+            if path[0] == "fmu":
+                read_log(holder)
+                continue
             columns = COLUMNS[key] if path[0] in ("hand", "hands") else ()
             holder[key] = read_recorded_table(holder.pop(key), columns)
     for fmu in tables_of(data, "fmu"):

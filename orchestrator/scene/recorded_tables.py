@@ -1,4 +1,4 @@
-"""A recorded log in the place of a table over time, of a hand or a drive:
+"""A recorded log in the place of a table over time, of a hand, a drive or a signal:
 
     [hand]
     type = "profile"
@@ -20,6 +20,8 @@ from itertools import count, takewhile, zip_longest
 from pathlib import Path
 from typing import Any
 
+from hapticlink.fmus.errors import InvalidUnit
+from hapticlink.fmus.units import base_unit
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import unknown
 
@@ -56,8 +58,8 @@ _KEYS = {field.name for field in fields(RecordedTable)}
 def find_recorded_tables(
     data: Mapping[str, Any],
 ) -> Iterator[tuple[tuple[str | int, ...], dict[str, Any], str]]:
-    """The tables of hands and drives of which `table` or `target` is a recorded log, each with its
-    path in the scene and that key."""
+    """The tables of hands, drives and signals of which `table` or `target` is a recorded log, each
+    with its path in the scene and that key."""
     holders: list[tuple[tuple[str | int, ...], Any]] = [(("hand",), data.get("hand"))]
     if isinstance(hands := data.get("hands"), dict):
         holders += [(("hands", name), hand) for name, hand in hands.items()]
@@ -66,11 +68,24 @@ def find_recorded_tables(
     for i, joint in enumerate(joints if isinstance(joints, list) else ()):
         if isinstance(joint, dict):
             holders.append((("linkage", "joint", i, "drive"), joint.get("drive")))
+    holders += [((*path, key), table.get(key)) for path, table, key in signal_tables(data)]
     for path, holder in holders:
         for key in ("table", "target"):
             given = holder.get(key) if isinstance(holder, dict) else None
             if isinstance(given, dict) and "path" in given:
                 yield path, holder, key
+
+
+def signal_tables(
+    data: Mapping[str, Any],
+) -> Iterator[tuple[tuple[str | int, ...], dict[str, Any], str]]:
+    """The tables that may have the settings of the block `signal`, with their paths and the key of
+    these."""
+    for name, key in (("fmu", "settings"), ("connection", "from")):
+        entries = data.get(name)
+        for i, entry in enumerate(entries if isinstance(entries, list) else ()):
+            if isinstance(entry, dict) and isinstance(entry.get(key), dict):
+                yield (name, i), entry, key
 
 
 def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -> list[list[float]]:
@@ -119,12 +134,27 @@ def _factors(units: Any, size: int, columns: Sequence[str]) -> list[float]:
     if len(units) != size:
         raise ValueError(f"{len(units)} units for {size} columns: give one for each")
     every = {unit: factor for of in UNITS.values() for unit, factor in of.items()}
+    if not columns:  # a signal's values have any unit
+        every |= dict.fromkeys(filter(_is_si, units[1:]), 1.0)
     for unit, si in zip_longest(units, (*columns, *("s",) * (not columns))):
         if unit is not None and unit not in every:
             raise ValueError(unknown("unit", unit, every))
         if unit is not None and si is not None and unit not in UNITS[si]:
             raise ValueError(f"{unit} where a column is in {si}: {', '.join(UNITS[si])}")
     return [every[unit] for unit in units]
+
+
+def si_unit(unit: str) -> str:
+    """The unit that values of a column have as they are read."""
+    return next((si for si, of in UNITS.items() if unit in of), unit)
+
+
+def _is_si(unit: str) -> bool:
+    try:
+        base_unit(unit)
+    except InvalidUnit:
+        return False
+    return True
 
 
 def _entry(path: Path, number: int, fields: Sequence[str], place: int) -> float:

@@ -45,8 +45,9 @@ class ForeignFmu:
     path: str | None = None
     """Its file, relative to the scene's file."""
     map: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
-    """By port of the block that it replaces, what the FMU calls it: a variable, or one for each
-    entry of a vector. Names that differ in brackets, underscores or case alone need none."""
+    """By port of the block that it replaces, what it is in the FMU: a variable, or one for each
+    entry of a vector, with a sign or factor where it has another one (`-tau_{x,y,z}`, `pos*0.001`).
+    Names that differ in brackets, underscores or case alone need none."""
     block: Annotated[str, BLOCKS.names()] | None = None
     """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -105,7 +106,8 @@ class RecordTable:
 
     signals: Literal["all", "connected", "none"] | tuple[str, ...] = "all"
     """all: every output; connected: those that a connection reads; none: no table; or a list of
-    FMUs, of their outputs `fmu.port`, and of entries of these, `fmu.port[1]`."""
+    FMUs, for all of their outputs, of variables `fmu.port` and entries `fmu.port[1]`: outputs,
+    inputs, locals and parameters. `*` stands for anything: `plant.*` are all variables of one."""
     every: Annotated[int, Quantity("1", ge=1, le=1_000_000)] = 1
     """Every so many communication points of a rate, from the one at t = 0 on, it gets a row, and at
     the last one within the scene's duration."""

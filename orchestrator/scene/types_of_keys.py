@@ -19,9 +19,11 @@ from hapticlink.orchestrator.scene.families import FamilyLinkage
 from hapticlink.orchestrator.scene.rates import Trace, VariableRate
 from hapticlink.orchestrator.scene.recorded_tables import RecordedTable
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import Wire
+from hapticlink.orchestrator.scene.signal_sources import WrittenWire
 from hapticlink.orchestrator.scene.toml_keys import Path, value
 
-_WRITTEN: dict[Any, Any] = {Scene: SceneFile, Linkage: FamilyLinkage}
+_WRITTEN: dict[Any, Any] = {Scene: SceneFile, Linkage: FamilyLinkage, Wire: WrittenWire}
 """Records that have further keys in a file, which are resolved before the record is read."""
 
 

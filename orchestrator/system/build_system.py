@@ -33,7 +33,7 @@ from hapticlink.orchestrator.system import (
 from hapticlink.orchestrator.system.assign_holds import assign, find_energy_ports
 from hapticlink.orchestrator.system.connections import check_partial_vectors, connect, with_texts
 from hapticlink.orchestrator.system.fmu_files import fmu_files
-from hapticlink.orchestrator.system.outputs_to_record import choose_outputs
+from hapticlink.orchestrator.system.outputs_to_record import choose_outputs, read_recorded
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
     Connection,
@@ -152,7 +152,7 @@ def _assemble(
     fmus = tuple(with_sizes(u, time) for u in alone)
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
-    fmus = tuple(with_texts(u, connections) for u in fmus)
+    fmus = tuple(read_recorded(with_texts(u, connections), scene.record) for u in fmus)
     if len(tables) < len(scene.fmu):  # what names an FMU that cannot be read may be right
         raise _faults(scene, problems)
     energy = find_energy_ports(scene, fmus, connections)
@@ -179,7 +179,10 @@ def _assemble(
     written = choose_outputs(scene.record, system, problems)
     if problems:
         raise _faults(scene, problems)
-    mapped = {table.name: names for table, *_, names in tables}
+    mapped = {
+        table.name: {port: tuple(map(str, terms)) for port, terms in names.items()}
+        for table, *_, names in tables
+    }
     return replace(
         system,
         recording=Recording(written, scene.record.every),

@@ -86,7 +86,8 @@ def _convert(
     target: Description,
     inputs: tuple[Scalar, ...],
 ) -> tuple[Scalar, ...]:
-    """The inputs with the conversion of the wire: units, then its factor and offset. Raises
+    """The inputs with the conversion of the wire: units, then its factor and offset, then what the
+    scene's `map` makes of the input. Raises
     ValueError for different sizes, texts, and units that cannot be converted."""
     text = next((s for s in (*outputs, *inputs) if s.type in WRITTEN), None)
     if text and {(s.type, s.causality) for s in inputs} != {(outputs[0].type, "input")}:
@@ -109,6 +110,6 @@ def _convert(
                     f"{a.name} is in {a.unit}, {b.name} in {b.unit}: {error}; connect quantities "
                     "of one dimension, or write convert = false"
                 ) from None
-        given = Linear(wire.factor, wire.offset).after(units)
+        given = b.conversion.after(Linear(wire.factor, wire.offset).after(units))
         converted.append(b if b.conversion == given else replace(b, conversion=given))
     return tuple(converted)

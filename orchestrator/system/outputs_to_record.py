@@ -1,21 +1,51 @@
-"""The outputs that a scene's [record] names."""
+"""What a scene's [record] names: outputs, and other variables of FMUs, which are then read as
+outputs are."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from hapticlink.orchestrator.base.errors import near
-from hapticlink.orchestrator.fmi.variables import WRITTEN
+from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 from hapticlink.orchestrator.scene.scene_tables import RecordTable
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Fmu, System
+
+ANYTHING = "*"
+
+
+def read_recorded(fmu: Fmu, record: RecordTable) -> Fmu:
+    """The FMU, of which those variables are recorded that the scene names and that are no outputs:
+    locals, inputs, parameters. What only an active clock lets be read is not."""
+    named = [] if isinstance(record.signals, str) else record.signals
+    asked = {s.name for s in fmu.description.scalars if _is_named(fmu.name, s, named)}
+    if not asked:
+        return fmu
+    scalars = tuple(replace(s, recorded=s.name in asked) for s in fmu.description.scalars)
+    return replace(fmu, description=replace(fmu.description, scalars=scalars))
+
+
+def _is_named(fmu: str, s: Scalar, named: Iterable[str]) -> bool:
+    if s.causality in ("output", "independent") or s.type in WRITTEN or s.clocks:
+        return False
+    names = (f"{fmu}.{s.port}", f"{fmu}.{s.name}")
+    return any(_fits(pattern, names) for pattern in named)
+
+
+def _fits(pattern: str, names: Iterable[str]) -> bool:
+    """Whether one of the names is `pattern`, in which `*` stands for anything."""
+    text = re.compile(".*".join(map(re.escape, pattern.split(ANYTHING))), re.DOTALL)
+    return any(text.fullmatch(name) for name in names)
 
 
 def choose_outputs(
     record: RecordTable, system: System, problems: list[Problem]
 ) -> tuple[str, ...] | None:
-    """The outputs that are written, `fmu.output`, in the order of the FMUs; None for all. Texts are
-    not. Adds a problem for each name that is none of an FMU, a port or an output."""
+    """The variables that are written, `fmu.variable`, in the order of the FMUs; None for all
+    outputs. Texts are not. Adds a problem for each name that is none of an FMU, a port or a
+    variable, and each pattern that fits none."""
     called = {
         f"{fmu.name}.{s.name}": {fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}"}
         for fmu in system.fmus
@@ -30,15 +60,15 @@ def choose_outputs(
     elif record.signals == "connected":
         chosen = {f"{c.source}.{s.name}" for c in system.connections for s in c.outputs}
     else:
-        chosen = {*record.signals}
         known = list(dict.fromkeys(name for names in called.values() for name in sorted(names)))
+        chosen = {name for name in known if any(_fits(asked, [name]) for asked in record.signals)}
         problems += [
             (
                 ("record", "signals", i),
-                f"{name!r} is no FMU or output of this scene; {_hint(name, known)}",
+                f"{name!r} is no FMU, nor variable of one; {_hint(name, known)}",
             )
             for i, name in enumerate(record.signals)
-            if name not in known
+            if not _fits(name, known)
         ]
     return tuple(name for name, names in called.items() if names & chosen)
 

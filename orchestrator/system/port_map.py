@@ -3,17 +3,25 @@ scene's `map`, and where names differ in brackets, underscores or case alone."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.fmi.description import Description
-from hapticlink.orchestrator.fmi.units import SAME, Unit, conversion, why_unsuitable
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.units import (
+    MATRICES,
+    SAME,
+    Linear,
+    Unit,
+    conversion,
+    why_unsuitable,
+)
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 
 if TYPE_CHECKING:
     from hapticlink.components.component import Component, Variable
@@ -21,8 +29,25 @@ if TYPE_CHECKING:
 
 _INDEX = re.compile(r"[\[(_ ]?(\d+(?:[,_]\d+)?)[\])]?$")
 """The index at the end of a name: F[1], F(1), F_1, F1, M[1,2], M_1_2."""
-Mapped = dict[str, tuple[str, ...]]
-"""By the block's port, the names of the FMU's scalars, row by row."""
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_PRODUCT = re.compile(rf"(?P<sign>-?)\s*(?:(?P<before>{_NUMBER})\s*\*\s*)?"
+                      rf"(?P<name>.*?)\s*(?:\*\s*(?P<after>{_NUMBER}))?", re.DOTALL)  # fmt: skip
+_LISTED = re.compile(r"\{([^{}]*)\}")
+
+
+class Term(NamedTuple):
+    """An entry of a block's port is factor x, with x the FMU's scalar of this name."""
+
+    name: str
+    factor: float = 1.0
+
+    def __str__(self) -> str:
+        sign = {1.0: "", -1.0: "-"}.get(self.factor)
+        return f"{self.factor!r}*{self.name}" if sign is None else sign + self.name
+
+
+Mapped = dict[str, tuple[Term, ...]]
+"""By the block's port, what its entries are in the FMU, row by row."""
 
 
 def map_ports(
@@ -38,20 +63,22 @@ def map_ports(
             there = unknown("port of the block", port, ports)
             hint = "what it has with other settings alone is fed by a [[connection]]"
             raise ValueError(f"{there}; {hint}")
-        renamings[port] = tuple(s.name for s in _find_scalars(description, names))
+        renamings[port] = tuple(_find_terms(description, names))
         if len(renamings[port]) != (size := ports[port][0].size):
             raise ValueError(f"{len(renamings[port])} variables for the {size} entries of {port}")
-        if {s.name for s in description.scalars if port in (s.name, s.port)} - {*renamings[port]}:
+        own = {s.name for s in description.scalars if port in (s.name, s.port)}
+        if own - {term.name for term in renamings[port]}:
             raise ValueError(f"the FMU has a port {port} of its own: take {port} out of the map")
-    every = [name for names in renamings.values() for name in names]
+        _check_factors(description, *ports[port], renamings[port])
+    every = [term.name for terms in renamings.values() for term in terms]
     if twice := [name for name in every if every.count(name) > 1]:
         raise ValueError(f"{twice[0]} is given twice")
     for port, (variable, cause) in ports.items():
-        taken = {name for names in renamings.values() for name in names}
+        taken = {term.name for terms in renamings.values() for term in terms}
         free = [s for s in description.scalars if s.causality == cause and s.name not in taken]
         if port not in renamings and not description.port(port, cause):
-            own = [s for s in free if s.port not in ports]
-            renamings |= {port: names} if (names := _alike(variable, own)) else {}
+            left = [s for s in free if s.port not in ports]
+            renamings |= {port: terms} if (terms := _alike(variable, left)) else {}
     return renamings
 
 
@@ -70,22 +97,22 @@ def in_units_of(description: Description, block: Component) -> Description:
             with suppress(ValueError):
                 into = conversion(description.unit(s), unit, s.relative)
                 if into != SAME:
-                    bound = s.bound and abs(into.factor) * s.bound
-                    nominal = abs(into.factor) * s.nominal
-                    s = replace(s, unit=unit.name, conversion=into, bound=bound, nominal=nominal)
+                    s = replace(_scaled(s, into), unit=unit.name)
                     units[unit.name] = unit
         scalars.append(s)
     return replace(description, scalars=tuple(scalars), units=units)
 
 
 def rename_ports(description: Description, names: Mapped, block: Component) -> Description:
-    """The description with the scalars of `names` under the block's names."""
+    """The description with the scalars of `names` under the block's names, and as what these are:
+    an output is factor x, and an input gives x = input/factor, both in the FMU's unit."""
     every = {v.name: v for v in (*block.inputs, *block.outputs, *block.parameters)}
     new = {
-        own: name
-        for port, given in names.items()
-        for own, name in zip(given, every[port].names, strict=True)
+        term.name: name
+        for port, terms in names.items()
+        for term, name in zip(terms, every[port].names, strict=True)
     }
+    factors = {term.name: term.factor for terms in names.values() for term in terms}
 
     def renamed(dependencies: Mapping[str, frozenset[str]]) -> dict[str, frozenset[str]]:
         return {
@@ -93,9 +120,14 @@ def rename_ports(description: Description, names: Mapped, block: Component) -> D
             for output, on in dependencies.items()
         }
 
+    def as_mapped(s: Scalar) -> Scalar:
+        factor = factors.get(s.name, 1.0)
+        own = Linear(factor if s.causality == "output" else 1.0 / factor)
+        return replace(_scaled(s, own), name=new.get(s.name, s.name))
+
     return replace(
         description,
-        scalars=tuple(replace(s, name=new.get(s.name, s.name)) for s in description.scalars),
+        scalars=tuple(map(as_mapped, description.scalars)),
         dependencies=renamed(description.dependencies),
         initial_dependencies=renamed(description.initial_dependencies),
         derivatives={new.get(a, a): new.get(b, b) for a, b in description.derivatives.items()},
@@ -137,23 +169,93 @@ def with_declarations(description: Description, block: Component) -> Description
     )
 
 
-def _find_scalars(description: Description, names: str | tuple[str, ...]) -> Iterator[Scalar]:
-    """The scalars of names, each of a variable or of a whole vector. Raises ValueError."""
-    for name in [names] if isinstance(names, str) else names:
-        there = [s for s in description.scalars if name in (s.name, s.port)]
-        if not there:
-            known = dict.fromkeys(s.port for s in description.scalars)
-            raise ValueError(unknown("variable of the FMU", name, known))
-        yield from sorted(there, key=lambda s: s.indices)
+def _scaled(s: Scalar, by: Linear) -> Scalar:
+    """A scalar that is converted once more."""
+    if by == SAME:
+        return s
+    size = abs(by.factor)
+    bound = s.bound and size * s.bound
+    return replace(s, conversion=by.after(s.conversion), bound=bound, nominal=size * s.nominal)
 
 
-def _alike(variable: Variable, scalars: Iterable[Scalar]) -> tuple[str, ...]:
+def _find_terms(description: Description, given: str | tuple[str, ...]) -> Iterator[Term]:
+    """The terms that are written as names of variables or of whole vectors, each with a sign, a
+    factor, or braces in it: `-tau_{x,y}`, `pos*0.001`, `1e-3*pos`. A variable that is called like
+    that is meant itself. Raises ValueError."""
+    for text in [given] if isinstance(given, str) else given:
+        if _has(description, text):
+            yield from _terms(description, text, 1.0)
+            continue
+        written = _PRODUCT.fullmatch(text)
+        assert written is not None  # `name` takes whatever it is
+        factor = float(f"{written['sign']}1")
+        for number in written.group("before", "after"):
+            factor *= float(number or 1)
+        if not 0 < abs(factor) < math.inf:
+            raise ValueError(f"{text}: a factor is a finite number other than 0")
+        for name in _expand(written["name"]):
+            yield from _terms(description, name, factor)
+
+
+def _terms(description: Description, name: str, factor: float) -> Iterator[Term]:
+    there = [s for s in description.scalars if name in (s.name, s.port)]
+    if not there:
+        known = dict.fromkeys(s.port for s in description.scalars)
+        more = re.search(r"[-+*/()]", name)
+        hint = "; what is more than a sign and a factor is for a [[connection]]" if more else ""
+        raise ValueError(unknown("variable of the FMU", name, known) + hint)
+    yield from (Term(s.name, factor) for s in sorted(there, key=lambda s: s.indices))
+
+
+def _has(description: Description, name: str) -> bool:
+    return any(name in (s.name, s.port) for s in description.scalars)
+
+
+def _expand(name: str) -> Iterator[str]:
+    """`tau_x`, `tau_y` of `tau_{x,y}`."""
+    if not (listed := _LISTED.search(name)):
+        yield name
+        return
+    for each in listed[1].split(","):
+        yield from _expand(name[: listed.start()] + each.strip() + name[listed.end() :])
+
+
+def _check_factors(
+    description: Description, port: Variable, causality: str, terms: Iterable[Term]
+) -> None:
+    """Raises ValueError for a factor that cannot be, or that would count twice."""
+    scalars = {s.name: s for s in description.scalars}
+    for term, unit in zip(terms, port.units, strict=True):
+        if term.factor == 1.0:
+            continue
+        own = scalars[term.name]
+        if causality == "parameter":
+            raise ValueError(f"{port.name}: a parameter has no factor; `start` sets its value")
+        if own.type not in CONTINUOUS:
+            raise ValueError(f"{term}: {own.name} is {own.type}, and only a real number is scaled")
+        if getattr(port, "kind", None) in MATRICES:
+            raise ValueError(
+                f"{term}: {port.name} is a {port.kind} matrix, whose entries are not scaled one by "
+                "one; lead a [[connection]] with a factor from another FMU"
+            )
+        units = SAME
+        with suppress(ValueError):  # told where it is connected
+            units = conversion(description.unit(own), Unit.named(unit), own.relative)
+        if units != SAME and math.isclose(abs(term.factor), abs(units.factor), rel_tol=1e-9):
+            sign = "-" if term.factor < 0 else ""
+            raise ValueError(
+                f"{term}: {own.name} is in {own.unit} and is converted to {unit} by itself; "
+                f"write {sign}{own.name}"
+            )
+
+
+def _alike(variable: Variable, scalars: Iterable[Scalar]) -> tuple[Term, ...]:
     """The scalars that are a port's entries by their names, counted from 1 or from 0; none where
     one lacks or there are more."""
     stem = _plain(variable.name)
     if not variable.shape:
         names = [s.name for s in scalars if _plain(s.name) == stem]
-        return tuple(names) if len(names) == 1 else ()
+        return tuple(map(Term, names)) if len(names) == 1 else ()
     by_index: dict[tuple[int, ...], str] = {}
     for s in scalars:
         end = _INDEX.search(s.name)
@@ -162,7 +264,7 @@ def _alike(variable: Variable, scalars: Iterable[Scalar]) -> tuple[str, ...]:
     for first in (1, 0):
         places = [*product(*(range(first, first + n) for n in variable.shape))]
         if sorted(by_index) == places:
-            return tuple(by_index[place] for place in places)
+            return tuple(Term(by_index[place]) for place in places)
     return ()
 
 

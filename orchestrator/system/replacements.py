@@ -12,7 +12,6 @@ from hapticlink.orchestrator.scene.blocks import BlockPlan
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Problem
-from hapticlink.orchestrator.system.port_map import Mapped
 from hapticlink.orchestrator.system.system import Replacement, System
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ def replacements(
     blocks: Mapping[str, Component],
     rows: Iterable[Wire],
     system: System,
-    mapped: Mapping[str, Mapped],
+    mapped: Mapping[str, Mapping[str, tuple[str, ...]]],
 ) -> dict[str, Replacement]:
     """By replaced block. `rows` are all connections that the haptic loop may have."""
     described = {u.name: u.description for u in system.fmus}

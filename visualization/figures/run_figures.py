@@ -93,7 +93,8 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
     if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
         q = table[JOINT_COORDINATES]
-        if len(finite := np.flatnonzero(np.isfinite(q).all(axis=1))):
+        finite = np.flatnonzero(np.isfinite(q).all(axis=1))
+        if len(finite) and of_port(results, POINT_POSE):
             ends = q[finite[[0, -1]]]
             drawn_by["mechanism"] = partial(_mechanism, results, linkage, ends, port)
     if of_port(results, POINT_POSE):

@@ -4,11 +4,14 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import hapticlink as hl
 from hapticlink.analysis.findings import summary
+from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.experiment import Experiment, simulate
-from tests.little_fmus import python_fmu
+from tests.little_fmus import python_fmu, slave
 from tests.orchestrator.c_fmus import NUMBERS, c_fmu3
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, scene, wire_table
 
@@ -154,3 +157,60 @@ def test_results_of_a_run_that_records_nothing(tmp_path):
     assert found.outcome.end_time == 0.5
     assert [*found.results.tables] == ["haptics", "graphics"]
     assert json.loads((tmp_path / "run.json").read_text())["files"] == ["run.json"]
+
+
+def test_any_variable_is_recorded_by_its_name_or_a_pattern(tmp_path):
+    """Locals of each type of number, an input and a parameter, as the FMU's own output has them; in
+    a process of its own, too."""
+    variables = (
+        ("input", {"u": 0.0}),
+        ("local", {"level": 0.0, "n": 3, "on": True}),
+        ("parameter", {"gain": 2.5}),
+        ("output", {"y": 0.0}),
+    )
+    body = """values["level"] += values["gain"] * size
+        values["n"] += 1
+        values["on"] = not values["on"]
+        values["y"] = values["level"]"""
+    path = slave(tmp_path, "Fed", *variables, body=body)
+    for isolate in (False, True):
+        text = fmu_table("fed", str(path.with_suffix("")), ISOLATED if isolate else "")
+        text += '[[connection]]\nfrom = { formula = "t" }\nto = "fed.u"\n'
+        file = scene(tmp_path, text, rate=10, duration=1.0)
+        run = hl.run(file, {"record.signals": ["fed.*"]}, out=tmp_path / "run")
+        assert np.array_equal(run["fed.level"], run["fed.y"])
+        assert run["fed.level"][-1] == pytest.approx(2.5)
+        assert np.array_equal(run["fed.n"], 3.0 + np.arange(11))
+        assert np.array_equal(run["fed.on"], (np.arange(11) + 1) % 2)
+        assert set(run["fed.gain"]) == {2.5}
+        assert run["fed.u"][-1] == pytest.approx(0.9)  # of the step that ends there
+        header = next(csv.reader((tmp_path / "run" / "haptics.csv").open()))
+        assert not any(name.startswith("fed_u") for name in header)
+
+
+@pytest.mark.parametrize("packaging", ["python", "native"])
+def test_what_is_no_output_changes_nothing_of_a_run(whole, tmp_path, packaging):
+    """Joint gains and the held matrices that a controller gets, beside the outputs to the byte."""
+    names = ["controller.k_j", "controller.P_c", "virtual_environment.P_c", "haptic_device.x_true"]
+    found = ran(tmp_path, f"record.signals={json.dumps(names)}", f"packaging={packaging}")
+    (table,) = (t for rate, t in columns(tmp_path).items() if rate == "haptics")
+    by_name = {c[0]: c[1:] for c in table}
+    own = {c[0]: c[1:] for c in whole[1]["haptics"]}
+    assert by_name["haptic_device.x_true[1]"] == own["haptic_device.x_true[1]"]
+    assert set(by_name["controller.k_j"]) == {"200.0"}
+    sent = {c[0]: c[1:] for c in columns(tmp_path)["graphics"]}["virtual_environment.P_c[1,1]"]
+    assert set(by_name["controller.P_c[1,1]"]) <= {*sent}  # held, unchanged
+    assert len(set(by_name["controller.P_c[1,1]"])) > 2
+    assert found.run["end"]["reason"] == "duration"
+
+
+def test_a_pattern_that_fits_nothing_is_refused(tmp_path):
+    with pytest.raises(SceneFault, match=r"'virtual_mechanism\.nope\*' is no FMU, nor variable"):
+        simulate(SCENE, tmp_path, ('record.signals=["virtual_mechanism.nope*"]',))
+
+
+def test_a_run_without_the_pose_of_its_point_is_drawn(tmp_path):
+    """The coordinates alone draw no mechanism: its finding tells of the point."""
+    names = '["virtual_mechanism.q", "haptic_device.x_true"]'
+    run = hl.run(SCENE, {"duration": 0.1, "record.signals": json.loads(names)}, out=tmp_path)
+    assert not (run.folder / "mechanism.png").exists()

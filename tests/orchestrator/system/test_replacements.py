@@ -234,3 +234,77 @@ def test_outputs_are_read_in_the_units_of_the_block(tmp_path, isolate):
         np.testing.assert_allclose(found[name], expected[name], rtol=1e-9, atol=1e-12)
     for told, own in zip(found.numbers, expected.numbers, strict=True):
         assert told == own
+
+
+def turned(folder: Path) -> Path:
+    """A spring whose axes and units are another's: x to the left in mm, forces of the device on
+    it; its law is F = 50 N/m (x_S - x_D) in those of the scene."""
+    inputs = {f"{end}_{axis}": 0.0 for end in ("world", "tool") for axis in "xyz"}
+    body = """for axis, by in (("x", -1e-3), ("y", 1e-3), ("z", 1.0)):
+            stretch = by * (values["world_" + axis] - values["tool_" + axis])
+            values["tau_" + axis] = -50.0 * stretch"""
+    outputs = {f"tau_{axis}": 0.0 for axis in "xyz"}
+    return slave(folder, "Turned", ("input", inputs), ("output", outputs), body=body)
+
+
+@pytest.mark.parametrize("packaging", ["python", "isolated"])
+def test_signs_and_factors_of_a_map_make_it_the_same_law(tmp_path, packaging):
+    """As the spring with the scene's own ports, in its signals, starts and energies."""
+    alone = {"fmu.controller.isolate": packaging == "isolated"}
+    common = {**SHORT, "controller.topology": False}
+    maps = [
+        "F_motor=-tau_{x,y,z}",
+        "x_S=-0.001*world_x,world_y*1e-3,world_z",
+        "x_D=tool_x*-0.001, tool_y*.001, tool_{z}",
+    ]
+    swap = SceneOptions([], [f"controller={turned(tmp_path)}"], maps)
+    found = hl.run("closed-loop-ideal", [*swap.options, *overrides.write_options(common | alone)])
+    plain = SceneOptions([], [f"controller={spring(tmp_path)}"], [])
+    own = hl.run("closed-loop-ideal", [*plain.options, *overrides.write_options(common)])
+    for name in ("controller.F_motor", "haptic_device.x_true", "virtual_mechanism.q"):
+        np.testing.assert_allclose(found[name], own[name], rtol=1e-9, atol=1e-12)
+    assert np.ptp(own["controller.F_motor"]) > 0.01
+    told = found.run["replaced"]["controller"]["mapped"]
+    assert [*told["x_S"]] == ["-0.001*world_x", "0.001*world_y", "world_z"]
+    assert [*told["F_motor"]] == ["-tau_x", "-tau_y", "-tau_z"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("F=0*force0,force1,force2", "0*force0: a factor is a finite number other than 0"),
+        ("F=1e999*force0,force1,force2", "a factor is a finite number other than 0"),
+        ("F=force{0,1}", "2 variables for the 3 entries of F"),
+        ("F=force0+1,force1,force2", "no variable of the FMU 'force0+1'"),
+        (
+            "F=force0+1,force1,force2",
+            "what is more than a sign and a factor is for a [[connection]]",
+        ),
+        ("F=-force0,force0,force1", "force0 is given twice"),
+        ("F=force0*1000,force1,force2", "force0 is in kN and is converted to N by itself; write"),
+    ],
+)
+def test_a_factor_that_cannot_be_is_refused(tmp_path, given, said, capsys):
+    file = pull(tmp_path, "force0", "force1", "force2")
+    with_units(file, force0="kN", force1="kN")
+    command = ["info", "closed-loop-ideal", "--swap", f"hand={file}", "--map", given]
+    assert status(*command) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_variable_that_is_called_like_a_product_is_meant_itself(tmp_path):
+    file = pull(tmp_path, "-f*2", "{a}", "b*3")
+    swap = {"replaces": "hand", "path": str(file), "map": {"F": ["-f*2", "{a}", "b*3"]}}
+    assert hl.run("closed-loop-ideal", {**SHORT, "fmu.+": swap})["hand.F"][0, 0] == -0.5
+
+
+def test_a_matrix_is_not_scaled_by_its_entries(tmp_path):
+    values = {f"P{i}{j}": float(i == j) for i in (1, 2, 3) for j in (1, 2, 3)}
+    file = slave(tmp_path, "Copy", ("output", values))
+    swap = {
+        "replaces": "virtual_environment",
+        "path": str(file),
+        "map": {"P_c": "-P{1,2,3}{1,2,3}"},
+    }
+    with pytest.raises(SceneFault, match="P_c is a projector matrix, whose entries are not scaled"):
+        hl.run("closed-loop-ideal", {**SHORT, "fmu.+": swap})

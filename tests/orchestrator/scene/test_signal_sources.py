@@ -1,0 +1,135 @@
+"""Connections from a table, a log, a formula, and another run."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+
+import hapticlink as hl
+from hapticlink.orchestrator.base.errors import SceneFault
+from tests.little_fmus import slave
+
+RATE = 100
+ROWS = [[0.0, 1.0], [0.25, 3.0], [0.5, -2.0]]
+
+
+def scene(folder, variables, sources, body="pass", rate=RATE):
+    """A little FMU whose inputs are fed by `sources`, at `rate`."""
+    path = slave(folder, "Fed", *variables, body=body)
+    lines = [
+        'title = "fed"',
+        "duration = 1.0",
+        f'[[fmu]]\nname = "fed"\npath = "{path}"\nrate = {rate}\ntiming = "sampled"',
+        *(f'[[connection]]\nfrom = {of}\nto = "fed.{to}"' for to, of in sources.items()),
+    ]
+    file = folder / "fed.toml"
+    file.write_text("\n".join(lines))
+    return file
+
+
+REAL = ("input", {"u": 0.0}), ("output", {"y": 0.0})
+
+
+@pytest.mark.parametrize("packaging", ["python", "native"])
+@pytest.mark.parametrize("interpolation", ["linear", "hold"])
+def test_a_table_acts_as_in_fmpy(tmp_path, interpolation, packaging):
+    """FMPy interpolates lines of its input at the beginning of each step; steps it is given by two
+    rows of one time, of which it takes the later."""
+    body = 'values["y"] = values["u"]'
+    of = f"{{ table = {ROWS}, interpolation = '{interpolation}' }}"
+    run = hl.run(scene(tmp_path, REAL, {"u": of}, body), {"packaging": packaging})
+    rows = ROWS
+    if interpolation == "hold":
+        ends = [[b[0], a[1]] for a, b in pairwise(ROWS)]
+        rows = sorted([*ROWS, *ends], key=lambda row: (row[0], ROWS.count(row)))
+    given = np.array([tuple(r) for r in rows], dtype=[("time", float), ("u", float)])
+    theirs = simulate_fmu(
+        str(tmp_path / "Fed.fmu"), stop_time=1.0, step_size=1 / RATE, output_interval=1 / RATE,
+        input=given, output=["y"],
+    )  # fmt: skip
+    # FMPy's row of an instant is the end of the step before, ours of a sampled FMU its beginning.
+    np.testing.assert_allclose(run["fed.y"][:-1], theirs["y"][1:], rtol=0, atol=1e-12)
+    assert np.ptp(run["fed.y"]) == 5.0
+
+
+def test_numbers_of_other_types_and_a_formula(tmp_path):
+    """By the closed form; a Boolean is true from .5 on, an Integer the nearest."""
+    inputs = {"on": False, "n": 0, "u": 0.0}
+    outputs = {"a": 0.0, "b": 0.0, "c": 0.0}
+    body = """values["a"] = float(values["on"])
+        values["b"] = float(values["n"])
+        values["c"] = values["u"]"""
+    sources = {
+        "on": "{ formula = 'where(t % 0.5 < 0.245, 1, 0)' }",
+        "n": "{ table = [[0.0, 2], [0.3, 7]], interpolation = 'hold' }",
+        "u": "{ formula = '-0.5*sin(2*pi*3*t)**2 + max(t, 0.2)' }",
+    }
+    run = hl.run(scene(tmp_path, (("input", inputs), ("output", outputs)), sources, body))
+    t = np.arange(RATE + 1) / RATE
+    assert np.array_equal(run["fed.a"], (t % 0.5 < 0.245) * 1.0)
+    assert np.array_equal(run["fed.b"], np.where(t < 0.3 - 1e-9, 2.0, 7.0))
+    expected = -0.5 * np.sin(2 * np.pi * 3 * t) ** 2 + np.maximum(t, 0.2)
+    np.testing.assert_allclose(run["fed.c"], expected, rtol=0, atol=1e-14)
+
+
+def test_what_a_run_recorded_drives_another_one_to_the_same_bits(tmp_path):
+    """The wrench of a hand on an arm, which reacts to the handle, as that of nobody."""
+    hand = {"type": "spring", "stiffness": [80.0, 80.0, 0.2], "target": [[0.0, 0.05, 0.02, -0.8]]}
+    options = {"duration": 0.5, "hand": hand}
+    own = hl.run("closed-loop-ideal", options, out=tmp_path / "own", figures=False)
+    log = {"path": str(tmp_path / "own" / "haptics.csv"), "columns": ["time", "hand.F"]}
+    wire = {"from": {"table": log}, "to": "haptic_device.F_hand"}
+    again = hl.run("closed-loop-ideal", {**options, "connection.+": wire})
+    assert np.array_equal(own["haptic_device.x_true"], again["haptic_device.x_true"])
+    assert np.array_equal(again["haptic_device_F_hand.y"], own["hand.F"])
+
+
+def test_a_log_has_units_and_lies_beside_the_scene(tmp_path):
+    (tmp_path / "log.csv").write_text("t,force\n0,1\n500,2\n")
+    of = "{ table = { path = 'log.csv', units = ['ms', 'kN'] }, interpolation = 'hold' }"
+    file = scene(tmp_path, REAL, {"u": of}, 'values["y"] = values["u"]')
+    run = hl.run(file)
+    assert (run["fed.y"][0], run["fed.y"][-1]) == (1000.0, 2000.0)
+    assert run.run["units"]["fed_u.y"] == "N"
+
+
+def test_it_is_swept_as_all_keys(tmp_path):
+    file = scene(tmp_path, REAL, {"u": "{ formula = 't' }"}, 'values["y"] = values["u"]')
+    run = hl.run(file, {"connection.0.from.formula": "2*t"})
+    assert run["fed.y"][-1] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("of", "said"),
+    [
+        ("{ formula = 'f(t)' }", "`formula` 'f(t)': no function of a formula 'f'"),
+        ("{ formula = 'x' }", "no variable of a formula 'x'"),
+        ("{ formula = 't +' }", "invalid syntax; write a formula such as"),
+        ("{ formula = '(lambda: 1)()' }", "is nothing that a formula may have"),
+        ("{ formula = 't.real' }", "'t.real' is nothing that a formula may have"),
+        ("{ formula = '1e400' }", "1e309 is no finite number"),
+        ("{ formula = 'sin(t, 2)' }", "sin takes 1 arguments, not 2"),
+        ("{ formula = '" + "(" * 300 + "t" + ")" * 300 + "' }", "too many nested parentheses"),
+        ("{ }", "give a signal either a `table` or a `formula`"),
+        ("{ formula = 't', table = [[0.0, 1.0]] }", "either a `table` or a `formula`"),
+        ("{ formula = ['t', 't'] }", "has 2 numbers, fed.u takes 1"),
+        ("{ table = [[0.0, 1.0], [0.0, 2.0]] }", "does not come after"),
+        ("{ table = [] }", "the table has no rows"),
+        ("{ table = [[0.0]] }", "at least one value beside its time"),
+        ("{ formula = 't', units = ['N', 'N'] }", "2 `units` for 1 values"),
+        ("{ formula = 't', units = ['furlong'] }", "furlong"),
+        ("{ formulae = 't' }", "connection[0].from.formulae: unknown key"),
+        ("{ table = { path = 'none.csv' } }", "connection[0].from.table"),
+    ],
+)
+def test_what_is_no_signal_is_refused(tmp_path, of, said):
+    with pytest.raises(hl.Fault) as refused:
+        hl.run(scene(tmp_path, REAL, {"u": of}))
+    assert said in str(refused.value)
+
+
+def test_a_text_input_takes_no_number(tmp_path):
+    variables = ("input", {"s": "a"}), ("output", {"y": 0.0})
+    with pytest.raises(SceneFault, match="s is a String"):
+        hl.run(scene(tmp_path, variables, {"s": "{ formula = 't' }"}))
