@@ -30,7 +30,7 @@ export function felt(vibration, force, watched, ended) {
 
 // Why, of the control of the rate.
 export const why = ({ value, max }) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
-the force on the hand ${Math.round(max)} times a second. In between, that force rests on where the linkage was: late as it is, it can feed a swing that it should damp.`;
+the force on the hand ${Math.round(max)} times a second. In between, that force uses where the linkage was. A late force can feed a swing that it should damp.`;
 
 export class FirstMinute {
   // `send` is given what is changed.
