@@ -19,7 +19,7 @@ from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene.overrides import as_command_line
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stability:
     """The stability of a scene in poses and hands."""
 
@@ -135,6 +135,8 @@ class Stability:
 
     def __str__(self) -> str:
         return "\n".join((f"{self.title}: {self.finding}", *self.lines()))
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         lines = "".join(f"<li>{escape(line)}</li>" for line in (*self._warnings(), *self._below()))
