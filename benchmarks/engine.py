@@ -138,9 +138,9 @@ def finding(found: dict[tuple[str, int, str], tuple[float, Ran]]) -> str:
     )
     ends = [run.end for (_, _, name), (_, run) in found.items() if name == "MuJoCo, pulled"]
     return (
-        f"With MuJoCo's copy placed on the mechanism's pose the loop differs from that with ours by "
-        f"{same:.1g} mm; with both pulled by the report's forces, by {apart:.2g} mm. Distance from "
-        f"the loop with graphics at the haptic rate (median and range over scenes and rates): "
+        f"With MuJoCo's copy placed on the mechanism's pose the loop differs from that with ours "
+        f"by {same:.1g} mm; with both pulled by the report's forces, by {apart:.2g} mm. Distance "
+        f"from the loop with graphics at the haptic rate (median and range over scenes and rates): "
         f"{spread(by['ours, placed'])} with a placed copy, {spread(by['ours, pulled'])} with ours "
         f"pulled, {spread(by['MuJoCo, pulled'])} with MuJoCo's pulled, of whose runs "
         f"{sum(end != 'ended' for end in ends)} of {len(ends)} end early."

@@ -25,8 +25,8 @@ def advise(
     eight random variations of it.
 
     Prints what to write into the scene, its error and energy, and which others were as good
-    within the spread. Writes advice.json and table.csv to OUT (default advice/SCENE); the same command
-    continues what was interrupted.
+    within the spread. Writes advice.json and table.csv to OUT (default advice/SCENE); the same
+    command continues what was interrupted.
 
     For example:
 

@@ -36,7 +36,7 @@ CODE_LINES = {
     "fmus": 2816,
     "orchestrator": 13021,
     "programs": 1021,
-    "analysis": 7172,
+    "analysis": 7181,
     "visualization": 3363,
     "api": 448,
     "commands": 1406,

@@ -15,6 +15,7 @@ from hapticlink.analysis.sweep.grid import MAX_RUNS, Point
 from hapticlink.analysis.sweep.row import FAILED, METRIC, WHOLE, Row
 from hapticlink.analysis.sweep.table import HEADS, NOT_REPRODUCIBLE, few_lines
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
@@ -31,13 +32,21 @@ def seeds(scene: Scene) -> dict[str, int]:
     scene are then equal, but for what FMUs of others draw themselves."""
     rates = {"graphics.rate": scene.graphics.rate} if scene.graphics else {}
     rates |= {f"fmu.{_quoted(fmu.name)}.rate": fmu.rate for fmu in scene.fmu if fmu.rate}
-    drawn: dict[str, Any] = {key: r for key, r in rates.items() if isinstance(r, VariableRate)}
+    drawn: dict[str, Any] = {
+        key: rate
+        for key, rate in rates.items()
+        if isinstance(rate, VariableRate) and exact(rate.min) < exact(rate.max)
+    }
     drawn |= {
         f"delays.{_quoted(name)}": late
         for name, late in scene.delays.items()
         if isinstance(late, Latency) and (late.loss or (late.max or 0.0) > late.min)
     }
-    drawn |= {f"at.{i}": event for i, event in enumerate(scene.at) if event.noise}
+    drawn |= {
+        f"at.{i}": event
+        for i, event in enumerate(scene.at)
+        if event.noise and event.time < scene.duration
+    }
     return {f"{key}.seed": draw.seed for key, draw in drawn.items()}
 
 

@@ -126,8 +126,8 @@ def _choices(found: Mapping[str, Sequence[Measured]]) -> Iterator[str]:
     yield "## What single choices change\n\n" + fill(
         f"Each setting at {RATE} Hz against nothing held, rk4 with projection and Gauss-Seidel; "
         "run time as the median of the ratios within rounds, with quartiles. An error below that "
-        "of the base can come from two that cancel. The local model (B.15) leaves out Coriolis terms: its "
-        "error does not vanish with rates.",
+        "of the base can come from two that cancel. The local model (B.15) leaves out Coriolis "
+        "terms: its error does not vanish with rates.",
         110,
     )
     for scene, points in found.items():

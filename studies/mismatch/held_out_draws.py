@@ -72,8 +72,8 @@ def section(found: Found) -> Iterator[str]:
     yield paragraph(
         "The slider-crank, a massless spring hand of 200 N/m, and the rate of "
         f"{KEPT_APART} Hz, whose frames end between ticks (it takes the row of {NEAREST} Hz), "
-        f"had no part in the choice. With the advised methods {sound} of {of} of these runs are stable, "
-        f"and {kept} of {of} keep both limits. At rest on the slider-crank "
+        f"had no part in the choice. With the advised methods {sound} of {of} of these runs are "
+        f"stable, and {kept} of {of} keep both limits. At rest on the slider-crank "
         f"{bad[0]} of the {bad[1]} rows with a map are unstable. A cell of the table has two "
         "parts. First: the draws within the limits with the method of the row (* not advised). "
         "Second, of the cases in which any method keeps the limits: how many have an error within "

@@ -260,8 +260,8 @@ def _limits(found: Found) -> Iterator[str]:
         "refuse the ideal. All holds, the report's gains and, with the mechanism at the graphics "
         f"rate, the integrators were tried at {both(FEW)} Hz without Coriolis compensation alone. "
         f"Elsewhere the holds {both([f'`{hold}`' for hold in LIKELY])} were: one of them is within "
-        f"a tenth of the best of all in {_likely(found)} cases in which any keeps the limits. The continuous "
-        f"runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by "
+        f"a tenth of the best of all in {_likely(found)} cases in which any keeps the limits. "
+        f"The continuous runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by "
         f"{np.median(sizes):.1g} mm within 1 s (median; up to {max(sizes):.1g}), so that smaller "
         "differences of the handle mean nothing."
     )

@@ -35,6 +35,9 @@ def test_the_seeds_are_those_of_what_is_drawn() -> None:
         'delays."virtual_environment.Lambda_inv".seed': 0,
     }
     assert repeats.seeds(hl.scene("scenario")) == {"at.2.seed": 1}
+    assert repeats.seeds(hl.scene("scenario", {"duration": 1.0})) == {}  # before the noise
+    fixed = {"graphics.rate": {"min": 30, "max": 30.0}}
+    assert repeats.seeds(hl.scene("closed-loop-ideal", fixed)) == {}
     assert repeats.seeds(hl.scene("closed-loop-ideal")) == {}
 
 
