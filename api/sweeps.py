@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.sweep import grid, job, row, table
+from hapticlink.analysis.sweep import grid, job, repeats, row, table
 from hapticlink.analysis.sweep.grid import Runs, Vary, points
 from hapticlink.analysis.sweep.run_sweep import Unfinished
 from hapticlink.analysis.sweep.run_sweep import sweep as make
@@ -31,12 +31,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+SPREAD = "spread.csv"
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class Sweep:
     """The table of a sweep: `s["tracking_max_mm"]` is a column as a NumPy array, one entry per run,
     of which there are `len(s)`. A notebook shows it.
 
     `rows` are the runs, `keys` the varied keys, `folder` contains `files`, None in memory.
+    `spread` has, if points were repeated, a row for each point: `runs`, `whole_runs` (that lasted
+    as long as the scene says), and of these for each column of numbers `NAME q25`, `NAME median`
+    and `NAME q75`; else it is empty.
     """
 
     rows: list[dict[str, Any]]
@@ -53,6 +59,12 @@ class Sweep:
     def failed(self) -> list[dict[str, Any]]:
         """The rows of failed runs, with the reason in `end` and `message`."""
         return [r for r in self.rows if r["end"] in row.FAILED]
+
+    @property
+    def spread(self) -> list[dict[str, Any]]:
+        """Median and quartiles of the repetitions of each point."""
+        repeated = any(repeats.REPETITION in r for r in self.rows)
+        return repeats.spread(self.rows, self.keys) if repeated else []
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -78,11 +90,13 @@ class Sweep:
 
     def __str__(self) -> str:
         """The lines of `hapticlink sweep`."""
-        return "\n".join(table.lines(self.rows, self.keys))
+        lines = repeats.lines if self.spread else table.lines
+        return "\n".join(lines(self.rows, self.keys))
 
     def _repr_html_(self) -> str:
-        columns = self.columns
-        return html_table(columns, ([run.get(name, "") for name in columns] for run in self.rows))
+        shown = self.spread or self.rows
+        columns = table.columns(shown)
+        return html_table(columns, ([run.get(name, "") for name in columns] for run in shown))
 
     def __repr__(self) -> str:
         return f"{self}\n  columns: {', '.join(self.columns)}"
@@ -94,6 +108,7 @@ def sweep(
     options: Options = (),
     *,
     runs: Runs = (),
+    repeat: int = 1,
     out: str | Path | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -106,7 +121,8 @@ def sweep(
     `vary` gives each key its values, `{"graphics.rate": range(10, 61, 10), "hold": ["zoh", "foh"]}`
     or, as on the command line, `["graphics.rate=10..60..10", "hold=zoh,foh"]`; every combination is
     run. Alternatively `runs` lists the options of each run, or is a file with them. `options` (see
-    `scene`) apply to all runs.
+    `scene`) apply to all runs. `repeat` is the number of runs of each point, with other seeds of
+    what is drawn: rates that vary, latency and loss, noise. The seeds are columns of the table.
 
     The table is returned, and with `out` also written to that folder: table.csv, sweep.png (of the
     column `metric`; `format` as in `run`) and a file per row, so that an interrupted sweep can be
@@ -114,14 +130,16 @@ def sweep(
     processor; `scheduler` is the address of a Dask scheduler to run on. `progress` is called with
     the numbers of finished and of all runs.
 
-    A run that fails is a row of the table. Raises InputFault for invalid input and if every run is
-    refused, Fault if the sweep is interrupted.
+    A run that fails is a row of the table. Raises InputFault for invalid input, if every run is
+    refused, and for `repeat` if nothing is drawn; Fault if the sweep is interrupted.
     """
+    if repeat < 1:
+        raise InputFault(f"--repeat {repeat}: give 1 or more")
     if jobs is not None and jobs < 1:
         raise InputFault(f"--jobs {jobs}: give 1 or more")
     formats = figure_files.formats(format)
     varied = points(vary, runs)
-    made = job.jobs(scene, overrides.write_options(options), varied)
+    made = job.jobs(scene, overrides.write_options(options), varied, repeat)
     if metric:
         sweep_figure.check_metric(metric, [j.scene for j in made if j.scene])
     keys = tuple(dict.fromkeys(key for point in varied for key in point))
@@ -140,5 +158,8 @@ def sweep(
                 raise Fault(f"interrupted: {left.done} of {left.of} runs; {advice}") from None
     folder = folders.ensure(out)
     found = Sweep(into(folder), keys, folder, ("table.csv",))
+    if spread := found.spread:
+        table.write(folder / SPREAD, spread)
+        found = replace(found, files=(*found.files, SPREAD))
     drawn = sweep_figure.write_figure(folder, found.rows, keys, metric, formats)
-    return replace(found, files=("table.csv", *drawn))
+    return replace(found, files=(*found.files, *drawn))

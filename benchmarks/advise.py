@@ -101,10 +101,11 @@ def page(found: Sequence[Judged], command: str) -> Iterator[str]:
     known = [one for one in found if one.best]
     yield "# What `hapticlink advise` is worth on test scenes\n"
     yield fill(
-        f"The method that it says to take is within a tenth of the best of all methods in "
+        f"The advised method is within a tenth of the best of all methods in "
         f"{sum(one.near for one in known)} of the {len(known)} scenes in which any keeps the "
-        f"limits in all draws, and within the limits in {sum(one.within for one in found)} of "
-        f"{len(found)}, those counted in which none is and it says so.",
+        f"limits in all draws. The advice is right about the limits in "
+        f"{sum(one.within for one in found)} of {len(found)}: its method keeps them, or it says "
+        "that none does.",
         WIDTH,
     )
     yield ""

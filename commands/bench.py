@@ -44,7 +44,7 @@ def bench(
     out: Out = None,
     quick: Annotated[bool, Parameter(negative="", help="Fewer steps, sizes and rounds.")] = False,
     stale: Annotated[
-        bool, Parameter(negative="", help="List the tables of other code alone, without WHAT.")
+        bool, Parameter(negative="", help="Without WHAT: list only the tables of other code.")
     ] = False,
 ) -> int:
     """Measure run time, error and limits. Without WHAT, list which tables in results/ were made

@@ -11,7 +11,7 @@ from hapticlink.commands.progress import time_command
 def reproduce(*, out: Out = None) -> int:
     """Reproduce the report's figures from runs of the FMUs, with a page of the findings and a table
     of all its statements, in OUT (default results/report). Run it in the folder of the project's
-    checkout, of which it needs nothing more than the README's first command installs."""
+    checkout, after the README's first command."""
     make = checkout.function("reproduce", "studies.report:reproduce")
 
     def tell(what: str) -> None:

@@ -12,7 +12,7 @@ from hapticlink.orchestrator.network import key_file
 
 Key = Annotated[
     Path,
-    Parameter(help="File of the key that both computers need, made where it serves first."),
+    Parameter(help="File of the key that both computers need; the first serve makes it."),
 ]
 
 

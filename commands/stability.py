@@ -30,7 +30,7 @@ Drift = Annotated[
 ]
 UserPort = Annotated[
     bool,
-    Parameter(negative="", help="Report, too, whether any hand could be given energy."),
+    Parameter(negative="", help="Report also whether some hand could get energy from it."),
 ]
 Check = Annotated[
     int,

@@ -26,6 +26,13 @@ Runs = Annotated[
         help="Instead of --vary, a list of runs: a CSV with a column per key, or a TOML of [[run]]."
     ),
 ]
+Repeat = Annotated[
+    int,
+    Parameter(
+        help="Runs of each point, with other seeds of what is drawn (rates that vary, latency and "
+        "loss, noise); spread.csv then has medians and quartiles."
+    ),
+]
 Jobs = Annotated[int | None, Parameter(help="Runs at a time; default one per processor.")]
 Scheduler = Annotated[
     str | None, Parameter(help="Address of a Dask scheduler to run on, e.g. tcp://10.0.0.5:8786.")
@@ -39,6 +46,7 @@ def sweep(
     *,
     vary: Vary = None,
     runs: Runs = None,
+    repeat: Repeat = 1,
     set: Set = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
@@ -57,6 +65,7 @@ def sweep(
 
         hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh
         hapticlink sweep closed-loop --vary graphics.rate=10..60:11 --metric tracking_max_mm
+        hapticlink sweep scenario --vary hold=zoh,foh --repeat 20
     """
     import hapticlink as hl
     from hapticlink.analysis.sweep.row import REFUSED
@@ -65,7 +74,7 @@ def sweep(
     folder = output.out or default_folder("sweeps", scene)
     with progress.runs(f"{title(scene)}: sweep", output.quiet) as count:
         result = hl.sweep(
-            scene, vary or (), set or (), runs=runs or (), out=folder, jobs=jobs,
+            scene, vary or (), set or (), runs=runs or (), repeat=repeat, out=folder, jobs=jobs,
             scheduler=scheduler, metric=metric, format=format, progress=count,
         )  # fmt: skip
     for row in result.failed[:10]:
@@ -73,6 +82,7 @@ def sweep(
         say(f"hapticlink: {what}: {row['end']}: {row['message']}", file=sys.stderr)
     runs_done, failed = len(result.rows), len(result.failed)
     record = {"folder": str(folder), "rows": result.rows}
+    record |= {"spread": spread} if (spread := result.spread) else {}
     output.show(f"{title(scene)}: {result}", [f"{folder}/: {', '.join(result.files)}"], record)
     if failed < runs_done:
         return 0

@@ -10,7 +10,7 @@ from hapticlink.orchestrator.base.terminal_output import say
 
 Poses = Annotated[int, Parameter(help="Number of poses of the scene's run.")]
 Costs = Annotated[
-    bool, Parameter(negative="", help="Beside it what rates, delays and holds cost at the start.")
+    bool, Parameter(negative="", help="Tell also what rates, delays and holds cost at the start.")
 ]
 
 

@@ -8,7 +8,7 @@ from hapticlink.commands.options import Out, Scene, Set, default_folder
 from hapticlink.orchestrator.base.terminal_output import say
 
 Margin = Annotated[
-    float, Parameter(help="Factor on all stiffnesses, 1 or more, at which the map is unstable.")
+    float, Parameter(help="Factor (1 or more) on all stiffnesses up to which it is stable.")
 ]
 
 

@@ -33,7 +33,7 @@ WAIT = 0.1
 """Time (s) between two looks for Ctrl-C."""
 Host = Annotated[
     str,
-    Parameter(help="Address to serve on; any other than this one admits whoever knows the URL."),
+    Parameter(help="Address to serve on; another one admits whoever knows the URL."),
 ]
 Port = Annotated[
     int | None,

@@ -27,7 +27,7 @@ SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...]]] =
 OTHERS = {"two_users": ("left", ((0.012, -0.012),))}
 """By file, the point of the user who drags in a second window, and that one's path (m)."""
 
-DIRECT = "closed_loop_direct.html#graphics.rate=12"
+DIRECT = "closed_loop_direct.html#graphics.rate=11"
 OF_FILE: dict[str, tuple[str, tuple[int, int], tuple[float, float]]] = {
     "a_and_b": (
         "closed_loop.html#graphics.rate=10&b.controller.topology=false", (1360, 820), (0.03, 0.03)
@@ -39,8 +39,13 @@ OF_FILE: dict[str, tuple[str, tuple[int, int], tuple[float, float]]] = {
 (px), and where the mouse goes from the operational point (m)."""
 
 
-def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") -> None:
-    """Drag along a path, and stay at its end for a while with the button down."""
+VIBRATES = "() => document.getElementById('said').innerText.match(/by (.+) mm/)?.[1] > 4"
+
+
+def dragged(
+    page: Any, path: tuple[tuple[float, float], ...], user: str = "", rest: int = 1500
+) -> None:
+    """Drag along a path, and stay at each of its points (ms), at last with the button down."""
     page.wait_for_function("() => view.frame && view.stage.limits && view.frame.t > 0.5")
     x, y, scale = page.evaluate(
         """(user) => { const box = view.stage.canvas.getBoundingClientRect();
@@ -53,7 +58,7 @@ def dragged(page: Any, path: tuple[tuple[float, float], ...], user: str = "") ->
     page.mouse.down()
     for dx, dy in path:
         page.mouse.move(x + scale * dx, y - scale * dy, steps=40)
-        page.wait_for_timeout(1500)
+        page.wait_for_timeout(rest)
 
 
 def of_file(browser: Any, name: str) -> None:
@@ -63,9 +68,10 @@ def of_file(browser: Any, name: str) -> None:
     page.goto(f"file://{OUT / link}")
     if "&b." in link:
         page.wait_for_function("() => view.frame?.b")
-    dragged(page, (path,))
-    if name.startswith("first_minute"):  # in this very picture
-        page.wait_for_function("() => document.getElementById('said').innerText.includes('vibrat')")
+    first_minute = name.startswith("first_minute")
+    dragged(page, (path,), rest=0 if first_minute else 1500)
+    if first_minute:  # in this very picture, by more than the handle is wide
+        page.wait_for_function(VIBRATES, timeout=60_000)
     page.screenshot(path=OUT / f"{name}.png")
     page.close()
 

@@ -157,4 +157,5 @@ def _seeds(scene: Scene, system: System) -> dict[str, int]:
     rates = {"graphics.rate": scene.graphics.rate} if scene.graphics else {}
     rates |= {f"fmu.{fmu.name}.rate": fmu.rate for fmu in scene.fmu if fmu.rate}
     seeds = {name: r.seed for name, r in rates.items() if isinstance(r, VariableRate)}
-    return seeds | {c.name: c.latency.seed for c in system.connections if c.latency}
+    seeds |= {c.name: c.latency.seed for c in system.connections if c.latency}
+    return seeds | {f"at.{i}": event.seed for i, event in enumerate(scene.at) if event.noise}

@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6018,
     "fmus": 2816,
-    "orchestrator": 13251,
+    "orchestrator": 13252,
     "programs": 1021,
-    "analysis": 7091,
-    "visualization": 3334,
-    "api": 435,
-    "commands": 1398,
+    "analysis": 7183,
+    "visualization": 3364,
+    "api": 448,
+    "commands": 1407,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

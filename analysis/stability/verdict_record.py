@@ -19,7 +19,7 @@ from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene.overrides import as_command_line
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stability:
     """The stability of a scene in poses and hands."""
 
@@ -27,7 +27,7 @@ class Stability:
     bounds: Bounds
     poses: tuple[Pose, ...]
     hands: Mapping[str, Hand | None]
-    """By name, the scene's own among them; None: as it is."""
+    """The judged hands by name, the scene's own among them; None: the scene as it is."""
     cases: tuple[Case, ...]
     without: Mapping[str, str]
     """By pose without equilibrium, the reason."""
@@ -41,8 +41,7 @@ class Stability:
     rounded: str = ""
     """At which rate it was judged instead of its own, and why."""
     run_fault: str = ""
-    """How the run of the scene failed from which the poses are taken, "" where it reached its
-    end."""
+    """How the scene's run, from which the poses are taken, failed; "" if it reached its end."""
 
     @property
     def in_hands(self) -> str:
@@ -71,8 +70,8 @@ class Stability:
 
     @property
     def damping(self) -> float | None:
-        """The damping to ground (N.s/m) that a handle lacks that nobody holds, infinite where none
-        that was tried suffices; None where it lacks none."""
+        """The damping to ground (N.s/m) that a handle in free air lacks: infinite if none that was
+        tried suffices, None if it lacks none."""
         return max((c.damping for c in self.cases if c.damping is not None), default=None)
 
     def record(self) -> dict[str, Any]:
@@ -135,6 +134,8 @@ class Stability:
 
     def __str__(self) -> str:
         return "\n".join((f"{self.title}: {self.finding}", *self.lines()))
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         lines = "".join(f"<li>{escape(line)}</li>" for line in (*self._warnings(), *self._below()))

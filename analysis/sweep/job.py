@@ -16,6 +16,8 @@ import hapticlink.analysis
 import hapticlink.components
 import hapticlink.fmus
 import hapticlink.orchestrator
+from hapticlink.analysis.sweep.repeats import REPETITION
+from hapticlink.analysis.sweep.repeats import repeat as repeated
 from hapticlink.fmus.cache import sources
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator import open_scene
@@ -39,18 +41,28 @@ class Job:
 
 
 def jobs(
-    scene: str | Path | Scene, options: Sequence[str], points: Iterable[Mapping[str, str]]
+    scene: str | Path | Scene,
+    options: Sequence[str],
+    points: Iterable[Mapping[str, str]],
+    repeat: int = 1,
 ) -> list[Job]:
-    """The jobs of `points`, each of `scene` with the common `options` and those of its point.
+    """The jobs of `points`, each of `scene` with the common `options` and those of its point, and
+    `repeat` times with other seeds.
 
     A point without a valid scene is a refused job. Raises InputFault if all points are refused or
-    there is no such scene, Interrupted for a signal.
+    there is no such scene, and as `repeats.repeat`; Interrupted for a signal.
     """
-    source, checked = open_scene.source_of(scene), []
-    for point in points:
-        checked.append(job(source, [*options, *(f"{k}={v}" for k, v in point.items())], point))
+    source = open_scene.source_of(scene)
+
+    def at(point: Mapping[str, str]) -> Job:
+        own = (f"{k}={v}" for k, v in point.items() if k != REPETITION)
+        return job(source, [*options, *own], point)
+
+    checked = [at(point) for point in points]
     if checked and all(one.scene is None for one in checked):
         raise InputFault(checked[0].refusal)
+    if repeat > 1:
+        checked = [at(p) for p in repeated([(j.point, j.scene) for j in checked], repeat)]
     return checked
 
 

@@ -15,6 +15,8 @@ Row = dict[str, Any]
 
 METRIC = "tracking_max_mm"
 DONE, REFUSED, DIED, INTERRUPTED = "done", "refused", "died", "interrupted"
+WHOLE = ("duration",)
+"""Ends of runs whose numbers can be compared: they lasted as long as the scene says."""
 FAILED = ("fault", "diverged", REFUSED, DIED)
 """Ends with an error: a fault of the run, divergence, bad input, and what is no fault of the scene
 (a process that crashed or hung, a full disk)."""

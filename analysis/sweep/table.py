@@ -62,13 +62,17 @@ def lines(rows: Sequence[Row], keys: Sequence[str]) -> Iterator[str]:
     yield f"{len(rows)} runs over {', '.join(keys)}, {bad} failed"
     shown = {name: head for name, head in HEADS.items() if any(name in row for row in rows)}
     cells = [[_cell(name, row.get(name, "")) for name in (*keys, *shown)] for row in rows]
-    if len(rows) > MOST:
-        order = sorted(range(len(rows)), key=lambda i: rows[i].get(METRIC, math.inf))
-        ends = *order[: MOST // 2], *order[-MOST // 2 :]
-        cells = [cells[i] for i in ends]
-        cells.insert(MOST // 2, ["..."] * len(cells[0]))
-    cells.insert(0, [*keys, *shown.values()])
-    yield from (f"  {line}" for line in align_columns(cells))
+    order = [row.get(METRIC, math.inf) for row in rows]
+    yield from few_lines([*keys, *shown.values()], cells, order)
+
+
+def few_lines(heads: list[str], cells: list[list[str]], order: Sequence[float]) -> Iterator[str]:
+    """The lines of a table; of more than MOST rows those of the smallest and largest `order`."""
+    if len(cells) > MOST:
+        indices = sorted(range(len(cells)), key=order.__getitem__)
+        cells = [cells[i] for i in (*indices[: MOST // 2], *indices[-MOST // 2 :])]
+        cells.insert(MOST // 2, ["..."] * len(heads))
+    yield from (f"  {line}" for line in align_columns([heads, *cells]))
 
 
 def _cell(name: str, value: Any) -> str:

@@ -31,7 +31,7 @@ NOTES = f"""- `ours, C` is what a native FMU runs (`packaging = "native"`): the 
   constraintDynamics. `four calls only` is the time of those calls alone, the least that a program
   in C++ would take for the same RK4 step; the ratio above counts it, at the error of our RK4 with
   projection.
-- It is one tip at one time, so an error that crosses zero is too small in its row.
+- The error is that of one tip at one time: where it crosses zero, its row shows too small a one.
 - MuJoCo's equalities are soft, with one stiffness (time constant 2 h): its error is theirs, and no
   smaller with a method of higher order. Drake takes loops in its discrete plant alone, whose step
   is of first order.
@@ -109,8 +109,8 @@ def _page(
         "",
         "## Run time relative to ours at equal error",
         "",
-        "The smallest ratio over the rows that no other row of the same code beats, to our fastest",
-        "row (as C) with no larger error.",
+        "Of the rows of a code that none of its other rows beats: the smallest ratio to our",
+        "fastest row (as C) with no larger error.",
         "",
         *table(f"mechanism | {' | '.join(OTHERS)} | reference", f"l{'r' * len(OTHERS)}l", relative),
         "",

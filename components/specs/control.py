@@ -35,8 +35,8 @@ class PassivityLaw:
     beyond a budget is taken out by damping ([energy](energy.md#passivity-controller))."""
 
     energy: Annotated[float, Quantity("J", ge=0)] = 0.0
-    """What the motors may give in all: that of drives and gravity, of a mechanism in motion at the
-    start, and (m_D - m_S) v^2/2 where the handle shall feel lighter than the device."""
+    """What the motors may give in all: the energy of drives and gravity, of a mechanism in motion
+    at the start, and (m_D - m_S) v^2/2 where the handle shall feel lighter than the device."""
     limit: Annotated[float, Quantity("1", gt=0, lt=2)] = 0.5
     """Largest damping times the period, by the device's inertia; a sampled damper is stable below
     2."""
@@ -68,6 +68,6 @@ class Controller:
     """Topology controller; true for its defaults."""
     contact: bool = False
     """Whether contacts are felt: F_env enters the impedance law. Needs [contacts]. With further
-    hands or efforts on joints it always does, with all that acts beside the hand."""
+    hands or efforts on joints F_env always enters, with all that acts beside the hand."""
     passivity: PassivityLaw | bool = False
     """Passivity controller at the motors; true for its defaults."""

@@ -28,8 +28,8 @@ class Observer:
     k_D: Annotated[float, Quantity("1/s", gt=0)] = 100.0
     """Output gain."""
     beside: bool = False
-    """true: the observer is an FMU of its own beside the device, which takes torques and puts out
-    base angles, as a device from elsewhere does that is to be observed; the numbers are the same.
+    """true: the observer is an FMU of its own beside the device. The device then takes torques
+    and puts out base angles, as an observed device from elsewhere does; the numbers are the same.
     Needs sensing = "encoders"."""
 
 
@@ -78,7 +78,7 @@ class Device:
     motor_damping: Annotated[float, Quantity("N.m.s/rad", ge=0)] = 0.0
     """Viscous damping about the axis of each motor."""
     motor_friction: Annotated[float, Quantity("N.m", ge=0)] = 0.0
-    """Dry friction about the axis of each motor: this times tanh of its rate over 0.1 rad/s."""
+    """Dry friction about the axis of each motor: motor_friction tanh(rate/(0.1 rad/s))."""
     torque_limit: Annotated[float, Quantity("N.m", gt=0)] = 0.5
     """Largest torque of a motor; if one would exceed it, all four are scaled by one factor."""
     encoder_resolution: Annotated[float, Quantity("rad", gt=0)] = 0.0015707963267948966

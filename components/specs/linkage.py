@@ -146,8 +146,8 @@ class Loop:
 
     type: CutType = "revolute"
     """revolute: the two points coincide; slot: the first body's point, a pin, is on the line
-    through the second body's point along `axis`; prismatic: so it is, and the first body does not
-    turn relative to the second."""
+    through the second body's point along `axis`; prismatic: a slot in which the first body does
+    not turn relative to the second."""
     bodies: tuple[str, str]
     """The two bodies; may be "ground"."""
     at: tuple[Point, Point]

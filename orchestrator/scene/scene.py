@@ -100,7 +100,7 @@ class Scene:
     format: Literal[2] = 2
     """Version of the format of scenes."""
     experiment: Literal["", "chapter 6", "section B.6"] = ""
-    """The report's experiment that it is: the summary says in what it differs from that."""
+    """The report's experiment that the scene stands for; the summary lists the differences."""
     duration: Duration
     """Simulated time."""
     hold: HoldName = "zoh"

@@ -45,15 +45,15 @@ class ForeignFmu:
     path: str | None = None
     """Its file, relative to the scene's file."""
     map: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
-    """By port of the block that it replaces, what it is in the FMU: a variable, or one for each
-    entry of a vector, with a sign or factor where it has another one (`-tau_{x,y,z}`, `pos*0.001`).
-    Names that differ in brackets, underscores or case alone need none."""
+    """What each port of the replaced block is in the FMU: a variable, or one for each entry of a
+    vector, with a sign or factor where it has another one (`-tau_{x,y,z}`, `pos*0.001`). Names
+    that differ only in brackets, underscores or case need none."""
     block: Annotated[str, BLOCKS.names()] | None = None
     """In place of a file, the block to build ([extending](extending.md#a-block))."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the block, by name."""
     engine: Literal["mujoco"] | None = None
-    """In place of a file, the physics engine by which the block that it replaces is made:
+    """In place of a file, the physics engine that makes the block:
     [MuJoCo](engine.md)."""
     rate: Literal["haptics", "graphics"] | AnyRate | None = None
     """Its communication rate: one of the scene's, or its own, written as graphics.rate is. By
@@ -82,8 +82,8 @@ class ForeignFmu:
 
 @dataclass(frozen=True, kw_only=True)
 class Wire:
-    """A connection of a scalar or a whole vector, between any FMUs of the scene. A connection to an
-    input of a block replaces the one that the haptic loop has there."""
+    """A connection of a scalar or a whole vector, between any FMUs of the scene. A connection to
+    an input of a block replaces that of the haptic loop."""
 
     from_: Annotated[str, Field(alias="from")]
     """The output, `fmu.variable`."""
@@ -101,7 +101,8 @@ class Wire:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordTable:
-    """What a run writes. Outputs that nobody reads either are not fetched from their FMUs:
+    """What a run writes. Outputs that are neither written nor read are not fetched from their
+    FMUs:
     [what is recorded](fmus.md#what-is-fetched-and-recorded)."""
 
     signals: Literal["all", "connected", "none"] | tuple[str, ...] = "all"
@@ -109,8 +110,8 @@ class RecordTable:
     FMUs, for all of their outputs, of variables `fmu.port` and entries `fmu.port[1]`: outputs,
     inputs, locals and parameters. `*` stands for anything: `plant.*` are all variables of one."""
     every: Annotated[int, Quantity("1", ge=1, le=1_000_000)] = 1
-    """Every so many communication points of a rate, from the one at t = 0 on, it gets a row, and at
-    the last one within the scene's duration."""
+    """A rate gets a row every so many of its communication points, from t = 0 on, and at the last
+    one within the scene's duration."""
     format: Literal["csv", "rows"] = "csv"
     """csv; or rows, the header of the CSV and a line feed, then rows of doubles, which take less
     than half the time to write and almost none to read."""

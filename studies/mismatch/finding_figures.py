@@ -121,8 +121,8 @@ def _tracking(folder: Path, found: Found) -> Iterator[str]:
     unit = "largest |x_S - x_D| (mm), median"
     made = lines(folder, "tracking.png", title, drawn, unit, NAMED, hollow=SOME)
     text = (
-        f"{title}. Each rate has the gains that the table takes for it, which change with a rate, "
-        f"and the errors with them. `foh` has a smaller median than `zoh` at {_fewer(drawn)} rates "
+        f"{title}. Each rate has the gains that the table takes for it; errors change with them. "
+        f"`foh` has a smaller median than `zoh` at {_fewer(drawn)} rates "
         "at which both are stable in every draw."
     )
     yield _text(text, made, "Tracking error by hold and rate")
@@ -152,8 +152,8 @@ def _energy(folder: Path, found: Found) -> Iterator[str]:
     made = lines(folder, "energy.png", title, drawn, unit, NAMED, hollow=SOME)
     text = (
         f"{title}: {SHARE:.0%} of the hand's work, and at least {1e3 * NOTICEABLE_J:g} mJ. `foh` "
-        f"generates less than `zoh` at {_fewer(drawn)} rates. A stable run is not yet a passive "
-        "one, which tracking errors do not show."
+        f"generates less than `zoh` at {_fewer(drawn)} rates. A stable run need not be "
+        "passive; tracking errors do not show this."
     )
     yield _text(text, made, "Energy at the user's port by hold and rate")
 
@@ -185,8 +185,8 @@ def _signs(found: Found) -> str:
     wrong = [r for r in rows if r["verdict"] != r[RUN]]
     text = (
         f"Whether a run decays after a kick of {KICK:g} rad/s is as the map says in "
-        f"{len(rows) - len(wrong)} of {len(rows)} scenes at rest; growth that saturated motors end "
-        "in a limit cycle is no decay"
+        f"{len(rows) - len(wrong)} of {len(rows)} scenes at rest (a limit cycle in which saturated "
+        "motors end a growth is no decay)"
     )
     if not wrong:
         return f"{text}."
@@ -226,8 +226,8 @@ def _integrators(folder: Path, found: Found) -> Iterator[str]:
     kept = ", ".join(f"{count} with {i}" for i, count in sound.items())
     text = (
         f"{title} (medians within draws; quartiles {quarters}). Of {len(COMPARED) * len(FEW)} "
-        f"cells, stable in every draw: {kept}. The passive midpoint rule makes no energy of its "
-        "own; what the holds make is not its matter."
+        f"cells, stable in every draw: {kept}. The passive midpoint rule generates no energy of "
+        "its own, but does not prevent what the holds generate."
     )
     yield _text(text, made, "Tracking error by integrator")
 
@@ -270,8 +270,8 @@ def _lost(found: Found) -> str:
     return (
         f" With the report's gains, {len(lost)} of {len(every[0])} draws are unstable with every "
         f"hold at {both(FEW)} Hz: {where}. Of the same blocks at {REFERENCE} Hz {sound} of "
-        f"{len(lost)} runs are stable: where these are, it is not the graphics rate, "
-        "but 512 Hz that is too slow for these gains."
+        f"{len(lost)} runs are stable: for these, not the graphics rate but 512 Hz "
+        "is too slow at these gains."
     )
 
 

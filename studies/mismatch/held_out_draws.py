@@ -40,8 +40,8 @@ def worth(found: Found) -> str:
         "On linkages, hands and a rate that were [kept apart](../../docs/glossary.md#words), the "
         "method that a row says to take is within a tenth of the best of all methods in "
         f"{near(MOBILITY, taken)} with the mechanism at 512 Hz, and in {near(DIRECT, taken)} with "
-        "the mechanism at the graphics rate; there "
-        "the best of it and of what the row says to try, too, is in "
+        "the mechanism at the graphics rate. There "
+        "the best of this method and those to try, too, is so in "
         f"{near(DIRECT, lambda cell: found.listed[cell])}."
     )
 
@@ -71,24 +71,24 @@ def section(found: Found) -> Iterator[str]:
     bad = _unstable_maps(found)
     yield paragraph(
         "The slider-crank, a massless spring hand of 200 N/m, and the rate of "
-        f"{KEPT_APART} Hz, whose frames end between ticks and which takes the row of {NEAREST} Hz, "
-        f"were in no choice. With the advised methods {sound} of {of} of these runs are stable, "
-        f"and {kept} of {of} keep both limits. At rest on the slider-crank "
-        f"{bad[0]} of the {bad[1]} rows with a map are unstable. In the table: draws within the "
-        "limits with the method of the row (* not advised); and in how many of the cases in which "
-        "any method keeps the limits it does, with an error within a tenth of the smallest, the "
-        "row's method alone, and the best of it and of those to try, too, which at 512 Hz are all "
-        "that there are. The error is that of tracking, of a "
-        "mechanism at 512 Hz the coupling error ([kept-apart.csv](kept-apart.csv))."
+        f"{KEPT_APART} Hz, whose frames end between ticks (it takes the row of {NEAREST} Hz), "
+        f"had no part in the choice. With the advised methods {sound} of {of} of these runs are "
+        f"stable, and {kept} of {of} keep both limits. At rest on the slider-crank "
+        f"{bad[0]} of the {bad[1]} rows with a map are unstable. A cell of the table has two "
+        "parts. First: the draws within the limits with the method of the row (* not advised). "
+        "Second, of the cases in which any method keeps the limits: how many have an error within "
+        "a tenth of the smallest, with the row's method alone, and with the best of it and those "
+        "to try, too (at 512 Hz all methods). The error is the tracking error, or at 512 Hz the "
+        "coupling error ([kept-apart.csv](kept-apart.csv))."
     )
     heads = [f"{PLACES[a]}, {'on' if b == 'full' else 'off'}" for a, b in every]
     table = ["| Hz | " + " | ".join(heads) + " |", "|---" * (1 + len(heads)) + "|", *lines]
     yield "\n".join(table)
     looked_up = [_near(by_cell, c, [_nearest(by_cell, c)]) for c in found.advice if c[0] == DIRECT]
     yield paragraph(
-        "One method for all hands cannot reach that with the mechanism at the graphics rate: the "
-        "one that is right most often at a rate, looked up on these very cases, is so in "
-        f"{_share(looked_up)}. `hapticlink advise` runs all methods on a scene of yours.",
+        "With the mechanism at the graphics rate no one method can reach that for all hands: even "
+        "the method that is within a tenth most often at a rate, looked up on these very cases, is "
+        f"so in {_share(looked_up)}. `hapticlink advise` runs all methods on a scene of yours.",
     )
 
 

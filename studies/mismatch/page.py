@@ -44,10 +44,10 @@ def write(folder: Path, found: Found) -> Path:
 def _answer(found: Found) -> Iterator[str]:
     yield paragraph(
         "Limits: the coupling stays stable, and sampling and holding generate at most "
-        f"{SHARE:.0%} of the hand's work at the user's port. A method is advised where it keeps "
-        "them in every [draw](../../docs/glossary.md#words); elsewhere nothing keeps them, and the "
-        "best is named with what it does keep. At a rate that is not in a table take the row next "
-        "to it."
+        f"{SHARE:.0%} of the hand's work at the user's port. A method is advised if it keeps "
+        "them in every [draw](../../docs/glossary.md#words). Where none does, the best is named, "
+        "with the number of draws in which it keeps them. For a rate that is not in a table take "
+        "the row next to it."
     )
     yield "\n".join(
         paragraph(
@@ -65,15 +65,34 @@ def _answer(found: Found) -> Iterator[str]:
         "Gains K_pc (N/m, N/m, N.m/rad) and B_pc (N.s/m, N.s/m, N.m.s/rad): soft (25, 25, .01) and "
         "(5, 5, .002); medium (100, 100, .1) and (20, 20, .02), as in `closed-loop-direct`; stiff "
         "(100, 100, .5) and (70, 70, .375), the report's. `a, b` is hold `a` from slow to fast and "
-        "`b` from fast to slow, without `b` the latest sample; `slope` is of the velocity from "
-        "slow to fast. Within the limits: draws that are stable and keep the limit of energy at "
-        "the user's port (below). Error: the largest |x_S - x_D| of a run, median of the stable "
-        "draws (worst). As good: other methods that the best one does not beat beyond the spread: "
-        "where one is advised, by a smaller error in more than three quarters of the draws; where "
-        f"none is, by keeping the limits in more draws by a sign test at {LEVEL:.0%}. Try, too: no "
-        "method is the most accurate in every hand, so run these as well on your own scene, and "
-        "take the smallest error within the limits: each is that which adds most cases in which "
-        "the best of the row and these is within a tenth of the best of all methods. "
+        "`b` from fast to slow, without `b` the latest sample; `slope` holds the velocity from "
+        "slow to fast."
+    )
+    yield "\n".join(
+        f"| {column} | {meaning} |"
+        for column, meaning in (
+            ("column", "meaning"),
+            ("---", "---"),
+            (
+                "within the limits",
+                "draws that are stable and keep the limit of energy at the user's port (below)",
+            ),
+            ("error", "largest distance of x_S and x_D in a run, median of stable draws (worst)"),
+            (
+                "as good",
+                "methods that the best does not beat beyond the spread. If it is advised, it beats "
+                "another by a smaller error in more than three quarters of the draws; if not, by "
+                f"keeping the limits in more draws (sign test at {LEVEL:.0%})",
+            ),
+            (
+                "try, too",
+                "no method is the most accurate in every hand: run these on your scene, and take "
+                "the smallest error within the limits. Each adds most cases in which the best of "
+                "the row and these is within a tenth of the best of all methods",
+            ),
+        )
+    )
+    yield paragraph(
         "[advice.csv](advice.csv) has quartiles, spread over seeds, coupling error, energy and "
         "margin of each row."
     )
@@ -187,7 +206,7 @@ def _other_limits(found: Found) -> Iterator[str]:
     """What other limits of the energy at the user's port would advise."""
     yield "## What the limit of energy decides"
     yield paragraph(
-        f"The share of {SHARE:.0%} was set when runs had been seen, so that it is no part of the "
+        f"The share of {SHARE:.0%} was set after runs had been seen: it is no part of the "
         "evidence. A mechanism at the graphics rate, with other shares of the hand's work:"
     )
     heads = [f"{COMPENSATION[bias].split()[-1]}, {share:.0%}" for bias in BIAS for share in SHARES]
@@ -209,8 +228,8 @@ def _other_limits(found: Found) -> Iterator[str]:
 def _limits(found: Found) -> Iterator[str]:
     yield "## What it does not cover"
     yield paragraph(
-        "One device, with assumed dimensions (`components/specs/`), at 512 Hz, with ideal sensing "
-        "and without latency: encoders, delays and losses add to what is found here. Linkages of "
+        "The study has one device, with assumed dimensions (`components/specs/`), at 512 Hz, with "
+        "ideal sensing and without latency: encoders, delays and losses add errors. Linkages of "
         "about 0.5 to 2 kg and 40 to 150 mm, wrenches up to 0.5 N, paths of 2 cm in half a second "
         "and slower. Gains in three steps, so that better ones may lie between them. Walls of 1000 "
         f"N/m and 10 N.s/m, with {SUBSTEPS} integration steps a frame where the mechanism runs at "
@@ -227,7 +246,7 @@ def _limits(found: Found) -> Iterator[str]:
         f"each has {SEEDS} draws, of the wrench or path of the hand and of the periods of a rate "
         "that varies. Every method runs on the same draws, and methods are compared within a draw. "
         f"Where all {of} draws keep the limits, up to {1 - LEVEL ** (1 / of):.0%} of further ones "
-        f"may not ({1 - LEVEL:.0%} confidence, if draws know nothing of each other). Graphics "
+        f"may not ({1 - LEVEL:.0%} confidence, if draws are independent). Graphics "
         f"rates are whole haptic ticks a frame: {both(list(map(str, TICKS)))} of 1/512 s. A run is "
         "stable if it reaches its end with handle and operational point less than "
         f"{APART[0]:g} mm and {APART[1]:g} rad apart. A method is "
@@ -237,13 +256,12 @@ def _limits(found: Found) -> Iterator[str]:
         f"lifted map, where it has one, is stable on "
         f"{both(['five-bar', 'four-bar', 'serial arm'])}. A quarter: the continuous "
         "runs, which no hold disturbs, generate up to "
-        f"{_continuous(found):.0%} without Coriolis compensation, and a limit below that would "
-        "refuse the ideal. Tried at "
-        f"{both(FEW)} Hz without Coriolis compensation alone: all holds, the report's gains, and, "
-        "of a mechanism at the graphics rate, the integrators. Elsewhere it has the holds "
-        f"{both([f'`{hold}`' for hold in LIKELY])}, one of which is within a tenth of the best of "
-        f"all in {_likely(found)} cases in which any keeps the limits. The continuous "
-        f"runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by "
+        f"{_continuous(found):.0%} without Coriolis compensation, so that a lower limit would "
+        "refuse the ideal. All holds, the report's gains and, with the mechanism at the graphics "
+        f"rate, the integrators were tried at {both(FEW)} Hz without Coriolis compensation alone. "
+        f"Elsewhere the holds {both([f'`{hold}`' for hold in LIKELY])} were: one of them is within "
+        f"a tenth of the best of all in {_likely(found)} cases in which any keeps the limits. "
+        f"The continuous runs are at {REFERENCE} Hz; those at {FLOOR} Hz differ from them by "
         f"{np.median(sizes):.1g} mm within 1 s (median; up to {max(sizes):.1g}), so that smaller "
         "differences of the handle mean nothing."
     )

@@ -83,14 +83,24 @@ def premises(name: str, results: Results) -> str:
     return f"{name}: not an experiment of the report; {', '.join(values)}"
 
 
+def _premises(entry: Entry, shown: dict[str, str]) -> str:
+    """The premises of a figure; of those that are `shown` already, the figure where they stand."""
+    text = "; ".join(entry.premises)
+    if text in shown:
+        return f"those of {shown[text]}"
+    shown[text] = entry.title
+    return text
+
+
 def write(folder: Path, entries: Sequence[Entry], counts: str) -> Path:
     """Writes README.md of `folder`, with the counts of the statements' verdicts; returns its
     path."""
     parts = [HEAD.format(counts=counts)]
+    shown: dict[str, str] = {}
     for e in entries:
         parts.append(
             f"## {e.title}: {e.finding}\n\n- The report: {e.stated}.\n- Found: {e.found}.\n\n"
-            f"![{e.title}]({e.figure})\n\nPremises: {'; '.join(e.premises)}.\n\n"
+            f"![{e.title}]({e.figure})\n\nPremises: {_premises(e, shown)}.\n\n"
             f"Run: `{e.command}`\n"
         )
     path = folder / "README.md"

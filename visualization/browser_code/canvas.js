@@ -33,6 +33,7 @@ export const SECOND = "#dd6600"; // of the second of two runs in one picture
 const DARK = {
   "#000000": "#f0f2f6", "#333333": "#c4c8d2", "#666666": "#9aa0ac", "#8c8c8c": "#8a909c", "#bfbfbf": "#596070", "#d9d9d9": "#3b4150",
   "#ffffff": "#1d2129", "#4477aa": "#7aa7d9", "#b85c00": "#f0964a", "#228833": "#5cc46e", "#aa3377": "#e07ab5", "#cc3311": "#ff7a5c",
+  "#8250c8": "#b794f4", "#75751f": "#c3c35a", "#882255": "#d987ab", "#1f7d70": "#4fc4b2",
 };
 const dark = globalThis.matchMedia?.("(prefers-color-scheme: dark)");
 export const inTheme = (color) => (dark?.matches && color && color.slice(0, 7) in DARK ? DARK[color.slice(0, 7)] + color.slice(7) : color);

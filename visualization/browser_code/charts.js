@@ -2,7 +2,7 @@
 import { FELT, fitted, inTheme, text, themed } from "./canvas.js";
 
 const SPAN = 10, LEFT = 44, ENERGIES = 4; // s, px, and the most lines of energies
-const COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#66ccee", "#999933", "#882255", "#44aa99", "#777777"], DASHES = [[], [5, 3], [2, 3], [7, 3, 2, 3]];
+const COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#8250c8", "#75751f", "#882255", "#1f7d70", "#666666"], DASHES = [[], [5, 3], [2, 3], [7, 3, 2, 3]];
 const size = (v) => v && Math.hypot(v[0], v[1]);
 // `each`: series of every user, from that user's part of a frame; `series`: from the whole frame.
 const CHARTS = [

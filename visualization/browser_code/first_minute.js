@@ -22,7 +22,7 @@ export function firstMinute(controls) {
 // enough, and whether the run has ended.
 export function felt(vibration, force, watched, ended) {
   if (ended) return ["The run has ended: the line above the picture says why.", "red"];
-  if (vibration) return [`The handle vibrates: ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`, "red"];
+  if (vibration) return [`The handle vibrates (red trace): ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`, "red"];
   if (!force.some(Boolean)) return ["No hand pulls: press on the picture and drag.", ""];
   if (!watched) return ["A second is watched first.", ""];
   return ["The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.", "green"];
@@ -30,7 +30,7 @@ export function felt(vibration, force, watched, ended) {
 
 // Why, of the control of the rate.
 export const why = ({ value, max }) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
-the force on the hand ${Math.round(max)} times a second. In between, that force rests on where the linkage was: late as it is, it can feed a swing that it should damp.`;
+the force on the hand ${Math.round(max)} times a second. In between, that force uses where the linkage was. A late force can feed a swing that it should damp.`;
 
 export class FirstMinute {
   // `send` is given what is changed.
@@ -80,8 +80,9 @@ export class FirstMinute {
   add(t, { handle, F_hand }, ended) {
     if (!this.offered) return;
     this.swings.add(t, handle);
-    const { vibration, watched } = this.swings, [words, light] = felt(vibration, F_hand, watched, ended);
+    const { vibration, watched, trace } = this.swings, [words, light] = felt(vibration, F_hand, watched, ended);
     if (words !== this.felt.textContent) this.felt.textContent = words;
     this.light.className = `light ${light}`;
+    this.trace = vibration ? trace : [];
   }
 }

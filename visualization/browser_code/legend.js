@@ -46,7 +46,7 @@ export function tags(host, shown) {
   host.replaceChildren(...shown.map(([color, label]) => {
     const tag = document.createElement("li");
     tag.style.background = color;
-    tag.style.color = luminance(color) > 0.3 ? "#111" : "#fff";
+    tag.style.color = luminance(color) > 0.179 ? "#000" : "#fff"; // where both have 4.58:1
     tag.textContent = label;
     return tag;
   }));

@@ -240,6 +240,7 @@ function second() {
 function draw() {
   if (view.frame) {
     const { b } = view.frame;
+    stage.trace = first_minute.trace;
     stage.draw(ending.frame ?? view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
     tags($("tags"), [...view.frame.states.filter((state) => !state.startsWith("energy")).map(label), ...(b ? [[SECOND, second()]] : [])]);
     $("time").textContent = `${view.frame.t.toFixed(2)} s`;

@@ -1,6 +1,6 @@
 // The mechanism on its canvas, and where `pull` is given the pointers that pull the handles: each
 // that of the user whose handle is nearest when it is pressed; whether it begins to pull.
-import { fitted, themed } from "./canvas.js";
+import { fitted, inTheme, themed } from "./canvas.js";
 import { Legend } from "./legend.js";
 import { paint, place, zigzag } from "./painter.js";
 
@@ -142,9 +142,19 @@ export class Stage {
     this.fit(width, height);
     paint(context, this.marks, frame, this);
     for (const other of others) paint(context, outlined(other), other.frame, this);
+    if (this.trace?.length) this.drawTrace(context);
     for (const [name, user] of users(frame)) this.drawPull(context, user, name);
     this.legend.draw(frame);
     this.drawScale(context, height);
+  }
+
+  // Where a vibrating handle was in the last second.
+  drawTrace(context) {
+    context.strokeStyle = inTheme("#cc3311");
+    context.lineWidth = 1.4;
+    context.beginPath();
+    this.trace.forEach((place) => context.lineTo(...this.toScreen(place)));
+    context.stroke();
   }
 
   // The mouse's spring.

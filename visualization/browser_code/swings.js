@@ -30,10 +30,16 @@ export class Swings {
     if (!this.axes.length || t < this.t) {
       this.axes = [0, 1].map((i) => new Axis(point[i]));
       this.since = t;
+      this.past = [];
     }
     this.t = t;
+    this.past.push({ t, point });
+    while (t - this.past[0].t > WINDOW) this.past.shift();
     this.axes.forEach((axis, i) => axis.add(t, point[i]));
   }
+
+  // Where it was in the last second.
+  get trace() { return this.past.map(({ point }) => point); }
 
   // Whether it has been seen for that long.
   get watched() { return this.t - this.since >= WINDOW; }

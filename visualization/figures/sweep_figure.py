@@ -1,5 +1,6 @@
 """The figure of a sweep: a metric against the first numeric key, with one line for each combination
-of the others; a map for two numeric keys with many values each."""
+of the others; a map for two numeric keys with many values each. Of repeated runs it shows the
+median, with the quartiles as a band or whiskers."""
 
 from __future__ import annotations
 
@@ -13,12 +14,14 @@ import numpy as np
 
 import hapticlink.visualization
 from hapticlink.analysis.sweep.grid import number
-from hapticlink.analysis.sweep.row import METRIC, Row
+from hapticlink.analysis.sweep.repeats import QUARTILES, REPETITION, spread
+from hapticlink.analysis.sweep.row import METRIC, WHOLE, Row
 from hapticlink.analysis.sweep.table import columns
 from hapticlink.fmus.cache import sha, sources
 from hapticlink.fmus.versions import version
 from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_files
@@ -53,7 +56,8 @@ FEW_KEYS = 3
 """Keys whose values alone name a row: of more, each row says those that it gives."""
 FEW = len(CURVES)
 """Number of lines that differ in colour; further ones also differ in dash pattern."""
-GOOD = ("duration",)
+LOW, HIGH, LOST = "low", "high", "lost"
+"""Of a row that stands for repeated runs: quartiles of the metric, and runs that did not last."""
 DPI = 130
 STAMPS = {
     "png": ("Comment", b"IEND\xaeB`\x82"),
@@ -90,20 +94,25 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
         return None
     if "_J" in metric:
         rows = [r | {metric: 1e3 * r[metric]} if _is_shown(r, metric) else r for r in rows]
+    runs, lost = len(rows), sum(not _is_shown(r, metric) for r in rows)
+    name = _named(metric)
+    if any(REPETITION in r for r in rows):
+        rows = [_middle(point, metric) for point in spread(rows, keys)]
+        name = f"median of the {name}"
     numeric = [k for k in keys if all(number(r.get(k, "")) is not None for r in rows)]
     others = [k for k in keys if k not in numeric[:1]]
     lines = len({_label(r, others) for r in rows})
     figure, axes = _axes(wide=lines > 1)
     if len(numeric) > 1 and len(keys) == 2 and lines > FEW:
-        _map(figure, axes, rows, numeric[0], numeric[1], metric)
+        _map(figure, axes, rows, numeric[0], numeric[1], metric, name)
     elif numeric:
-        _lines(axes, rows, numeric[0], others, metric)
+        _lines(axes, rows, numeric[0], others, metric, name)
     else:
-        _bars(axes, rows, keys, metric)
-    best = min((r for r in rows if _is_shown(r, metric)), key=lambda r: r[metric], default=None)
+        _bars(axes, rows, keys, metric, name)
+    whole = [r for r in rows if _is_whole(r, metric)] or [r for r in rows if _is_shown(r, metric)]
+    best = min(whole, key=lambda r: r[metric], default=None)
     if best:
-        lost = sum(not _is_shown(r, metric) for r in rows)
-        text = finding(best, best[metric], _named(metric), keys, lost, len(rows))
+        text = finding(best, best[metric], name, keys, lost, runs)
         headline(axes, text, 80)
     return figure
 
@@ -164,7 +173,7 @@ def unit(key: str) -> str:
 
 def words(key: str) -> str:
     """A scene's key in words: `linkage.body.link0.mass` is `mass of link0`."""
-    path = key.replace("_", " ").split(".")
+    path = [name.replace("_", " ") for name in overrides.parse(f"{key}=")[0]]
     return QUANTITIES.get(key) or " of ".join(reversed(path[-2:]))
 
 
@@ -202,10 +211,27 @@ def _label(row: Row, keys: Sequence[str]) -> str:
 
 def _is_shown(row: Row, metric: str) -> bool:
     value = row.get(metric)
-    return isinstance(value, int | float) and bool(np.isfinite(value)) and row["end"] in GOOD
+    return isinstance(value, int | float) and bool(np.isfinite(value)) and row["end"] in WHOLE
 
 
-def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric: str) -> None:
+def _middle(point: Row, metric: str) -> Row:
+    """The row of a point of repeated runs, with the median as its number."""
+    found = {k: v for k, v in point.items() if not k.startswith(f"{metric} ")}
+    found[LOST] = point["runs"] - point["whole_runs"]
+    if f"{metric} median" not in point:
+        return found | {"end": f"none of {point['runs']} runs lasted"}
+    low, middle, high = (point[f"{metric} {q}"] for q in QUARTILES)
+    return found | {"end": WHOLE[0], metric: middle, LOW: low, HIGH: high}
+
+
+def _is_whole(row: Row, metric: str) -> bool:
+    """Whether a row has its number, and lost none of its runs."""
+    return _is_shown(row, metric) and not row.get(LOST)
+
+
+def _lines(
+    axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric: str, name: str
+) -> None:
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(_label(row, others), []).append(row)
@@ -217,17 +243,24 @@ def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric
         colour, dash = CURVES[i % FEW], ("-", "--", ":", "-.")[i // FEW % 4]
         axes.plot(positions, value, dash, color=colour, marker=".", label=label or None)
         drawn += [v for v in value if np.isfinite(v)]
-        bad = [float(r[x]) for r in group if not _is_shown(r, metric)]
+        if any(LOW in r for r in group):
+            ends = ([r.get(end, np.nan) for r in group] for end in (LOW, HIGH))
+            axes.fill_between(positions, *ends, color=colour, alpha=0.2, linewidth=0)
+        bad = [float(r[x]) for r in group if not _is_whole(r, metric)]
         # Ended early: on the upper edge, a little apart for each line.
         axes.plot(
             bad, [0.99 - 0.02 * (i % 20)] * len(bad), "x", color=colour, ms=5,
             transform=axes.get_xaxis_transform(), clip_on=False,
         )  # fmt: skip
-    if any(not _is_shown(r, metric) for r in rows):
-        axes.plot([], [], "kx", label="ended early or failed")
+    bad_ones = not all(_is_whole(r, metric) for r in rows)
+    if bad_ones:
+        some = "some " if any(LOST in r for r in rows) else ""
+        axes.plot([], [], "kx", label=f"{some}ended early or failed")
+    if any(LOW in r for r in rows):
+        axes.fill_between([], [], [], color="0.8", label="quartiles")
     _scale(axes, drawn)
-    axes.set(xlabel=axis(x), ylabel=_named(metric))
-    if len(groups) > 1 or any(not _is_shown(r, metric) for r in rows):
+    axes.set(xlabel=axis(x), ylabel=name)
+    if len(groups) > 1 or bad_ones or any(LOW in r for r in rows):
         title = ", ".join(map(words, others)) or None
         axes.legend(
             title=title, fontsize="small", loc="center left", bbox_to_anchor=(1.01, 0.5),
@@ -235,7 +268,9 @@ def _lines(axes: Any, rows: Sequence[Row], x: str, others: Sequence[str], metric
         )  # fmt: skip
 
 
-def _map(figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: str) -> None:
+def _map(
+    figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: str, name: str
+) -> None:
     xs, ys = (sorted({float(r[k]) for r in rows}) for k in (x, y))
     values = np.full((len(ys), len(xs)), np.nan)
     for r in rows:
@@ -247,14 +282,18 @@ def _map(figure: Any, axes: Any, rows: Sequence[Row], x: str, y: str, metric: st
     finite = values[np.isfinite(values)]
     wide = finite.size and finite.min() > 0 and finite.max() > 30 * finite.min()
     mesh = axes.pcolormesh(xs, ys, values, shading="nearest", norm="log" if wide else "linear")
-    figure.colorbar(mesh, label=f"{_named(metric)}{lost}")
+    figure.colorbar(mesh, label=f"{name}{lost}")
     axes.set(xlabel=axis(x), ylabel=axis(y))
 
 
-def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str) -> None:
+def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str, name: str) -> None:
     labels = [_label(r, keys) for r in rows]
     values = [r[metric] if _is_shown(r, metric) else np.nan for r in rows]
     axes.barh(range(len(rows)), values, height=0.5, tick_label=labels, color=CURVES[0])
+    if any(LOW in r for r in rows):
+        ends = [[r.get(end, np.nan) for r in rows] for end in (LOW, HIGH)]
+        arms = np.abs(np.array(ends) - values)
+        axes.errorbar(values, range(len(rows)), xerr=arms, fmt="none", ecolor="0.3", capsize=4)
     for i, value in enumerate(values):
         if np.isnan(value):
             axes.text(
@@ -265,7 +304,8 @@ def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str) -> N
         axes.figure.set_figwidth(10)
     axes.figure.set_figheight(max(4.6, 1.5 + sum(0.2 + 0.2 * len(t.split("\n")) for t in labels)))
     named = ", ".join(map(words, keys)) if len(keys) <= FEW_KEYS else ""
-    axes.set(xlabel=_named(metric), ylabel=named)
+    quartiles = "; whiskers: quartiles" if any(LOW in r for r in rows) else ""
+    axes.set(xlabel=f"{name}{quartiles}", ylabel=named)
 
 
 def _scale(axes: Any, values: Sequence[float]) -> None:

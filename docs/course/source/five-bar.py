@@ -192,8 +192,8 @@ if factor is not ...:
 # %% [markdown] answer
 # The age is 1.5 frames: a factor of six. With velocity terms it is 5.35. Without them the distance
 # is larger at every rate, and at 60 Hz larger than at 10 Hz: the error of the law is so much
-# larger than the error of the rate that it hides it. Who measures only that law will say that the
-# rate does not matter.
+# larger than the error of the rate that it hides it. If you measure only that law, you will say
+# that the rate does not matter.
 
 # %% answer
 factor = 60 / 10

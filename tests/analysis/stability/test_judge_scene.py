@@ -415,6 +415,7 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     assert found.record()["growth_rate"] == found.growth == found.worst.growth > 0.0
     assert found.remedies[0].stable
     line = next(line for line in found.lines() if line.startswith("remedy: "))
+    assert repr(found) == str(found)
     shown = ET.fromstring(f"<div>{found._repr_html_()}</div>")
     assert {row.findtext("td") for row in shown.iter("tr")} >= {c.hand for c in found.cases}
     assert line in {entry.text for entry in shown.iter("li")}

@@ -126,6 +126,14 @@ def test_a_vibration_is_three_swings_of_a_millimetre_in_the_last_second(
         assert 0.8 * mm < found["mm"] <= mm
 
 
+def test_the_trace_is_where_it_was_in_the_last_second() -> None:
+    traced = SWUNG + "answer = swings.trace;"
+    found = np.array(javascript("swings.js", traced, {"hertz": 5, "mm": 6, "drift": 0.01}))
+    assert found[:, 0] == pytest.approx(0.01 * 0.016 * np.arange(188)[-len(found) :])
+    assert np.ptp(found[:, 0]) == pytest.approx(0.01, abs=0.01 * 0.016)
+    assert np.ptp(found[:, 1]) == pytest.approx(6e-3, rel=0.02)
+
+
 def test_it_is_steady_only_in_a_hand() -> None:
     """That was watched for a second, of a run that goes on; and what vibrates by itself does so."""
     told = "answer = given.map((each) => felt(...each));"
@@ -134,7 +142,7 @@ def test_it_is_steady_only_in_a_hand() -> None:
         "No hand pulls": [None, nobody, True, None],
         "A second is watched first.": [None, hand, False, None],
         "The handle is steady": [None, hand, True, None],
-        "The handle vibrates": [swings, nobody, False, None],
+        "The handle vibrates (red trace)": [swings, nobody, False, None],
         "The run has ended": [None, hand, True, "the run has diverged"],
     }
     found = javascript("first_minute.js", told, [*said.values()])
