@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.recorded_scene import scene_file
-from hapticlink.orchestrator.results.run_record import RunRecord
 from hapticlink.visualization.compare import numbers, overlay, settings
 from hapticlink.visualization.compare.numbers import Row
 from hapticlink.visualization.figure_axes import plain
@@ -135,15 +134,10 @@ def _picture(name: str, figure: Figure) -> str:
     return f'<figure{wide}><img alt="{escape(name)}" src="data:image/png;base64,{data}"></figure>'
 
 
-def _timed(record: RunRecord) -> bool:
-    """Whether a run depends on a clock: not one with the arrivals of another."""
-    return bool(record.network) or (record.real_time or {"arrivals": ""}).get("arrivals") is None
-
-
 def _again(runs: Mapping[str, Results]) -> Iterator[str]:
     gives = "With the versions above it gives the same tables."
-    if any(_timed(run.record) for run in runs.values()):
-        gives = "Tables of runs in real time, or over a network, differ by when samples arrive."
+    if any(run.record.depends_on_a_clock for run in runs.values()):
+        gives = "Tables of runs in real time, or of FMUs elsewhere, differ by when samples arrive."
     yield (
         "<p>Save a scene as <code>scene.toml</code>, then <code>hapticlink run scene.toml</code>. "
         f"{gives}</p>"
