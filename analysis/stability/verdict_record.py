@@ -120,8 +120,8 @@ class Stability:
         if self.verdict == "drifts":
             slow = [case for case in self.cases if case.drifts and not case.free]
             some = f"{len({case.hand for case in slow})} of {hands}" if len(held) > 1 else hands
-            where = f"in {some}, and in no hand more than that, {in_poses}"
-            return f"drifts slowly {where}: {_name_case(worst_case(slow))}"
+            near = f", and marginal in {len(edge)}" if edge else ""
+            return f"drifts slowly in {some}{near}, {in_poses}: {_name_case(worst_case(slow))}"
         if self.verdict == "not held":
             loose = worst_case(c for c in self.cases if c.free)
             if loose.verdict != "unstable":

@@ -41,7 +41,7 @@ def test_a_verdict_of_drift_names_the_hands_that_drift() -> None:
     found = verdict(drifts, marginal, ("0 s", "stiff arm", -0.5, "stable", "oscillation"))
     assert found.verdict == "drifts"
     assert found.finding == (
-        "drifts slowly in 1 of 3 hands, and in no hand more than that, 1 pose: drift of 0.4 Hz "
+        "drifts slowly in 1 of 3 hands, and marginal in 1, 1 pose: drift of 0.4 Hz "
         "grows at 0.08 1/s in light touch at 0 s"
     )
     shakes = verdict(drifts, marginal, ("0 s", "stiff arm", 0.5, "unstable", "oscillation"))
