@@ -32,10 +32,10 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6018,
     "fmus": 2816,
-    "orchestrator": 13252,
+    "orchestrator": 13256,
     "programs": 1021,
-    "analysis": 7183,
-    "visualization": 3364,
+    "analysis": 7187,
+    "visualization": 3369,
     "api": 448,
     "commands": 1407,
 }

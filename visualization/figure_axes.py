@@ -79,8 +79,8 @@ def in_lines(text: str, width: int) -> str:
 
 
 def titled_axes(results: Results, title: str, x: str, *y: str) -> tuple[Figure, Any]:
-    """A figure whose title tells where a run ended early, and its axes: one, or one below the other
-    for several labels y."""
+    """A figure whose title tells where a run ended early and which rows are all that is known, and
+    its axes: one, or one below the other for several labels y."""
     from hapticlink.visualization.shown_figure import ShownFigure  # loads Matplotlib
 
     reason = results.record.end.reason
@@ -90,6 +90,8 @@ def titled_axes(results: Results, title: str, x: str, *y: str) -> tuple[Figure, 
         if reason == "stop_when" and said.startswith("the device"):
             why = said
         title += f", until {why} at {short(results.last_time)} s"
+    if (every := results.record.scene["record"]["every"]) > 1:
+        title += f", in one row of {every}"
     further = LINE * max(in_lines(title, WIDTH).count("\n") - 1, 0)
     figure = ShownFigure(figsize=(6.4, 4.4 + 1.2 * (len(y) - 1) + further))
     set_margins(figure, top=MARGINS["top"] + further)

@@ -105,15 +105,12 @@ class Advice:
         if not self.taken.admitted:
             yield f"nothing keeps the limits in every draw: {self.taken.broken}"
             yield "take a higher rate. What comes nearest:"
-        own = [
-            row[METRIC]
-            for method, row in self.screened.items()
-            if method.gains == OWN and not self.limits.why_not(row)
-        ]
-        if len(own) > 1 and max(own) <= ALIKE * min(own):
+        rows = [row for method, row in self.screened.items() if method.gains == OWN]
+        own = [row[METRIC] for row in rows if not self.limits.why_not(row)]
+        if len(own) == len(rows) > 1 and max(own) <= ALIKE * min(own):
             yield (
-                f"the hold matters little here: with the scene's own gains all {len(own)} leave "
-                f"{short(min(own))} to {short(max(own))} mm"
+                f"the hold matters little here: with the scene's own gains all {len(own)} keep the "
+                f"limits and leave {short(min(own))} to {short(max(own))} mm"
             )
         yield f"take {self.taken.line}"
         yield from (f"  {as_command_line(option)}" for option in self.taken.method.options)

@@ -128,7 +128,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
         yield f"largest forces: {'; '.join(peaks)}"
         yield from _describe_saturation(measures)
     if port := measures.port:
-        yield _energy(port)
+        yield _energy(port, results.record.scene["record"]["every"])
     yield from describe_changes(results)
     for name, energy in results.record.across.items():
         if max(energy.peak, abs(energy.generated)) >= SMALLEST_J:
@@ -158,16 +158,23 @@ def _tracking(user: str, error: TrackingError) -> str:
     )
 
 
-def _energy(port: PortEnergy) -> str:
-    """A line on the energy at the user's port, beside the work of the hands."""
+def _energy(port: PortEnergy, every: int) -> str:
+    """A line on the energy at the user's port in one row of `every`, beside the work of the
+    hands."""
+    seen = f", in one row of {every}" if every > 1 else ""
     hands = [1e3 * work for name, work in port.works.items() if name.endswith("hand")]
-    put_in = f"the hand put in {short(sum(hands))} mJ, " if hands else ""
-    is_over = port.peak > tolerated_energy(port.hand_work)
+    put_in = f"the hand {describe_work(sum(hands))}, " if hands else ""
+    this_is = "over" if port.peak > tolerated_energy(port.hand_work) else "within"
     generated = describe_generated(port.peak, port.generated, f", at {port.time_of_peak:.3g} s")
     return (
-        f"energy at the user's port: {put_in}the rendering {generated}. A passive one generates "
-        f"none; this is {'over' if is_over else 'within'} the tolerated {allowance(port.hand_work)}"
+        f"energy at the user's port{seen}: {put_in}the rendering {generated}. A passive one "
+        f"generates none; this is {this_is} the tolerated {allowance(port.hand_work)}"
     )
+
+
+def describe_work(millijoules: float, took: str = "took") -> str:
+    """The work of a hand, which may be led: `put in 5 mJ`, or `took out`."""
+    return f"{f'{took} out' if millijoules < 0 else 'put in'} {short(abs(millijoules))} mJ"
 
 
 def describe_generated(peak: float, end: float, when: str = "") -> str:

@@ -118,7 +118,7 @@ class Passivity:
         if self.rounded:
             yield f"  {self.rounded}"
         yield (
-            "  no hand can take energy out of it"
+            "  no hand can take energy out of it in small motions about this equilibrium"
             if self.passive
             else "  for a person the verdict in hands decides; a hand without damping there could "
             "take energy out of it, which softer gains, a higher rate or more damping mend"

@@ -117,8 +117,10 @@ class Stability:
         if self.verdict == "unstable":
             return f"unstable: {_name_case(worst)}"
         if self.verdict == "drifts":
-            where = f"in {hands} and {in_poses}"
-            return f"drifts slowly, and does not vibrate, {where}: {_name_case(worst)}"
+            slow = [case for case in self.cases if case.drifts and not case.free]
+            some = f"{len({case.hand for case in slow})} of {hands}" if len(held) > 1 else hands
+            near = f", and marginal in {len(edge)}" if edge else ""
+            return f"drifts slowly in {some}{near}, {in_poses}: {_name_case(worst_case(slow))}"
         if self.verdict == "not held":
             loose = worst_case(c for c in self.cases if c.free)
             if loose.verdict != "unstable":
@@ -166,7 +168,9 @@ class Stability:
 
     def _below(self) -> Iterator[str]:
         """What stands below the table of hands: margins, remedies, and what was left out."""
-        yield f"margin at {self.worst.pose}: {', '.join(self._margins())}"
+        poses = {case.pose for case in self.cases}
+        alone = " (other poses may have less)" if len(poses) > 1 else ""
+        yield f"margin at {self.worst.pose}{alone}: {', '.join(self._margins())}"
         if self.margin.alone:
             yield (
                 f"at {self.worst.pose} the mechanism leaves its pose by itself: without hand and "

@@ -270,7 +270,7 @@ class ChangeCost:
         kg = ", ".join(short(float(at_slow(d.felt).real)) for d in self.felt.free)
         if self.felt.growing:
             where = "when let go" if self.felt.growing[0].free else "in some hands"
-            kg = f"{kg}; unstable {where}" if self.felt.steady_in else "unstable in all hands"
+            kg = f"{kg}; unstable {where}" if self.felt.steady_in else "unstable in all hands tried"
         stiff, most = (_stiffness(f) if f else "-" for f in (self.felt, self.stiffest))
         times = f"{short(self.times)} times" if self.times else "-"
         width = _width(self.felt.width) if self.felt.constrained else "-"

@@ -179,6 +179,7 @@ class _Tuning:
             reached = judge.margin(scales)
             if reached < self._margin * (1 - 2 * FINE):
                 scales = {law: s * reached / self._margin for law, s in scales.items()}
+                self.result.limited_by = "the margin at the scene's own rates"
                 reached = judge.margin(scales)
                 try:
                     self._require_limits(feel, scales)

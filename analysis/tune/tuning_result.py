@@ -118,11 +118,10 @@ class Tuned:
             for name, value in felt.items():
                 yield f"{gains} gains: {name} feels like {value:.4g} N/m at {HERTZ:g} Hz"
         for gains, run in self.motion.items():
-            far = f"handle at most {1e3 * run['distance']:.3g} mm off"
+            said = f"handle at most {1e3 * run['distance']:.3g} mm off"
             if not np.isfinite(run["distance"]):
-                far = "a fault, or not passive"
-            yield (
-                f"{gains} gains: along the run, {far}, "
-                f"at most {1e3 * run['energy_peak']:.3g} mJ generated at the user's port"
-            )
+                said = "it fails, or generates more energy than is put in"
+            if np.isfinite(run["energy_peak"]):
+                said += f", at most {1e3 * run['energy_peak']:.3g} mJ generated at the user's port"
+            yield f"{gains} gains: along the run, {said}"
         yield from map(overrides.as_command_line, overrides.write_options(self.gains))

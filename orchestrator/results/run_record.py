@@ -281,6 +281,12 @@ class RunRecord(RunEnding, RunSetup):
     warnings: list[str] | None = None
     """None of a run that goes on or was killed."""
 
+    @property
+    def depends_on_a_clock(self) -> bool:
+        """Whether another run of the scene differs: not one with the arrivals of another."""
+        in_time = self.real_time is not None and "arrivals" not in self.real_time
+        return in_time or bool(self.network)
+
 
 def content(section: RunSetup | RunEnding | PortEnergy | HeldContacts) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""

@@ -38,7 +38,7 @@ def worth(found: Found) -> str:
 
     return (
         "On linkages, hands and a rate that were [kept apart](../../docs/glossary.md#words), the "
-        "method that a row says to take is within a tenth of the best of all methods in "
+        "first method of a row is within a tenth of the best of all methods in "
         f"{near(MOBILITY, taken)} with the mechanism at 512 Hz, and in {near(DIRECT, taken)} with "
         "the mechanism at the graphics rate. There "
         "the best of this method and those to try, too, is so in "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.user_port import NOTICEABLE_J, SHARE
 from hapticlink.analysis.sweep.row import METRIC, Row
-from studies.mismatch import finding_figures, held_out_draws
+from studies.mismatch import finding_figures, held_out_draws, robustness
 from studies.mismatch.cases import SEEDS
 from studies.mismatch.design import DIRECT, FLOOR, MOBILITY, REFERENCE, SUBSTEPS
 from studies.mismatch.figures import short
@@ -28,14 +28,14 @@ from studies.mismatch.method_choice import (
     quartiles,
     relative,
 )
-from studies.mismatch.methods import BIAS, COLUMNS, FEW, LIKELY, TICKS, VARIABLE, Method
+from studies.mismatch.methods import BIAS, COLUMNS, FEW, LIKELY, TICKS, VARIABLE
 
 
 def write(folder: Path, found: Found) -> Path:
     """Writes the page, README.md of `folder`, and its figures; returns its path."""
     parts = ["# The mismatch of rates: which hold, with which gains, at which graphics rate"]
     parts += [*_answer(found), *finding_figures.sections(folder, found), *_other_limits(found)]
-    parts += [*held_out_draws.section(found), *_limits(found)]
+    parts += [*robustness.section(found), *held_out_draws.section(found), *_limits(found)]
     path = folder / "README.md"
     path.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
     return path
@@ -79,10 +79,11 @@ def _answer(found: Found) -> Iterator[str]:
             ),
             ("error", "largest distance of x_S and x_D in a run, median of stable draws (worst)"),
             (
-                "as good",
-                "methods that the best does not beat beyond the spread. If it is advised, it beats "
-                "another by a smaller error in more than three quarters of the draws; if not, by "
-                f"keeping the limits in more draws (sign test at {LEVEL:.0%})",
+                "take any of these",
+                "the method whose numbers the row has, first, and those that it does not beat "
+                "beyond the spread. If it is advised, it beats another by a smaller error in more "
+                "than three quarters of the draws; if not, by keeping the limits in more draws "
+                f"(sign test at {LEVEL:.0%}): [how sure that is](#how-sure-is-a-row)",
             ),
             (
                 "try, too",
@@ -138,9 +139,9 @@ def _where_to_run(found: Found) -> str:
 
 def _table(found: Found, arrangement: str, bias: str) -> str:
     lines = [
-        f"| {COMPENSATION[bias]}: graphics rate (Hz) | take | within the limits | error (mm) "
-        "| as good | try, too |",
-        "|---" * 6 + "|",
+        f"| {COMPENSATION[bias]}: graphics rate (Hz) | take any of these | within the limits "
+        "| error (mm) | try, too |",
+        "|---" * 5 + "|",
     ]
     for rate in COLUMNS:
         cell = (arrangement, bias, rate)
@@ -148,9 +149,10 @@ def _table(found: Found, arrangement: str, bias: str) -> str:
         rows = [r for r in found.cells[cell][chosen.best].values() if stable(r)]
         _, middle, _, worst = map(short, quartiles(rows, METRIC))
         error = f"{middle} ({worst})" if rows else "-"
-        taken = named(chosen.best) if chosen.admitted else f"nothing; best: {named(chosen.best)}"
+        alike = robustness.by_gains((chosen.best, *chosen.ties))
+        taken = alike if chosen.admitted else f"nothing; nearest: {alike}"
         lines.append(
-            f"| {rate} | {taken} | {_within(chosen)} | {error} | {_several(chosen.ties)} | "
+            f"| {rate} | {taken} | {_within(chosen)} | {error} | "
             f"{'; '.join(map(named, found.listed[cell][1:]))} |"
         )
     return "\n".join(lines)
@@ -161,12 +163,6 @@ def _within(chosen: Choice) -> str:
     over = chosen.of - chosen.most - chosen.lost
     why = [f"{chosen.lost} unstable"] * (chosen.lost > 0) + [f"{over} by energy"] * (over > 0)
     return f"{chosen.most} of {chosen.of}" + (f" ({', '.join(why)})" if why else "")
-
-
-def _several(methods: Sequence[Method]) -> str:
-    """Up to three methods, by name."""
-    more = f" and {len(methods) - 3} more" if len(methods) > 3 else ""
-    return "; ".join(map(named, methods[:3])) + more if methods else "none"
 
 
 def table_rows(found: Found) -> Iterator[Row]:
@@ -238,16 +234,15 @@ def _limits(found: Found) -> Iterator[str]:
         "their own measures)."
     )
     yield "## How it was measured"
-    sizes, of = floor(found.runs), next(iter(found.advice.values())).of
+    sizes = floor(found.runs)
     yield paragraph(
         "`hapticlink study` makes this page, [runs.csv](runs.csv) (a row for each run, with the "
         "seed of its draw), [maps.csv](maps.csv) (lifted maps) and "
         "[kept-apart.csv](kept-apart.csv). A case is a linkage in a hand, with or without contact; "
         f"each has {SEEDS} draws, of the wrench or path of the hand and of the periods of a rate "
         "that varies. Every method runs on the same draws, and methods are compared within a draw. "
-        f"Where all {of} draws keep the limits, up to {1 - LEVEL ** (1 / of):.0%} of further ones "
-        f"may not ({1 - LEVEL:.0%} confidence, if draws are independent). Graphics "
-        f"rates are whole haptic ticks a frame: {both(list(map(str, TICKS)))} of 1/512 s. A run is "
+        "Graphics rates are whole haptic ticks a frame: "
+        f"{both(list(map(str, TICKS)))} of 1/512 s. A run is "
         "stable if it reaches its end with handle and operational point less than "
         f"{APART[0]:g} mm and {APART[1]:g} rad apart. A method is "
         "advised if every draw is stable, the energy at the user's port peaks at most "

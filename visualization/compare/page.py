@@ -135,9 +135,12 @@ def _picture(name: str, figure: Figure) -> str:
 
 
 def _again(runs: Mapping[str, Results]) -> Iterator[str]:
+    gives = "With the versions above it gives the same tables."
+    if any(run.record.depends_on_a_clock for run in runs.values()):
+        gives = "Tables of runs in real time, or of FMUs elsewhere, differ by when samples arrive."
     yield (
         "<p>Save a scene as <code>scene.toml</code>, then <code>hapticlink run scene.toml</code>. "
-        "With the versions above it gives the same tables.</p>"
+        f"{gives}</p>"
     )
     for name, run in runs.items():
         text = escape(scene_file(run))

@@ -305,7 +305,7 @@ def _constraints(results: Results, times: Vector, numbers: Vector) -> Figure:
     most = int(count.max())
     share = 100 * (samples[max(samples)] / sum(samples.values()))
     title = f"{most} of 3 directions of motion constrained in {share:.3g} % of the samples"
-    label = "constrained directions\n(a wrench along one accelerates nothing)"
+    label = "constrained directions\n(a wrench along one accelerates hardly anything)"
     figure, axes = titled_axes(results, title, "time (s)", label)
     set_margins(figure, right=0.7)
     axes.step(time, count, where="post")
@@ -338,7 +338,7 @@ def _port(results: Results, port: UserPort) -> Figure:
     if peak > summary.ROUNDING_J:
         title = f"At most {short(1e3 * peak)} mJ generated, at {port.time_s[at]:.3g} s"
         if put_in := float(port.put_in_J[at]):
-            title += f", where the hand had put in {short(1e3 * put_in)} mJ"
+            title += f", where the hand had {summary.describe_work(1e3 * put_in, 'taken')}"
     if peak > summary.ROUNDING_J and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name][at]))
         title += f"; largest source then: {_source(largest)}"

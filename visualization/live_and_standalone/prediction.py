@@ -72,7 +72,7 @@ def _verdict(cases: Sequence[Case], beside: str, so_far: bool = False) -> dict[s
     verdict = "marginal" if worst.drifts else worst.verdict
     mouse = next(case for case in cases if case.hand == MOUSE)
     calm = "; stable in the mouse's hand" if mouse.verdict == "stable" != worst.verdict else ""
-    said = f"{_summary(worst)}{calm}{beside}{', so far' if so_far else ''}"
+    said = f"{_summary(worst, len(cases))}{calm}{beside}{', so far' if so_far else ''}"
     if so_far and verdict != "unstable":  # what only the worst of all hands tells
         verdict = ""
     lines = (
@@ -160,10 +160,10 @@ def _with_parameters(fmu: Fmu, parameters: Parameters) -> Fmu:
     return fmu
 
 
-def _summary(worst: Case) -> str:
+def _summary(worst: Case, hands: int) -> str:
     rate = f"{short(abs(worst.growth))} 1/s"
     if worst.verdict == "stable":
-        return f"stable in all hands, decays {rate}"
+        return f"stable in all {hands} hands, decays {rate}"
     if worst.verdict == "marginal":
         return f"marginal in {worst.hand}"
     return f"{worst.kind} of {short(worst.hertz)} Hz, grows {rate}, in {worst.hand}"

@@ -36,13 +36,18 @@ def test_the_smallest_error_within_the_limits_of_all_draws_is_advised() -> None:
     assert next(none.lines()).startswith("nothing keeps the limits")
 
 
-@pytest.mark.parametrize(("worst", "matters"), [(1.09, False), (1.11, True)])
-def test_a_hold_that_matters_little_is_no_advice(worst: float, matters: bool) -> None:
+@pytest.mark.parametrize(
+    ("worst", "fails", "matters"), [(1.09, False, False), (1.11, False, True), (1.09, True, True)]
+)
+def test_a_hold_that_matters_little_is_no_advice(worst: float, fails: bool, matters: bool) -> None:
+    """It matters where it decides whether a run keeps the limits."""
     rows = {Method("zoh", "own"): row(1.0), Method("foh", "own"): row(worst)}
-    rows |= {Method("exact", "own"): row(9.0, end="diverged"), Method("foh", "soft"): row(5.0)}
+    if fails:
+        rows[Method("exact", "own")] = row(1.0, end="diverged")
+    rows[Method("foh", "soft")] = row(5.0)
     taken = Measured(Method("zoh", "own"), np.ones(2), np.zeros(2), 2)
     lines = list(advise.Advice("", taken, (), (), rows, LIMITS).lines())
-    assert ("all 2 leave 1 to 1.09 mm" in lines[0]) is not matters
+    assert ("all 2 keep the limits and leave 1 to 1.09 mm" in lines[0]) is not matters
 
 
 @pytest.mark.parametrize("scene", ["closed-loop-direct", "closed-loop-b1", "enclosure"])

@@ -24,6 +24,7 @@ from studies.mismatch import (
     measure,
     method_choice,
     page,
+    robustness,
 )
 from studies.mismatch import study as make
 from studies.mismatch.design import DIRECT, MOBILITY
@@ -216,6 +217,46 @@ def test_the_list_to_try_has_what_is_nearly_best_in_most_cases() -> None:
     assert method_choice.to_try(CELL, by_method, ZOH) == (ZOH, PSPM, FOH, other)
 
 
+def _found(cells: method_choice.Cells) -> page.Found:
+    """What was found of cells alone."""
+    advice = {cell: choice(cell, rows, {}) for cell, rows in cells.items()}
+    return page.Found([], cells, {}, advice, {}, [], {})
+
+
+def _drawn(errors: list[float], bad: set[int] = frozenset()) -> dict[str, Row]:
+    """Rows of two draws a case, in turn; those of `bad` are unstable."""
+    return {
+        f"case {i // 2}, seed {i % 2}": _row(50.0 if i in bad else e)
+        | {"case": f"case {i // 2}", "seed": i % 2}
+        for i, e in enumerate(errors)
+    }
+
+
+def test_a_row_says_that_it_depends_on_the_draws_only_where_it_does() -> None:
+    """foh is better in each first draw by a third, zoh in each second one by a fifth; then foh in
+    all."""
+    swapped = {ZOH: _drawn([1.5, 1.0] * 8), FOH: _drawn([1.0, 1.25] * 8)}
+    found = _found({CELL: swapped})
+    assert robustness.agreement(found, DIRECT) == (1, 0, 1, pytest.approx(1.5))
+    assert "not robust" in " ".join(robustness.section(found))
+    sure = {ZOH: _drawn([1.5, 1.5] * 8), FOH: _drawn([1.0, 1.25] * 8)}
+    found = _found({CELL: sure})
+    assert robustness.agreement(found, DIRECT) == (1, 1, 1, 1.0)
+    assert "not robust" not in " ".join(robustness.section(found))
+
+
+def test_draws_that_fail_together_are_told_from_independent_ones() -> None:
+    """Of 20 draws two fail: those of one case, or one each of two cases."""
+    for bad, share in (({4, 5}, 1.0), ({4, 7}, 0.0)):
+        cells = {CELL: {ZOH: _drawn([1.0] * 20, bad)}}
+        assert robustness.failures(_found(cells)) == (share, pytest.approx(1 / 19))
+
+
+def test_methods_are_listed_by_gains_from_the_first_on() -> None:
+    medium = Method("zoh", "medium")
+    assert robustness.by_gains((FOH, medium, ZOH)) == "soft: `foh`, `zoh`; medium: `zoh`"
+
+
 def _sweep(jobs: list[Job], *_: Any, measure: Any, **__: Any) -> list[Row]:
     """Rows as if `foh` were right, medium gains unstable at 10 Hz, and soft maps unstable never."""
     rows: list[Row] = []
@@ -246,9 +287,9 @@ def test_the_page_gives_the_advice_of_the_rows(
     of = 3 * cases.SEEDS
     path = make(tmp_path, tmp_path, 1, trained=trained, kept_apart=cases.kept_apart()[:2])
     text = path.read_text()
-    assert text.index("| take |") < text.index("## Why") < text.index("## Kept apart")
+    assert text.index("| take any of these |") < text.index("## Why") < text.index("## Kept apart")
     for rate in RATES:
-        assert f"| {rate} | `foh`, soft | {of} of {of} | 1 (1) |" in text
+        assert f"| {rate} | soft: `foh` | {of} of {of} | 1 (1) |" in text
     assert "Coriolis compensation on: graphics rate" in text
     figures = ("gains", "tracking", "energy", "margins", "integrators", "mobility")
     for name in figures:
@@ -294,7 +335,16 @@ def short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("COMPARED", ("zoh",)),
         ("LIKELY", ("zoh", "foh")),
     ):
-        for part in (make_module, held_out_draws, method_choice, design, page, finding_figures):
+        parts = (
+            make_module,
+            held_out_draws,
+            method_choice,
+            design,
+            page,
+            finding_figures,
+            robustness,
+        )
+        for part in parts:
             monkeypatch.setattr(part, name, value, raising=False)
     for hold in [h for h in HOLDS if h not in ("zoh", "foh")]:
         monkeypatch.delitem(HOLDS, hold)
@@ -333,10 +383,13 @@ def test_a_short_study_says_what_its_runs_give(short: Path, tmp_path: Path) -> N
                 most = max(1e-3, 0.25 * float(r["hand_work_J"]))
                 kept[name] = kept.get(name, 0) + (good and float(r["port_peak_J"]) <= most)
             found = re.search(
-                rf"\n\| {rate} \| (nothing; best: )?(.*?) \| (\d+) of (\d+).*? \| (\S+)[ |]", table
+                rf"\n\| {rate} \| (nothing; nearest: )?(\w+): (`[^`]*`).*? \| (\d+) of (\d+).*? "
+                r"\| (\S+)[ |]",
+                table,
             )
             assert found
-            nothing, name, count, of, middle = found.groups()
+            nothing, gains, hold, count, of, middle = found.groups()
+            name = f"{hold}, {gains}"
             assert (int(count), int(of)) == (kept[name], cases.SEEDS)
             assert (nothing is None) == (count == of)
             assert middle == "-" or float(middle) == float(f"{median(errors[name]):.2g}")

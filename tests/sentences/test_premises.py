@@ -1,0 +1,195 @@
+"""Scenes in which the premise of a sentence is broken, and by which the sentence changes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis.findings.report_premises import describe_experiment
+from hapticlink.analysis.findings.summary import describe_work
+from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.stability.margin_and_remedy import Margin
+from hapticlink.analysis.stability.verdict_record import Stability
+from hapticlink.analysis.tune.tuning_result import Tuned
+from hapticlink.visualization.compare import page
+from hapticlink.visualization.figures import run_figures
+
+HANDS = ("light touch", "firm grip", "stiff arm")
+
+
+def verdict(*cases: tuple[str, str, float, str, str]) -> Stability:
+    """Of hands in poses: (pose, hand, growth, verdict, kind)."""
+    of = tuple(
+        Case(pose, hand, growth, 1e-3, 0.4, kind, said, ())
+        for pose, hand, growth, said, kind in cases
+    )
+    return Stability(
+        "", Mock(), (), dict.fromkeys(HANDS), of, {}, max(of, key=lambda c: (c.rank, c.growth)),
+        Margin(2.0, None, None), (), (),
+    )  # fmt: skip
+
+
+def test_a_verdict_of_drift_names_the_hands_that_drift() -> None:
+    """A hand whose divergence leads nowhere is marginal, whatever its growth rate."""
+    drifts = ("0 s", "light touch", 0.08, "unstable", "drift")
+    marginal = ("0 s", "firm grip", 0.26, "marginal", "divergence")
+    found = verdict(drifts, marginal, ("0 s", "stiff arm", -0.5, "stable", "oscillation"))
+    assert found.verdict == "drifts"
+    assert found.finding == (
+        "drifts slowly in 1 of 3 hands, and marginal in 1, 1 pose: drift of 0.4 Hz "
+        "grows at 0.08 1/s in light touch at 0 s"
+    )
+    shakes = verdict(drifts, marginal, ("0 s", "stiff arm", 0.5, "unstable", "oscillation"))
+    assert shakes.finding.startswith("unstable: oscillation of 0.4 Hz grows at 0.5 1/s")
+    calm = verdict(("0 s", "light touch", -0.1, "stable", "drift"), marginal)
+    assert calm.finding.startswith("stable in 1 of 2 hands and marginal in the others, 1 pose")
+
+
+def test_a_margin_says_that_other_poses_may_have_less() -> None:
+    one = [("0 s", hand, -1.0, "stable", "oscillation") for hand in HANDS]
+    (line,) = (line for line in verdict(*one).lines() if line.startswith("margin"))
+    assert line == "margin at 0 s: stiffnesses times 2"
+    several = verdict(*one, ("1 s", "firm grip", -2.0, "stable", "oscillation"))
+    (line,) = (line for line in several.lines() if line.startswith("margin"))
+    assert line.startswith("margin at 0 s (other poses may have less): ")
+
+
+SPRING: dict[str, Any] = {
+    "type": "spring",
+    "stiffness": [300.0, 300.0, 1.0],
+    "damping": [5.0, 5.0, 0.01],
+}
+START = (0.04452, 0.0148, -0.7878)
+
+
+def holding(x: float, y: float, theta: float) -> dict[str, Any]:
+    return {"hand": {**SPRING, "target": [[0.0, x, y, theta]]}}
+
+
+@pytest.mark.parametrize(
+    ("scene", "broken", "remedied", "said"),
+    [
+        ("closed-loop-ideal", holding(0.08, *START[1:]), holding(*START), "begins with a pull of"),
+        (
+            "closed-loop-ideal",
+            holding(*START[:2], START[2] + math.tau),
+            holding(*START),
+            "begins a whole turn from the handle's angle",
+        ),
+        (
+            "obstacles",
+            {"contacts.stiffness": 1e8},
+            {"contacts.stiffness": 1e8, "mechanism.integrator": "linearly-implicit"},
+            "too fast for steps of",
+        ),
+        (
+            "five-bar",
+            {"linkage.start.elbow1": -1.0},
+            {"linkage.start.elbow1": -1.5707963},
+            "the loops do not close at the given start",
+        ),
+        (
+            "enclosure",
+            {"mechanism.integrator": "passive-midpoint"},
+            {"mechanism.integrator": "passive-midpoint", "contacts.detection": "haptics"},
+            "passive-midpoint makes no energy within a step, but",
+        ),
+    ],
+)  # fmt: skip
+def test_a_warning_ends_with_what_it_advises(
+    scene: str, broken: dict[str, Any], remedied: dict[str, Any], said: str
+) -> None:
+    def warnings(options: dict[str, Any]) -> str:
+        return "\n".join(
+            hl.run(scene, {"duration": 0.02, **options}, figures=False).run["warnings"]
+        )
+
+    assert said in warnings(broken)
+    assert said not in warnings(remedied)
+
+
+def test_the_stops_of_a_further_user_act_only_outside_of_its_workspace() -> None:
+    def told(x: float) -> str:
+        path = [[0.0, 0.0247, -0.0113, 0.314], [0.3, x, -0.0113, 0.314]]
+        pulled = {**SPRING, "stiffness": [2000.0, 2000.0, 1.0], "damping": [20.0, 20.0, 0.05]}
+        options = {"duration": 0.4, "stop_when": "", "hands.left": {**pulled, "target": path}}
+        return str(hl.run("two-users", options, figures=False))
+
+    said = "the handle of left left its device's workspace, and its stops acted"
+    assert said in told(0.3)
+    assert said not in told(0.0247)
+
+
+def test_of_thinned_rows_no_figure_or_sum_claims_more() -> None:
+    """Its port generates up to 15 mJ within a few frames, of which one in fifty is kept."""
+    scene, options = "closed-loop-direct", {"graphics.rate": 14, "duration": 1.5}
+    whole = hl.run(scene, options, figures=False)
+    thin = hl.run(scene, {**options, "record.every": 50}, figures=False)
+    assert whole.record.user_port
+    assert thin.record.user_port
+    assert thin.record.user_port.peak < 0.5 * whole.record.user_port.peak
+    assert "energy at the user's port: " in str(whole)
+    assert "energy at the user's port, in one row of 50: " in str(thin)
+    assert "reported and drawn from one row in 50 (record.every)" in str(thin)
+    for run, said in ((whole, False), (thin, True)):
+        for name in ("distance", "user_port"):
+            figure = run_figures.figures(run)[name]
+            title = " ".join(figure.axes[0].get_title().split())
+            assert title.endswith(", in one row of 50") is said
+
+
+def test_a_hand_that_is_led_takes_energy_out() -> None:
+    """The linkage falls, and the hand brakes it."""
+    falls = {"linkage.gravity": [0.0, -9.81], "controller.bias": "full", "duration": 0.3}
+    led = hl.run("closed-loop-ideal", {**falls, **holding(*START)}, figures=False)
+    assert "energy at the user's port: the hand took out " in str(led)
+    pushed = hl.run("closed-loop-ideal", {"duration": 0.3}, figures=False)
+    assert "energy at the user's port: the hand put in " in str(pushed)
+    assert (describe_work(-2.0, "taken"), describe_work(2.0)) == ("taken out 2 mJ", "put in 2 mJ")
+
+
+def test_runs_that_a_clock_drives_are_not_said_to_repeat() -> None:
+    run = hl.run("sampled-spring", {"duration": 0.1}, figures=False)
+
+    def said(**record: Any) -> bool:
+        other = Mock(wraps=run, record=replace(run.record, **record))
+        other.run = run.run
+        return "gives the same tables" in next(page._again({"a": other}))
+
+    assert said()
+    assert said(real_time={"arrivals": "runs/a"})
+    assert not said(real_time={"ticks": 51})
+    assert not said(network={"virtual_environment": {}})
+
+
+def test_a_tuning_that_fails_or_is_lowered_says_so() -> None:
+    own = {"distance": 1e-3, "energy_peak": 2e-4}
+
+    def line(motion: dict[str, float]) -> str:
+        tuned = Tuned(Mock(), 2.0, [], "0 s", {}, {"tuned": 2.0}, {"scene": {"contact": 1.0}, "tuned": {"contact": 2.0}}, {"tuned": motion})  # fmt: skip  # noqa: E501
+        return next(line for line in tuned.lines() if "along the run" in line)
+
+    assert line(own).endswith(
+        "handle at most 1 mm off, at most 0.2 mJ generated at the user's port"
+    )
+    failed = line({"distance": math.inf, "energy_peak": math.nan})
+    assert failed.endswith("along the run, it fails, or generates more energy than is put in")
+
+
+def test_what_differs_from_the_report_is_named_and_nothing_else() -> None:
+    def said(scene: str, options: dict[str, Any]) -> str:
+        return " ".join(
+            describe_experiment(
+                hl.run(scene, {"duration": 0.01, **options}, figures=False).run["scene"]
+            )
+        )
+
+    assert "no encoders and no observer" not in said("closed-loop", {})
+    assert "no encoders and no observer" in said("closed-loop", {"sensing": "ideal"})
+    assert "pulled at every joint" in said("closed-loop", {"graphics.sync": "joint"})
+    assert said("closed-loop-direct", {}) == ""
