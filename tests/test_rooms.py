@@ -34,12 +34,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 5908,
     "fmus": 2816,
-    "orchestrator": 13020,
+    "orchestrator": 13054,
     "programs": 1021,
-    "analysis": 7089,
+    "analysis": 7190,
     "visualization": 3333,
     "api": 435,
-    "commands": 1397,
+    "commands": 1398,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
