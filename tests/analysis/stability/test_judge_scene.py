@@ -321,7 +321,9 @@ def test_inside_of_each_margin_a_changed_scene_is_stable_and_outside_unstable(
     assert not any(map(stable, outside))
 
 
-@pytest.mark.parametrize(("scene", "options", "expected"), COUNTS, ids=str)
+@pytest.mark.parametrize(
+    ("scene", "options", "expected"), COUNTS, ids=[f"{each[0]}-{each[1]}" for each in COUNTS]
+)
 def test_a_verdict_takes_so_many_equilibria_slopes_and_products(
     scene: str,
     options: dict[str, Any],
