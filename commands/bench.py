@@ -30,6 +30,7 @@ Benchmark = Literal[
     "network",
     "advise",
     "foreign",
+    "waiting",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores: it
 measures, writes tables and figures into a folder, and returns the page."""
@@ -66,6 +67,7 @@ def bench(
     - network: the graphics on another computer: delay, jitter and loss against error and energy
     - advise: what `hapticlink advise` is worth on test scenes
     - foreign: FMUs of others, which packages of PyPI bring, beside FMPy
+    - waiting: what a user waits for: runs, verdicts, pages, and the floors beneath them
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress
     results/stability). An interrupted benchmark is continued by the same command.

@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6018,
     "fmus": 2816,
-    "orchestrator": 13256,
+    "orchestrator": 13290,
     "programs": 1021,
-    "analysis": 7187,
-    "visualization": 3369,
+    "analysis": 7288,
+    "visualization": 3371,
     "api": 448,
-    "commands": 1407,
+    "commands": 1408,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -33,6 +33,7 @@ from hapticlink.analysis.stability.graph_slopes import GraphSlopes, graph_slopes
 from hapticlink.analysis.stability.polynomial_holds import (
     advanced_powers,
     degree_of,
+    is_ageless,
     is_linear,
     is_polynomial,
     sample_arrives,
@@ -67,7 +68,6 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     flat,
 )
-from hapticlink.orchestrator.run.compiled.state import StateBlock
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -126,6 +126,7 @@ class ForwardSensitivity:
         self._graphs: dict[str, GraphSlopes | None] = {}
         self._named: dict[Any, list[StateEntry]] = {}
         self._polynomials = {n for n, hold in simulation.holds.items() if is_polynomial(hold)}
+        self._blocks = blocks(simulation)
         self._evaluated: dict[str, tuple[Fraction, bytes]] = {}
         self._applied: dict[Key, Applied] = {}
 
@@ -200,6 +201,14 @@ class ForwardSensitivity:
             hold = self._simulation.holds[operation.connection]
             if same == content and not sample_arrives(hold, tick):
                 return Fraction(now - before)
+        return self._ages(tick, operation, integers)
+
+    def _ages(self, tick: int, operation: Instruction, integers: NDArray[np.int64]) -> bytes:
+        """The ages of the samples of an operation, where these matter."""
+        holds = self._simulation.holds
+        match operation:
+            case Evaluate(connection) if is_ageless(holds[connection]):
+                return b""
         return ages(integers, tick)
 
     def _of_any(self, tick: int, operation: Instruction, call: Call, reach: Reach) -> Applied:
@@ -246,15 +255,18 @@ class ForwardSensitivity:
 
     def _powers(self, tick: int, operation: Evaluate, since: Since) -> Matrix:
         """The slopes of c_0 to c_d by the numbers of the state of a hold."""
-        hold = self._simulation.holds[operation.connection]
-        at, base = StateBlock(hold.c).save().numbers, self._simulation.system.timeline.base
+        hold, block = (
+            self._simulation.holds[operation.connection],
+            self._blocks[operation.connection],
+        )
+        at, base = block.save().numbers, self._simulation.system.timeline.base
         about = hold.row, hold.parts.matrix, hold.c.n, len(at), operation.ahead, base
         known = self.work.slopes.setdefault((POWERS, *about, since), [])
         wide = SAME * np.maximum(1.0, np.abs(at))
         for slopes in known:
             if is_linear(hold) or (np.abs(at - slopes.at) <= wide).all():
                 return slopes.J
-        J = slopes_of_powers(hold, tick, float(operation.ahead))
+        J = slopes_of_powers(hold, block, tick, float(operation.ahead))
         known.insert(0, Slopes(at, J, np.zeros_like(J)))
         return J
 
@@ -377,7 +389,7 @@ class ForwardSensitivity:
                 key = (type(operation), *file, seconds, parameters.tobytes(), *sizes)
                 return key, self.work.slopes.setdefault(key, [])
         integers = [np.zeros(0, np.int64), *(each.integers for each in template.holds)]
-        since = ages(np.concatenate(integers), tick)
+        since = self._ages(tick, operation, np.concatenate(integers))
         if isinstance(operation, Set):
             setter = self._simulation.setters[operation.fmu, operation.now]
             if isinstance(setter, Setter):

@@ -14,8 +14,10 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -115,17 +117,45 @@ class GraphSlopes:
         return np.split(state[-sum(self._n) :], np.cumsum(self._n)[:-1])
 
 
-_Mapped = tuple[ca.Function, ca.Function]
+class _Buffered:
+    """A function of CasADi that is evaluated in place: a plain call takes longer to convert its
+    numbers than to compute with them."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self._arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+        self._result = np.zeros(function.size_out(0), order="F")
+        buffer: Any
+        buffer, self._evaluate = function.buffer()
+        for i, argument in enumerate(self._arguments):
+            buffer.set_arg(i, argument.data)
+        buffer.set_res(0, self._result.ravel(order="K").data)
+        self._buffer = buffer  # `evaluate` holds a bare pointer to it
+
+    def set_others(self, others: Sequence[Vector | float]) -> None:
+        """Sets all arguments but the first."""
+        for argument, value in zip(self._arguments[1:], others, strict=True):
+            argument[:] = value
+
+    def at(self, own: Vector) -> Matrix:
+        """The result, with this first argument."""
+        self._arguments[0][:] = own
+        self._evaluate()
+        return self._result.copy()
+
+
+_Mapped = tuple[_Buffered, _Buffered]
 
 
 def _map_with_jacobian(arguments: list[ca.SX], result: ca.SX) -> _Mapped:
     """A function, and its Jacobian by the first argument."""
     slopes = ca.densify(ca.jacobian(result, arguments[0]))
     values = ca.Function("values", arguments, [ca.densify(result)])
-    return values, ca.Function("slopes", arguments, [slopes])
+    return _Buffered(values), _Buffered(ca.Function("slopes", arguments, [slopes]))
 
 
 def _at(mapped: _Mapped, own: Matrix, *others: Vector | float) -> tuple[Matrix, Matrix]:
     """The results at the rows of `own`, and the Jacobian at the first one."""
     values, slopes = mapped
-    return np.asarray(values(own.T, *others)).T, np.asarray(slopes(own[0], *others))
+    for function in mapped:
+        function.set_others(others)
+    return np.array([values.at(each)[:, 0] for each in own]), slopes.at(own[0])

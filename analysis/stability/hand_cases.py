@@ -110,6 +110,20 @@ def worst_case(cases: Iterable[Case]) -> Case:
     return first_of_largest((c for c in every if c.rank == rank), lambda case: case.growth)
 
 
+def hardest_first(cases: Iterable[Case]) -> list[str]:
+    """The poses of some cases: that with the most marginal ones first, of those with as many that
+    in which a case grows most."""
+    poses: dict[str, list[Case]] = {}
+    for case in cases:
+        poses.setdefault(case.pose, []).append(case)
+
+    def ease(pose: str) -> tuple[int, float]:
+        marginal = sum(case.verdict == "marginal" for case in poses[pose])
+        return -marginal, -max(case.growth for case in poses[pose])
+
+    return sorted(poses, key=ease)
+
+
 class InHands:
     """A scene at rest in a pose, with the gains multiplied by `scales` and every input of the
     controller delayed by `late` of its steps; for the hand None the scene's own stays. Raises

@@ -19,7 +19,7 @@ import numpy as np
 
 from hapticlink.analysis.search.acceptance import broken_limit
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.hand_cases import in_poses, worst_case
+from hapticlink.analysis.stability.hand_cases import hardest_first, in_poses, worst_case
 from hapticlink.analysis.stability.hands import (
     FREE,
     HANDS,
@@ -29,7 +29,7 @@ from hapticlink.analysis.stability.hands import (
     holds,
     linearise_hand,
 )
-from hapticlink.analysis.stability.margin_and_remedy import MARGINS, Visited, improvements
+from hapticlink.analysis.stability.margin_and_remedy import MARGINS, improvements
 from hapticlink.analysis.stability.modes import DRIFT, Bounds
 from hapticlink.analysis.stability.poses import (
     Pose,
@@ -41,6 +41,7 @@ from hapticlink.analysis.stability.poses import (
     rest,
     simulate_scene,
 )
+from hapticlink.analysis.stability.remedy_trial import Visited
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.short_hyperperiod import short
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
@@ -228,7 +229,10 @@ def _judge(
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
         judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
-        margin, remedies = improvements(read, judged, held, bounds, worst, visits, work, steps)
+        hardest = hardest_first(cases)
+        margin, remedies = improvements(
+            read, judged, held, bounds, worst, visits, hardest, work, steps
+        )
         with linearisable(read) as (_, system, removed):
             frozen = (*removed, *frozen_nonlinearities.describe_switches(system))
     return Stability(

@@ -7,22 +7,22 @@ A mode that only drifts counts as stable.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 
 from hapticlink.analysis.search.search import (
     Largest,
-    judge_best_first,
     largest_count,
     largest_scale,
 )
 from hapticlink.analysis.search.settings import LAWS, REMEDIES, set_rate
-from hapticlink.analysis.stability.hand_cases import Case, InHands, first_of_largest, in_poses
+from hapticlink.analysis.stability.hand_cases import Case, InHands, first_of_largest
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
+from hapticlink.analysis.stability.remedy_trial import Remedy, Trial, Visited, find_best
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames
@@ -48,13 +48,6 @@ FASTER = (2, 4)
 MARGINS = "stiffness", "delay", "rate"
 TRIED = 3
 """Remedies that are judged in all poses."""
-DECAY = 0.05
-"""Rate (1/s) at which a scene with a remedy decays at least, lest what is frozen takes it back."""
-
-
-Visited = Callable[[Scene], tuple[Sequence[Pose], str]]
-"""The poses in which a scene is judged, and which limit of `search/acceptance.py` its run
-breaks."""
 
 
 @dataclass(frozen=True)
@@ -77,20 +70,6 @@ class Margin:
     where it is no more than a drift."""
 
 
-@dataclass(frozen=True)
-class Remedy:
-    """Options, and the growth rate (1/s) of the worst case in all poses and hands with them, those
-    aside that are marginal or only drift. stable: whether it decays by DECAY at least; marginal:
-    the hands in which small motions neither grow nor decay in some pose; breaks: the limit that the
-    run with them breaks."""
-
-    options: tuple[str, ...]
-    growth: float
-    stable: bool
-    marginal: tuple[str, ...] = ()
-    breaks: str = ""
-
-
 def improvements(
     read: Scene,
     poses: Sequence[Pose],
@@ -98,11 +77,13 @@ def improvements(
     bounds: Bounds,
     worst: Case,
     visited: Visited,
+    hardest: Sequence[str] = (),
     work: SharedWork | None = None,
     steps: Steps | None = None,
 ) -> tuple[Margin, tuple[Remedy, ...]]:
     """The margin in the `worst` pose, and what ends its instability, as `remedies`; nothing where
-    it is stable. visited: gives the poses in which the scene with other options is judged."""
+    it is stable. visited: gives the poses in which the scene with other options is judged, those
+    that are named in `hardest` first."""
     pose = next(pose for pose in poses if pose.name == worst.pose)
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
@@ -112,7 +93,7 @@ def improvements(
         margin = search.margin(place)
         softer = search.softer(place, margin)
         candidates = () if stable else [*search.candidates(place, margin, softer)]
-    return margin, search.remedies(candidates, softer, visited)
+    return margin, search.remedies(candidates, softer, visited, hardest)
 
 
 class _Search:
@@ -255,11 +236,15 @@ class _Search:
                 yield (set_rate("haptics", factor * self._haptic), *softer)
 
     def remedies(
-        self, candidates: Sequence[tuple[str, ...]], softer: tuple[str, ...], visited: Visited
+        self,
+        candidates: Sequence[tuple[str, ...]],
+        softer: tuple[str, ...],
+        visited: Visited,
+        hardest: Sequence[str],
     ) -> tuple[Remedy, ...]:
-        """The first of those that are best in the worst pose with which the scene is stable, judged
-        as it will be with them, in the poses of its changed run; the best of TRIED where none is.
-        And softer gains with which all decays."""
+        """The first of those that are best in the worst pose that suffices, judged in the poses of
+        its changed run; the best of TRIED where none does. And softer gains with which all
+        decays."""
         self._steps.expected += len(candidates) + min(TRIED, len(candidates))
         growth = {}
         for change in candidates:
@@ -270,40 +255,33 @@ class _Search:
         while left and len(best) < TRIED:
             best.append(first_of_largest(left, lambda change: -growth[change]))
             left.remove(best[-1])
-        judged = list(
-            judge_best_first(
-                best[:1] + [change for change in best[1:] if growth[change] < 0.0],
-                lambda changes: [self._in_all(change, softer, visited) for change in changes],
-                lambda remedy: remedy.stable and not remedy.marginal and not remedy.breaks,
-            )
-        )
-        if growth.get(softer, 0.0) < 0.0 and softer not in (remedy.options for remedy in judged):
-            judged.append(self._in_all(softer, softer, visited))
-        judged = [remedy for remedy in judged if remedy.growth < float("inf")]
-        every = sorted(
-            judged, key=lambda r: (r.growth >= 0.0, bool(r.breaks), len(r.marginal), r.growth)
-        )
-        return tuple(r for r in every if r is every[0] or (r.options == softer and r.growth < 0.0))
+        best[1:] = [change for change in best[1:] if growth[change] < 0.0]
 
-    def _in_all(self, change: tuple[str, ...], softer: tuple[str, ...], visited: Visited) -> Remedy:
-        name = _name(change, softer)
-        self._steps.begin(f"{name}: its own run")
-        changed, _ = short(open_scene.load(self._read, change))
-        try:
-            poses, broken = visited(changed)
-        except (InputFault, FmuFault):  # its run fails
-            return Remedy(change, float("inf"), False)
-        cases, without = in_poses(
-            changed,
-            poses,
-            self._hands,
-            self._bounds,
-            lambda pose: self._steps.tell(f"{name}: pose at {pose}"),
-            self._work,
-        )
-        worst = _worst(cases) if cases and not without else float("inf")
-        marginal = dict.fromkeys(case.hand for case in cases if case.verdict == "marginal")
-        return Remedy(change, worst, worst < -DECAY, tuple(marginal), broken)
+        def trial(change: tuple[str, ...]) -> Trial:
+            name, changed = _name(change, softer), short(open_scene.load(self._read, change))[0]
+            self._steps.begin(f"{name}: its own run")
+            return Trial(
+                change,
+                changed,
+                visited,
+                hardest,
+                self._hands,
+                self._bounds,
+                lambda pose: self._steps.tell(f"{name}: pose at {pose}"),
+                self._work,
+            )
+
+        trials: dict[tuple[str, ...], Trial] = {}
+        for change in best:
+            trials[change] = trial(change)
+            if trials[change].judge(lambda remedy: remedy.suffices).suffices:
+                break  # which ranks before those that do not suffice
+        if growth.get(softer, 0.0) < 0.0 and softer not in trials:
+            trials[softer] = trial(softer)
+        found = [find_best([*trials.values()])] if trials else []
+        if softer in trials and softer not in (remedy.options for remedy in found):
+            found += [remedy] if (remedy := trials[softer].judge()).growth < 0.0 else []
+        return tuple(remedy for remedy in found if remedy.growth < float("inf"))
 
 
 def _name(change: tuple[str, ...], softer: tuple[str, ...]) -> str:
@@ -311,9 +289,3 @@ def _name(change: tuple[str, ...], softer: tuple[str, ...]) -> str:
     return "remedy " + " and ".join(
         [*others, *(["softer gains"] if len(others) < len(change) else [])]
     )
-
-
-def _worst(cases: Sequence[Case]) -> float:
-    """The largest growth rate of the cases that do not only drift, and are not marginal."""
-    rates = [case.growth for case in cases if case.verdict != "marginal" and not case.drifts]
-    return max(rates, default=-float("inf"))

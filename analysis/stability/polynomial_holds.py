@@ -44,6 +44,11 @@ def is_linear(hold: CompiledHold) -> bool:
     return not hold.parts.matrix and not hold.parts.coordinates
 
 
+def is_ageless(hold: CompiledHold) -> bool:
+    """Whether the value of a hold follows from its sample and the coordinates of the moment."""
+    return bool(hold.parts.coordinates) and hold.row.degree == 0 and not hold.link
+
+
 def sample_arrives(hold: CompiledHold, tick: int) -> bool:
     """Whether a sample in transit is there at a tick, and not taken yet."""
     link = hold.link
@@ -52,10 +57,9 @@ def sample_arrives(hold: CompiledHold, tick: int) -> bool:
     )
 
 
-def slopes_of_powers(hold: CompiledHold, tick: int, ahead: float) -> Matrix:
+def slopes_of_powers(hold: CompiledHold, block: StateBlock, tick: int, ahead: float) -> Matrix:
     """The slopes of (c_0, ..., c_d), n numbers each, of a hold at a tick and so much `ahead` of it,
-    by the numbers of its state."""
-    block = StateBlock(hold.c)
+    by the numbers of its state, the `block`."""
     state, degree, own = block.save(), degree_of(hold), hold.c
     spacing = own.stamps[own.count - 1] - own.stamps[own.count - 2] if own.count > 1 else 1
     at = np.arange(degree + 1.0) * spacing

@@ -11,9 +11,10 @@ from typing import Any
 from hapticlink.analysis.search.search import DOUBLINGS
 from hapticlink.analysis.stability.hand_cases import Case, worst_case
 from hapticlink.analysis.stability.hands import FREE
-from hapticlink.analysis.stability.margin_and_remedy import Margin, Remedy
+from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.remedy_trial import Remedy
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene.overrides import as_command_line

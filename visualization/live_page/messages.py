@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError
@@ -72,7 +73,12 @@ class Compare:
 
 
 Message = Hand | SetControl | Time | Compare
-_ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Discriminator("type")])
+
+
+@cache
+def _adapter() -> TypeAdapter[Message]:
+    """Made with the first message, which no page sends before it has shown a picture."""
+    return TypeAdapter(Annotated[Message, Discriminator("type")])
 
 
 def newest(received: Sequence[Message]) -> list[Message]:
@@ -93,7 +99,7 @@ def parse(text: str | bytes) -> Message:
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f"a message has at most {MAX_CHARACTERS} characters")
     try:
-        return _ADAPTER.validate_json(text)
+        return _adapter().validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,11 +27,12 @@ WORD = 8
 
 @dataclass(frozen=True)
 class Saved:
-    """A state that was copied. lengths: of the arrays of its numbers; own: the attributes of a
-    plugin's hold."""
+    """A state that was copied. counts: which say how long its arrays are, and lengths: of those of
+    its numbers; own: the attributes of a plugin's hold."""
 
     integers: Integers
     numbers: Vector
+    counts: tuple[int, ...]
     lengths: tuple[int, ...]
     own: dict[str, Any]
 
@@ -42,6 +44,7 @@ class Array:
 
     name: str
     address: int
+    is_whole: bool
     n: int
     used: str | None = None
     of: tuple[Any, ...] = ()
@@ -50,11 +53,38 @@ class Array:
     def length(self) -> int:
         return self.n if self.used is None else structures.evaluate(self.used, self.of)
 
+    @property
+    def view(self) -> NDArray[Any]:
+        """Its entries, as many as there are now."""
+        kind: Any = ctypes.c_int64 if self.is_whole else ctypes.c_double
+        return np.ctypeslib.as_array((kind * self.length).from_address(self.address))
+
+    @property
+    def counters(self) -> Iterator[Integers]:
+        """The numbers of the state that say how many there are."""
+        for name in structures.names(self.used or ""):
+            owner = next(each for each in self.of if hasattr(each, name))
+            if name in STATE[type(owner).__name__]:
+                place = ctypes.addressof(owner) + getattr(type(owner), name).offset
+                yield Array(name, place, True, 1).view
+
     def name_entries(self, length: int) -> Iterator[str]:
         if length == 1 and self.used is None:
             yield self.name
         else:
             yield from (f"{self.name}[{i + 1}]" for i in range(length))
+
+
+@dataclass(frozen=True)
+class _Views:
+    """The arrays of a state while they have these lengths."""
+
+    integers: list[Integers]
+    numbers: list[Vector]
+
+    @cached_property
+    def lengths(self) -> tuple[int, ...]:
+        return tuple(map(len, self.numbers))
 
 
 class StateBlock:
@@ -64,23 +94,23 @@ class StateBlock:
     def __init__(self, c: Any, own: Callable[[], Hold | None] = lambda: None) -> None:
         self._c, self._own = c, own
         self._rooms: list[int] = []
-        self._integers: list[Array] = []
-        self._numbers: list[Array] = []
+        self._arrays: list[Array] = []
+        self._counters: list[Integers] = []
+        self._known: dict[tuple[int, ...], _Views] = {}
 
     def integers(self) -> Integers:
         """The whole numbers of the state as it is."""
         if self._own():
             return self.save().integers
         self._locate()
-        return np.frombuffer(_read(self._integers), np.int64)
+        return _joined(self._views(self._counts()).integers, np.int64)
 
     def save(self) -> Saved:
         self._locate()
-        lengths = tuple(array.length for array in self._numbers)
-        integers = np.frombuffer(_read(self._integers), np.int64)
-        numbers = np.frombuffer(_read(self._numbers))
+        views = self._views(counts := self._counts())
+        integers, numbers = _joined(views.integers, np.int64), _joined(views.numbers, float)
         if not (own := self._own()):
-            return Saved(integers, numbers, lengths, {})
+            return Saved(integers, numbers, counts, views.lengths, {})
         floats, whole = [numbers], [*integers.tolist()]
 
         def note(value: Vector) -> Vector:
@@ -89,15 +119,18 @@ class StateBlock:
 
         attributes = _copied(vars(own), note, whole.append)
         every = np.concatenate(floats)
-        lengths = (*lengths, len(every) - len(numbers))
-        return Saved(np.array(whole, np.int64), every, lengths, attributes)
+        lengths = (*views.lengths, len(every) - len(numbers))
+        return Saved(np.array(whole, np.int64), every, counts, lengths, attributes)
 
     def restore(self, saved: Saved, numbers: Vector) -> None:
         """Takes on a state that was saved, with these numbers in the place of its own."""
         self._locate()
-        first = _write(self._integers, saved.integers)  # they say how many numbers there are
+        for counter, count in zip(self._counters, saved.counts, strict=True):
+            counter[0] = count
+        views = self._views(saved.counts)
+        first = _write(views.integers, saved.integers)
         assert saved.own or first == len(saved.integers)
-        at = _write(self._numbers, numbers)
+        at = _write(views.numbers, numbers)
         assert saved.own or at == len(numbers)
 
         def take(value: Vector) -> Vector:
@@ -110,16 +143,29 @@ class StateBlock:
 
     def names(self, saved: Saved) -> Iterator[str]:
         """What each of the numbers of a saved state is."""
-        arrays = [*self._numbers, Array("own", 0, 0, "")]
-        for array, length in zip(arrays, saved.lengths, strict=False):
+        arrays = [array for array in self._arrays if not array.is_whole]
+        for array, length in zip(
+            [*arrays, Array("own", 0, False, 0, "")], saved.lengths, strict=False
+        ):
             yield from array.name_entries(length)
 
     def _locate(self) -> None:
         """Finds the arrays, anew where one has grown."""
         if self._rooms != (rooms := [*_rooms(self._c)]):
-            self._rooms, found = rooms, [*_arrays(self._c, "", ())]
-            self._integers = [array for is_whole, array in found if is_whole]
-            self._numbers = [array for is_whole, array in found if not is_whole]
+            self._rooms, self._arrays = rooms, [*_arrays(self._c, "", ())]
+            self._counters = [each for array in self._arrays for each in array.counters]
+            self._known = {}
+
+    def _counts(self) -> tuple[int, ...]:
+        return tuple([int(counter[0]) for counter in self._counters])
+
+    def _views(self, counts: tuple[int, ...]) -> _Views:
+        """Of the arrays while the counters have these values, which they have now."""
+        if counts not in self._known:
+            views = [(array.is_whole, array.view) for array in self._arrays]
+            of_kind = ([view for whole, view in views if whole == kind] for kind in (True, False))
+            self._known[counts] = _Views(*of_kind)
+        return self._known[counts]
 
 
 def _rooms(c: Any) -> Iterator[int]:
@@ -130,8 +176,8 @@ def _rooms(c: Any) -> Iterator[int]:
     yield ctypes.addressof(c)
 
 
-def _arrays(c: Any, path: str, owners: tuple[Any, ...]) -> Iterator[tuple[bool, Array]]:
-    """The arrays of the state of a structure, each with whether it is of whole numbers."""
+def _arrays(c: Any, path: str, owners: tuple[Any, ...]) -> Iterator[Array]:
+    """The arrays of the state of a structure."""
     class_, known = type(c), (c, *owners)
     declared, pointers = dict(class_._fields_), POINTERS.get(class_.__name__, {})
     for field in STATE.get(class_.__name__, ()):
@@ -141,7 +187,7 @@ def _arrays(c: Any, path: str, owners: tuple[Any, ...]) -> Iterator[tuple[bool, 
         elif pointer is None:
             place = ctypes.addressof(c) + getattr(class_, field).offset
             is_whole = not issubclass(type_, ctypes.c_double)
-            yield is_whole, Array(name, place, ctypes.sizeof(type_) // WORD)
+            yield Array(name, place, is_whole, ctypes.sizeof(type_) // WORD)
         elif not (address := getattr(c, field)):
             continue
         elif pointer.type not in ("double", "int64_t"):
@@ -149,23 +195,22 @@ def _arrays(c: Any, path: str, owners: tuple[Any, ...]) -> Iterator[tuple[bool, 
             yield from _arrays(owned, f"{name}.", known)
         elif pointer.used == pointer.count:
             n = structures.evaluate(pointer.count, known)
-            yield pointer.type == "int64_t", Array(name, address, n)
+            yield Array(name, address, pointer.type == "int64_t", n)
         else:
-            yield pointer.type == "int64_t", Array(name, address, 0, pointer.used, known)
+            yield Array(name, address, pointer.type == "int64_t", 0, pointer.used, known)
 
 
-def _read(arrays: Sequence[Array]) -> bytes:
-    return b"".join([ctypes.string_at(a.address, WORD * a.length) for a in arrays])
+def _joined(views: Sequence[NDArray[Any]], kind: type) -> NDArray[Any]:
+    return np.concatenate(views) if views else np.zeros(0, kind)
 
 
-def _write(arrays: Sequence[Array], values: NDArray[Any]) -> int:
+def _write(views: Sequence[NDArray[Any]], values: NDArray[Any]) -> int:
     """Writes the first of `values` to arrays; how many they have taken."""
-    content, first = values.tobytes(), 0
-    for array in arrays:
-        size = WORD * array.length
-        ctypes.memmove(array.address, content[first : first + size], size)
-        first += size
-    return first // WORD
+    first = 0
+    for view in views:
+        view[:] = values[first : first + len(view)]
+        first += len(view)
+    return first
 
 
 def _copied(value: Any, number: Callable[[Vector], Vector], whole: Callable[[int], object]) -> Any:

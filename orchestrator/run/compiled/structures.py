@@ -119,6 +119,11 @@ def evaluate(expression: str, known: Sequence[Any], counts: Mapping[str, int] = 
     return int(eval(_compiled(expression), {"__builtins__": {}}, _Fields(known, counts)))
 
 
+def names(expression: str) -> tuple[str, ...]:
+    """The fields that an expression of loop.h reads."""
+    return _compiled(expression).co_names if expression else ()
+
+
 @cache
 def _compiled(expression: str) -> CodeType:
     return compile(expression.strip(), "loop.h", "eval")

@@ -56,7 +56,8 @@ COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
     ("serial", {}, (31, 147, 1828)),
     ("enclosure", {}, (17, 110, 1874)),
     ("two-users", {}, (16, 167, 2504)),
-    ("closed-loop-direct", {}, (45, 363, 4517)),
+    ("closed-loop-direct", {}, (42, 343, 4058)),
+    ("closed-loop-direct", {"hold": "foh"}, (42, 476, 6996)),
 ]
 
 

@@ -33,8 +33,9 @@ def test_a_hold_goes_on_from_its_powers_to_the_interpolating_polynomial(name: st
     for stamp, sample in zip(stamps, samples, strict=True):
         hold.push(stamp, sample, stamp)
     y, beside = samples[:, :n], samples[:, n:]
+    block = StateBlock(hold.c)
     for tick in (51, 58):
-        powers = slopes_of_powers(hold, tick, 0.5) @ StateBlock(hold.c).save().numbers
+        powers = slopes_of_powers(hold, block, tick, 0.5) @ block.save().numbers
         for dt in (0.0, 0.5, 9.5, 100.0):
             value = (advanced_powers(hold, dt) @ powers)[:n]
             expected = LAWS[name](stamps, y, beside, Fraction(tick) + Fraction(dt + 0.5))

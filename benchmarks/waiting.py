@@ -1,0 +1,182 @@
+"""What a user waits for: processor time of commands as they are typed, with FMUs in the cache, and
+the floors beneath them: Python with the modules of a run, and the event loop alone.
+
+Each command is a process of its own, with one thread of BLAS; of ROUNDS the least time counts,
+after one more that fills the cache. Memory is the largest that the process had. The counts of a
+verdict (equilibria searched, operations differentiated, products of matrices) depend on no machine.
+
+`HAPTICLINK_BEFORE`, the command `hapticlink` of another checkout, is measured by turns with this
+one. `beside` is the ratio of both while another process runs on the same core.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.page import Progress, load_average, system, table
+from benchmarks.rows import Rows
+from hapticlink.orchestrator.base import temporary_folders
+
+ROUNDS = 3
+COLUMNS = ("what", "before_s", "after_s", "beside", "memory_mb", "counts")
+BEFORE = "HAPTICLINK_BEFORE"
+IMPORTS = "import hapticlink as hl, hapticlink.commands.run; hl.run"
+LOOP = """
+from time import process_time
+from hapticlink.orchestrator import experiment
+from hapticlink.orchestrator.run import execute_plan
+execute_plan.perf_counter = process_time
+print(experiment.simulate("closed-loop-ideal", "loop", csv=False).outcome.wall_time)
+"""
+COUNTS = """
+import sys
+import hapticlink as hl
+from hapticlink.analysis.stability import judge_scene
+from hapticlink.analysis.stability.shared_work import SharedWork
+work = SharedWork()
+judge_scene.SharedWork = lambda: work
+hl.stability(sys.argv[1], sys.argv[2:])
+print(*(work.counts[each] for each in ("equilibria", "differentiated", "products")))
+"""
+VERDICTS = (
+    ("closed-loop-ideal",),
+    ("serial",),
+    ("enclosure",),
+    ("two-users",),
+    ("closed-loop-direct",),
+    ("closed-loop-ideal", "hold=foh"),
+    ("closed-loop-direct", "hold=foh"),
+    ("closed-loop-ideal", "hold=model"),
+)
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What a command took: processor time (s), memory (MB), and what it printed."""
+
+    seconds: float
+    memory: float
+    printed: str
+
+
+def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
+    """Writes waiting.csv into `folder`."""
+    (folder / "waiting.csv").unlink(missing_ok=True)
+    rows = Rows(folder / "waiting.csv", COLUMNS, 1)
+    after = str(Path(sys.executable).with_name("hapticlink"))
+    both = [os.environ.get(BEFORE, ""), after]
+    items = [*_items(quick)]
+    for k, (what, arguments) in enumerate(items):
+        progress(what, k, len(items))
+        rows.add(what, *_measured(arguments, both, 1 if quick else ROUNDS))
+    shown = [[row[column] or "-" for column in COLUMNS] for row in rows.rows.values()]
+    heads = "what | before (s) | after (s) | ratio beside a neighbour | memory (MB) | counts"
+    return "\n".join(
+        [
+            "# What a user waits for",
+            "",
+            f"Made by `{command}`: processor seconds, the least of {1 if quick else ROUNDS}, on "
+            f"{system()}, at a load of {load_average():.1f}. What is measured: "
+            "[waiting.py](../../benchmarks/waiting.py).",
+            "",
+            *table(heads, "lrrrrl", shown),
+            "",
+        ]
+    )
+
+
+def _items(quick: bool) -> Iterator[tuple[str, list[str]]]:
+    """What is measured, with the arguments of `hapticlink`, or of Python behind `-c`."""
+    yield "floor: imports of a run", ["-c", IMPORTS]
+    yield "floor: the loop of 3 s alone", ["-c", LOOP]
+    run = ["run", "closed-loop-ideal"]
+    yield "run, without figures", [*run, "--no-figures"]
+    yield "run, with figures", run
+    yield "page in one file, again", ["view", "closed-loop-ideal", "--standalone", "page.html"]
+    for scene, *options in VERDICTS[:1] if quick else VERDICTS:
+        sets = [text for option in options for text in ("--set", option)]
+        yield " ".join(["stability", scene, *options]), ["stability", scene, *sets]
+    if not quick:
+        yield "run of 100 s, native", _long(100)
+        yield "run of 1,000 s, native", _long(1000)
+
+
+def _long(seconds: int) -> list[str]:
+    options = [f"duration={seconds}", "packaging=native"]
+    sets = [text for option in options for text in ("--set", option)]
+    return ["run", "closed-loop-ideal", "--no-figures", *sets]
+
+
+def _measured(
+    arguments: list[str], both: list[str], rounds: int
+) -> tuple[float | str, float, float | str, float, str]:
+    commands = [command for command in both if command]
+    with temporary_folders.temporary_folder() as room:
+        first = {command: _take(command, arguments, room) for command in commands}
+        quiet = _least(commands, arguments, room, rounds)
+        ratio: float | str = ""
+        if len(commands) > 1:
+            with _neighbour() as core:
+                noisy = _least(commands, arguments, room, rounds, core)
+            ratio = round(noisy[commands[1]] / noisy[commands[0]], 3)
+        counts = ""
+        if arguments[0] == "stability":
+            scene, options = arguments[1], arguments[3::2]
+            told = {c: _take(c, ["-c", COUNTS, scene, *options], room).printed for c in commands}
+            counts = " / ".join(text.strip() for text in told.values())
+        before = round(quiet[commands[0]], 3) if len(commands) > 1 else ""
+        return before, round(quiet[both[1]], 3), ratio, round(first[both[1]].memory), counts
+
+
+def _least(
+    commands: list[str], arguments: list[str], room: Path, rounds: int, core: int | None = None
+) -> dict[str, float]:
+    """The least time (s) of each command, by turns."""
+    taken = [
+        {command: _take(command, arguments, room, core).seconds for command in commands}
+        for _ in range(rounds)
+    ]
+    return {command: min(each[command] for each in taken) for command in commands}
+
+
+def _take(command: str, arguments: list[str], room: Path, core: int | None = None) -> Taken:
+    """Carries out a command, or Python beside it; `core`: on which alone. Raises RuntimeError
+    where it fails."""
+    python = str(Path(command).with_name(Path(sys.executable).name))
+    line = [python, *arguments] if arguments[0] == "-c" else [command, *arguments]
+    places = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    with (room / "printed").open("w+") as printed:
+        process = subprocess.Popen(
+            line, cwd=room, stdout=printed, stderr=subprocess.STDOUT, text=True,
+            env={**places, "OPENBLAS_NUM_THREADS": "1"},
+        )  # fmt: skip
+        if core is not None:
+            os.sched_setaffinity(process.pid, {core})
+        _, status, usage = os.wait4(process.pid, 0)
+        printed.seek(0)
+        text = printed.read()
+    if os.waitstatus_to_exitcode(status) not in (0, 1):  # 1: a verdict that is not stable
+        raise RuntimeError(f"{' '.join(line)}: {text[-500:]}")
+    seconds = usage.ru_utime + usage.ru_stime
+    if arguments == ["-c", LOOP]:
+        seconds = float(text.split()[-1])
+    return Taken(seconds, usage.ru_maxrss / 1e3, text)
+
+
+@contextmanager
+def _neighbour() -> Iterator[int]:
+    """A core on which another process runs."""
+    core = min(os.sched_getaffinity(0))
+    busy = subprocess.Popen([sys.executable, "-c", "x = [0] * 10**6\nwhile True: x.reverse()"])
+    try:
+        os.sched_setaffinity(busy.pid, {core})
+        yield core
+    finally:
+        busy.kill()
+        busy.wait()

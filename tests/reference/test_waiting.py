@@ -1,0 +1,35 @@
+"""What `hapticlink bench waiting` measures of a process."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import waiting
+
+COMMAND = str(Path(sys.executable).with_name("hapticlink"))
+
+
+def test_a_process_is_measured_with_its_time_and_memory(tmp_path: Path) -> None:
+    idle = waiting._take(COMMAND, ["-c", "import time; time.sleep(1); print('rests')"], tmp_path)
+    busy = waiting._take(
+        COMMAND,
+        ["-c", "import time\nx = b'1' * 10**8\nwhile time.process_time() < 1: pass"],
+        tmp_path,
+    )
+    assert idle.printed == "rests\n"
+    assert 0.0 < idle.seconds < 1.0 <= busy.seconds
+    assert busy.memory > idle.memory + 90.0
+
+
+def test_two_checkouts_take_turns_and_are_compared_beside_a_neighbour() -> None:
+    before, after, beside, memory, counts = waiting._measured(["-c", "pass"], [COMMAND] * 2, 1)
+    assert min(before, after, beside, memory) > 0.0
+    assert counts == ""
+
+
+def test_a_command_that_fails_is_no_measurement(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="no such thing"):
+        waiting._take(COMMAND, ["-c", "import sys; print('no such thing'); sys.exit(3)"], tmp_path)
