@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import plugins, shelf, temporary_folders
 from hapticlink.orchestrator.base.errors import SceneFault
@@ -34,6 +33,7 @@ from hapticlink.orchestrator.system.assign_holds import assign, find_energy_port
 from hapticlink.orchestrator.system.connections import check_partial_vectors, connect, with_texts
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.outputs_to_record import choose_outputs
+from hapticlink.orchestrator.system.start_values import separate_start_values
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
     Connection,
@@ -55,6 +55,8 @@ def build_system(scene: Scene, starts: Mapping[str, Starts] | None = None) -> It
     """
     with temporary_folders.folder_if_needed() as room:
         planned = blocks(scene)
+        if starts is None:
+            planned = separate_start_values(planned)
         time = timeline(scene, planned)
         files = fmu_files(scene, planned, time, room, starts=starts)
         if starts is not None:
@@ -94,9 +96,10 @@ def _assemble_once(
         hands={},
         controller=None,
         controllers={},
+        linkage=scene.linkage and replace(scene.linkage, start={}),
     )
     events = repr(scene.at)
-    settings = [(b.name, without_start_values(b.block, b.settings)[0]) for b in planned.own]
+    settings = [(b.name, b.settings) for b in planned.own]
     described = [describe_once(files[b.name]) for b in planned.own]
 
     def is_same(known: Assembled) -> bool:
@@ -187,11 +190,11 @@ def _assemble(
 
 def _started(fmu: Fmu, block: BlockPlan) -> Fmu:
     """A block's FMU with the start values that its settings give parameters."""
-    _, starts = without_start_values(block.block, block.settings)
     given = (
         (s, value)
-        for parameter, values in starts.items()
-        for s, value in zip(fmu.description.port(parameter, "parameter"), values, strict=True)
+        for port, values in block.starts.items()
+        if (scalars := fmu.description.port(port, "parameter", "input"))
+        for s, value in zip(scalars, values, strict=True)
     )
     return replace(fmu, starts=tuple(given))
 

@@ -12,7 +12,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts, find_block, has_compiled
 from hapticlink.fmus.cache import folder, remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
@@ -69,8 +68,6 @@ def fmu_files(
         given: Starts = {}
         experiment: dict[str, float] = {}
         settings, packaging = block.settings, scene.packaging
-        if starts is None and block in blocks.own:
-            settings, _ = without_start_values(block.block, settings)
         if _prefers_compiled.get() and not block.engine and has_compiled(block.block, settings):
             packaging = "native"
         if starts is not None:

@@ -38,6 +38,8 @@ KEYS: dict[str, list[str]] = {
     "coupling": ["jacobi"],
     "duration": ["0.2"],
     "at": ['[{ time = 0.1, set = { "hand.wrench" = [-0.1, 0.0, 0.0] } }]'],
+    "linkage.start.shoulder1": ["0.7", "0.85", "2.5"],  # of which the last one does not close
+    "linkage.start.elbow2": ["1.5", "-1.5"],
     "stop_when": ["'haptic_device.workspace_margin < 1.0'"],
 }
 DIVERGES = ("graphics.rate=4", "duration=2.0", "controller.teleoperation.stiffness=[9e4, 9e4, 9e2]")
