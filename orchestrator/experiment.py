@@ -46,7 +46,7 @@ from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import build_system
+from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_system
 from hapticlink.orchestrator.system.system import System
 
 
@@ -112,7 +112,7 @@ class Prepared:
         return self.plan.system
 
 
-_PREPARED: shelf.Shelf[Prepared] = shelf.Shelf(8)
+_PREPARED: shelf.Shelf[Prepared] = shelf.Shelf(MAX_SYSTEMS)
 
 
 def _prepare(

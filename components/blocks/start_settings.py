@@ -8,9 +8,8 @@ from dataclasses import replace
 from functools import reduce
 from typing import Any
 
-from hapticlink.components.linkage.parameters import coordinates
 from hapticlink.components.specs.control import PassivityLaw, Topology
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import Linkage, coordinates
 
 START_SETTINGS = {
     "controller": {

@@ -18,8 +18,7 @@ from hapticlink.components.dynamics.assembly import TOLERANCE, assemble
 from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.linkage.branch import choose_dependent
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinates
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import Linkage, coordinates
 
 Choice = tuple[tuple[int, ...], tuple[int, ...]]
 SURE = 0.1

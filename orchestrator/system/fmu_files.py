@@ -60,7 +60,7 @@ def fmu_files(
     the settings (a loop that does not close), Fault where the compiler fails.
     """
     every = (*blocks.built, *blocks.engines)
-    begun = count(1)
+    begun, cached_in = count(1), folder()
 
     def find(block: BlockPlan) -> Path | Callable[[], Path]:
         interrupt.raise_if_interrupted()
@@ -87,7 +87,7 @@ def fmu_files(
         }
         compiled = packaging == "native" and not block.engine
         compiler = compiler_version() if compiled else ""
-        made_of = repr((block.block, settings, how, folder(), compiler))
+        made_of = repr((block.block, settings, how, cached_in, compiler))
         if path := _find_again(made_of):
             return path
         own = room / block.name  # two hands are two files of one name

@@ -12,8 +12,7 @@ import pytest
 from hapticlink.components.blocks.start_settings import has_free_start, start_pose
 from hapticlink.components.component import Component
 from hapticlink.components.dynamics.start_poses import StartPoses
-from hapticlink.components.linkage.parameters import coordinates
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import Linkage, coordinates
 from hapticlink.fmus.blocks import component
 from hapticlink.fmus.errors import FmuError
 from hapticlink.orchestrator import open_scene
