@@ -32,14 +32,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5908,
+    "components": 5940,
     "fmus": 2816,
-    "orchestrator": 13020,
+    "orchestrator": 13147,
     "programs": 1021,
-    "analysis": 7089,
+    "analysis": 7104,
     "visualization": 3333,
     "api": 435,
-    "commands": 1397,
+    "commands": 1398,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
