@@ -25,6 +25,7 @@ Benchmark = Literal[
     "stress",
     "view",
     "one",
+    "sweep",
     "standalone",
     "engine",
     "network",
@@ -62,6 +63,7 @@ def bench(
     - stress: hard scenes at the edge of stability and beyond, each with the outcome it has to have
     - view: deadlines missed and latencies while a browser drags
     - one: a scene as one FMU, beside its run through FMUs
+    - sweep: a point of a sweep beside the loop of its run, and beside FMPy
     - standalone: a scene as a page in one file: size, and speed in a browser
     - engine: MuJoCo in the place of the graphics copy and of the mechanism
     - network: the graphics on another computer: delay, jitter and loss against error and energy

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 from hapticlink.fmus.versions import find_code, find_versions
 from hapticlink.orchestrator.base import plugins
@@ -37,8 +38,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
     compiled = scene.packaging == "native" and blocks(scene).built
     packages = (*PACKAGES, "ziglang") if compiled else PACKAGES
     return RunSetup(
-        scene=scene.tables(),
-        options=list(scene.source.options) if scene.source else [],
+        **describe_scene(scene),
         versions=find_versions(packages) | {"python": platform.python_version()} | find_code(),
         plugins=plugins.list_plugins(),
         seeds=_seeds(scene, system),
@@ -80,6 +80,12 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         units=_units(system),
         without_effect=[*_find_idle_holds(scene, system), *_find_idle_events(scene, system)],
     )
+
+
+def describe_scene(scene: Scene) -> dict[str, Any]:
+    """What depends on the start values in the scene."""
+    options = list(scene.source.options) if scene.source else []
+    return {"scene": scene.tables(), "options": options}
 
 
 def _find_idle_holds(scene: Scene, system: System) -> Iterator[str]:

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import interrupt
+from hapticlink.orchestrator.base import interrupt, shelf
 from hapticlink.orchestrator.base.errors import (
     Fault,
     InputFault,
     Interrupted,
     describe_os_error,
 )
-from hapticlink.orchestrator.describe_run import setup
+from hapticlink.orchestrator.describe_run import describe_scene, setup
 from hapticlink.orchestrator.host import crash_monitor, host_state
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES
 from hapticlink.orchestrator.network.served_part import NOWHERE, Servers, place_remote_fmus
@@ -46,7 +46,7 @@ from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import build_system
+from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_system
 from hapticlink.orchestrator.system.system import System
 
 
@@ -94,6 +94,61 @@ class Experiment:
             columns = ("time", *recorded.get(clock.name, ()))
             empty[clock.name] = Table(columns, np.zeros((0, len(columns))), empty)
         return Results(self.folder, self.run, empty)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What there is of a run before it begins. every: the system with all outputs of its FMUs;
+    plan: of the system with those that are fetched; tables: the columns of each by its name;
+    before: what run.json says of it."""
+
+    every: System
+    plan: Plan
+    tables: Mapping[str, Sequence[str]]
+    before: RunSetup
+
+    @property
+    def system(self) -> System:
+        return self.plan.system
+
+
+_PREPARED: shelf.Shelf[Prepared] = shelf.Shelf(MAX_SYSTEMS)
+
+
+def _prepare(
+    scene: Scene, every: System, real_time: RealTimeRun | None, remote: Servers
+) -> Prepared:
+    """Of a scene's system. Raises InputFault as `Plan.check` does."""
+    system = place_remote_fmus(choose_fetched(every), scene, remote)
+    plan = Plan(system)
+    plan.check()
+    tables: dict[str, Sequence[str]] = {**_columns(system)}
+    if real_time:
+        sides = dict.fromkeys(require_concurrent(plan).values())
+        tables |= {f"{clock}_{SAMPLES}": COLUMNS for clock in sides}
+        tables |= {f"{fmu.name}_{FRAMES}": FRAME for fmu in system.fmus if fmu.served}
+    else:
+        refuse_hardware(system.fmus)
+    return Prepared(every, plan, tables, setup(scene, plan, tables, _find_left_out(every, system)))
+
+
+def _prepare_again(scene: Scene, every: System) -> Prepared | None:
+    """The same for a system that `build_system` has made of one before by other start values, which
+    shows in that they share all else; None where there is none."""
+    known = _PREPARED.take(
+        lambda item: (
+            item.every.connections is every.connections and item.every.timeline is every.timeline
+        )
+    )
+    if known is None:
+        return None
+    fmus = (
+        replace(fmu, starts=new.starts)
+        for fmu, new in zip(known.system.fmus, every.fmus, strict=True)
+    )
+    system = replace(known.system, fmus=tuple(fmus), energy=every.energy)
+    before = replace(known.before, **describe_scene(scene))
+    return replace(known, every=every, plan=known.plan.of(system), before=before)
 
 
 def _columns(system: System) -> dict[str, list[str]]:
@@ -162,18 +217,13 @@ def simulate(
             every = stack.enter_context(build_system(read))
         except Interrupted:
             raise Interrupted(when="before the run") from None
-        system = place_remote_fmus(choose_fetched(every), read, remote)
-        plan = Plan(system)
-        plan.check()
+        kept = in_memory and remote is NOWHERE and not real_time
+        ready = kept and _prepare_again(read, every)
+        ready = ready or _prepare(read, every, real_time, remote)
+        system, plan, tables, before = ready.system, ready.plan, ready.tables, ready.before
         build_time = perf_counter() - begin
-        tables: dict[str, Sequence[str]] = {**_columns(system)}
-        if real_time:
-            sides = dict.fromkeys(require_concurrent(plan).values())
-            tables |= {f"{clock}_{SAMPLES}": COLUMNS for clock in sides}
-            tables |= {f"{fmu.name}_{FRAMES}": FRAME for fmu in system.fmus if fmu.served}
-        else:
-            refuse_hardware(system.fmus)
-        before = setup(read, plan, tables, _find_left_out(every, system))
+        if kept:
+            _PREPARED.put(ready)
         alone = find_isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         if in_memory and not foreign and _fits_in_memory(system, tables):

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6018,
+    "components": 6050,
     "fmus": 2816,
-    "orchestrator": 13290,
+    "orchestrator": 13417,
     "programs": 1021,
-    "analysis": 7288,
+    "analysis": 7303,
     "visualization": 3371,
     "api": 448,
-    "commands": 1408,
+    "commands": 1409,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

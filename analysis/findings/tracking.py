@@ -163,7 +163,10 @@ def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
     times, known = device["time"], device[handle]
 
     def error(time: Vector, place: Vector) -> Vector:
-        held = np.column_stack([np.interp(time, times, entry) for entry in known.T])
+        if mechanism is device and len(time) == len(times):
+            held = known  # to which interpolation would lead
+        else:
+            held = np.column_stack([np.interp(time, times, entry) for entry in known.T])
         apart = PLANE.difference(place, held)
         return np.stack([PLANE.distance(apart) * 1e3, PLANE.angle(apart)])
 

@@ -135,7 +135,8 @@ def user_port(results: Results) -> UserPort | None:
     if find_other_pushes(results) or not (len(device["time"]) and len(mechanism["time"])):
         return None
     rows = rows_until(mechanism, device["time"][-1])
-    time = mechanism["time"][rows]
+    time = mechanism["time"]
+    time = time if rows.stop == len(time) else time[rows]
     works = Works(results, time)
     put_in = {FIRST: works.of(HAND_WRENCH, HANDLE_POSE)[0]}
     further: Vector | float = 0.0

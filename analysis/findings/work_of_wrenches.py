@@ -13,6 +13,9 @@ from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 from hapticlink.orchestrator.results.run_record import RunRecord
 from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 
+SAME_S = 1e-12
+"""Time (s) up to which a row's time is that of another."""
+
 
 def arrivals(record: RunRecord, connection: str, table: Table, same_clock: bool) -> Vector:
     """The times (s) from which the samples of a connection's source, the rows of a table, were
@@ -59,12 +62,16 @@ def _sums(rows: int, steps: Callable[[Table], Vector], table: Table) -> Vector:
 
 def _at(times: Vector, known: Vector, series: Vector) -> Vector:
     """A series at other times, linear between those at which it is known."""
-    return series if np.array_equal(times, known) else np.interp(times, known, series)
+    same = times is known or np.array_equal(times, known)
+    return series if same else np.interp(times, known, series)
+
+
+Rows = NDArray[np.intp] | slice
 
 
 def work_as_held(
     times: Vector,
-    force_at: Callable[[NDArray[np.intp]], Vector],
+    force_at: Callable[[Rows], Vector],
     known: Vector,
     moved: Table,
     position: str,
@@ -77,11 +84,16 @@ def work_as_held(
         order = np.argsort(known, kind="stable")
         known, newest = known[order], np.maximum.accumulate(order)
 
-    def steps(block: Table) -> Vector:
-        rows = np.searchsorted(known, block["time"][:-1] + 1e-12, "right") - 1
+    def rows_of(block: Table) -> Rows:
+        if known is block["time"] and (known[1:] - known[:-1] > SAME_S).all():
+            return slice(0, len(known) - 1)
+        rows = np.searchsorted(known, block["time"][:-1] + SAME_S, "right") - 1
         rows = np.maximum(rows, 0)
-        held = force_at(rows if newest is None else newest[rows])
-        work: Vector = (held * np.diff(block[position], axis=0)).sum(axis=1)
+        return rows if newest is None else newest[rows]
+
+    def steps(block: Table) -> Vector:
+        place = block[position]
+        work: Vector = (force_at(rows_of(block)) * (place[1:] - place[:-1])).sum(axis=1)
         return work
 
     return _at(times, moved["time"], _sums(len(moved.rows), steps, moved))
@@ -100,12 +112,16 @@ def work_of_source(
         else:
             path, place = elsewhere
             at_stamps = np.stack([np.interp(block["time"], path, x) for x in place.T], axis=1)
-        force = sign * block[signal]
+        force = _signed(sign, block[signal])
         mean = (force[:-1] + force[1:]) / 2
-        work: Vector = (mean * np.diff(at_stamps, axis=0)).sum(axis=1)
+        work: Vector = (mean * (at_stamps[1:] - at_stamps[:-1])).sum(axis=1)
         return work
 
     return _at(times, wrench["time"], _sums(len(wrench.rows), steps, wrench))
+
+
+def _signed(sign: float, force: Vector) -> Vector:
+    return force if sign == 1.0 else sign * force
 
 
 def absolute_work(results: Results, signal: str, position: str) -> float:
@@ -158,12 +174,14 @@ class Works:
         name = connection or next((each for each in meters if each.startswith(start)), None)
         known = arrivals(results.record, name, table, table is moved) if name else table["time"]
 
-        def force_at(rows: NDArray[np.intp]) -> Vector:
+        def force_at(rows: Rows) -> Vector:
+            if isinstance(rows, slice):
+                return _signed(sign, table[signal][rows])
             if not len(rows):
                 return np.zeros((0, *table.shape(signal)))
             first = int(rows.min())
             part = table.part(slice(first, int(rows.max()) + 1))
-            return sign * part[signal][rows - first]
+            return _signed(sign, part[signal][rows - first])
 
         meter = meters[name] if name else None
         at = int(np.searchsorted(times, meter.until)) if meter else 0

@@ -11,8 +11,7 @@ import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.components.contact.broad_phase import near
-from hapticlink.components.linkage.parameters import coordinates
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import Linkage, coordinates
 from hapticlink.fmus import cache
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.native.compiler import compiler_version, host_platform

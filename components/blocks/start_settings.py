@@ -9,6 +9,7 @@ from functools import reduce
 from typing import Any
 
 from hapticlink.components.specs.control import PassivityLaw, Topology
+from hapticlink.components.specs.linkage import Linkage, coordinates
 
 START_SETTINGS = {
     "controller": {
@@ -61,6 +62,30 @@ def without_start_values(
             starts[parameter] = (value,)
             common[first] = _with(table, path, NOMINAL)
     return common, starts
+
+
+START_POSE = ("q_start", "q_ref")
+"""The variables of blocks with a linkage that start at the joint coordinates of its `start`."""
+
+
+def has_free_start(settings: Mapping[str, Any]) -> bool:
+    """Whether no equation of a block depends on the numbers of its linkage's `start`, as long as
+    loops close and choose the same coordinates (dynamics/start_poses.py). They do where scales of
+    friction, offsets of gears, contacts or the local model follow from the start pose, or where it
+    is checked against start rates, or for bodies without mass."""
+    linkage = settings.get("linkage")
+    return (
+        isinstance(linkage, Linkage)
+        and not (settings.get("contacts") or settings.get("local_model"))
+        and not (linkage.start_velocity or linkage.choices or linkage.rubbing or linkage.force)
+        and all(gear.offset is not None for gear in linkage.gear)
+        and all(body.mass and body.inertia for body in linkage.body)
+    )
+
+
+def start_pose(linkage: Linkage) -> dict[str, tuple[float, ...]]:
+    """The start values of START_POSE."""
+    return dict.fromkeys(START_POSE, tuple(coordinates(linkage, linkage.start)))
 
 
 def _at(table: Any, path: Sequence[str]) -> Any:

@@ -36,10 +36,9 @@ from hapticlink.components.dynamics.variables import (
 )
 from hapticlink.components.linkage import branch
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinates
 from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.contacts import Contacts
-from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage
+from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, coordinates
 
 _BRANCH = (
     Variable("branch_ok", description="1 on the mechanism's branch, 0 folded"),

@@ -22,8 +22,7 @@ from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, 
 from hapticlink.components.dynamics.variables import parameters, start_parameters
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinates
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import Linkage, coordinates
 
 STEPS = 12
 RATE_STEPS = 3  # each step reduces the error by a factor of about MU

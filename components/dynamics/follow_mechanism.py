@@ -27,9 +27,8 @@ from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.projection import MU, projection
 from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import coordinates
 from hapticlink.components.schematic_parts import BlockPart
-from hapticlink.components.specs.linkage import GraphicsCopy, Linkage
+from hapticlink.components.specs.linkage import GraphicsCopy, Linkage, coordinates
 
 
 def inputs(linkage: Linkage, copy: GraphicsCopy) -> list[Variable]:

@@ -5,14 +5,10 @@ from __future__ import annotations
 from hapticlink.components import forces
 from hapticlink.components.component import Variable
 from hapticlink.components.linkage.closures import gear_parameters, rows
-from hapticlink.components.linkage.parameters import (
-    body_parameters,
-    coordinates,
-    mean_link_length,
-)
+from hapticlink.components.linkage.parameters import body_parameters, mean_link_length
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.schematic_parts import BlockPart
-from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
+from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism, coordinates
 
 
 def parameters(linkage: Linkage) -> tuple[Variable, ...]:

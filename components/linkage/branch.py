@@ -14,15 +14,21 @@ from hapticlink.components.linkage.model import LinkageModel
 
 
 def dependent_coordinates(model: LinkageModel, start: np.ndarray) -> tuple[list[int], list[int]]:
-    """Rows and columns of W that form a regular block W_d at the start pose, by elimination.
+    """Rows and columns of W that form a regular block W_d at the start pose.
 
-    start: the pose and the flat default parameters, (q, p). Redundant rows are left out.
+    start: the pose and the flat default parameters, (q, p).
     """
     n = model.q.numel()
     W = ca.Function("W", [model.q, model.p.vector], [model.W])
-    A = np.array(W(start[:n], start[n:]), dtype=float)
+    return choose_dependent(model, np.array(W(start[:n], start[n:]), dtype=float))
+
+
+def choose_dependent(model: LinkageModel, W: np.ndarray) -> tuple[list[int], list[int]]:
+    """Rows and columns of W, (m, n), that form a regular block, by elimination. Redundant rows are
+    left out."""
+    n, A = model.q.numel(), W.copy()
     unseen = [not model.J_h[:, j].nnz() for j in range(n)]
-    smallest = 1e-9 * np.abs(A).max()
+    smallest = 1e-9 * np.abs(A).max(initial=0.0)
     chosen: list[int] = []
     columns: list[int] = []
     while True:

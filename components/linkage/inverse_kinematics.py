@@ -21,8 +21,8 @@ from scipy.linalg import null_space
 
 from hapticlink.components.component import Signals
 from hapticlink.components.linkage.model import LinkageModel
-from hapticlink.components.linkage.parameters import body_parameters, coordinates
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.linkage.parameters import body_parameters
+from hapticlink.components.specs.linkage import Linkage, coordinates
 
 Vector = NDArray[np.float64]
 RANK = 1e-6

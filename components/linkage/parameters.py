@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 
 from hapticlink.components.component import Variable
 from hapticlink.components.specs.joint_types import OwnKey
@@ -54,15 +53,6 @@ def body_parameters(linkage: Linkage) -> tuple[Variable, ...]:
 
 def loop_name(linkage: Linkage, index: int) -> str:
     return linkage.loop[index].name or f"loop{index + 1}"
-
-
-def coordinates(linkage: Linkage, values: Mapping[str, float | Sequence[float]]) -> list[float]:
-    """Flat joint coordinates from values by joint name; missing ones are 0."""
-    flat: list[float] = []
-    for j in linkage.joint:
-        value = values.get(j.name, (0.0,) * j.kind.size)
-        flat.extend(value if isinstance(value, Sequence) else (value,))
-    return flat
 
 
 def mean_link_length(linkage: Linkage) -> float:

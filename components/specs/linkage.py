@@ -8,7 +8,7 @@ FMU. SI units throughout.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -382,3 +382,12 @@ class GraphicsCopy:
     """Joint acceleration for an error of the joint velocity, with sync = "joint"."""
     substeps: Substeps = 20
     """Integration steps per frame, where the copy is pulled."""
+
+
+def coordinates(linkage: Linkage, values: Mapping[str, float | Sequence[float]]) -> list[float]:
+    """Flat joint coordinates from values by joint name; missing ones are 0."""
+    flat: list[float] = []
+    for j in linkage.joint:
+        value = values.get(j.name, (0.0,) * j.kind.size)
+        flat.extend(value if isinstance(value, Sequence) else (value,))
+    return flat

@@ -128,8 +128,8 @@ def run(
             opened = stack.enter_context(kept.opened if kept else ExitStack())
             if kept:
                 simulation, loop = kept.simulation, kept.loop
-                system, plan = plan.system, kept.plan
-                kept.begin_again(system, results, stack)
+                kept = kept.begin_again(plan, results, stack)
+                plan = kept.plan
             else:
                 pace = real_time.pace if real_time else None
                 simulation = Simulation(plan.system, results, stack, opened, pace)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base import interrupt
@@ -67,7 +68,7 @@ def initialize(
             loops = True
         else:
             start.evaluate(evaluations)
-    sources = start.find_sources(every)
+    sources = found.sources
     before = values[sources]
     start.evaluate(every)
     if not np.isclose(values[sources], before, TOLERANCE, TOLERANCE, equal_nan=True).all():
@@ -98,9 +99,10 @@ def find_stop(system: System, fmu: Fmu, rates_change: bool) -> float:
 @dataclass(frozen=True)
 class Evaluation:
     """How outputs of an FMU are evaluated: `set_inputs` from the signals, then `read`. places: of
-    the outputs among the signals."""
+    the outputs among the signals; held: of values of holds, and of the samples that these are."""
 
     needs: Sequence[Connection]
+    held: Sequence[tuple[slice, NDArray[np.intp]]]
     places: Sequence[int]
     set_inputs: Callable[[Vector], object]
     read: Callable[[], object]
@@ -109,16 +111,19 @@ class Evaluation:
 @dataclass(frozen=True)
 class StartOrder:
     """The evaluations of the outputs of loaded FMUs at t = 0: in groups, each with whether its
-    outputs depend on each other, and whole FMUs."""
+    outputs depend on each other, and whole FMUs; `sources`: the places on which some of these
+    depend."""
 
     groups: Sequence[tuple[bool, Sequence[Evaluation]]]
     every: Sequence[Evaluation]
+    sources: Sequence[int]
 
     @classmethod
     def of(cls, fmus: LoadedFmus) -> StartOrder:
         start, system = StartValues(fmus), fmus.system
         groups = [(g.is_loop, start.evaluations(g.members)) for g in order_start(system)]
-        return cls(groups, start.evaluations(whole_fmus(system)))
+        every = start.evaluations(whole_fmus(system))
+        return cls(groups, every, start.find_sources(every))
 
 
 def _set_nothing(signals: Vector) -> None:
@@ -137,8 +142,14 @@ class StartValues:
     def _evaluation(self, outputs: StartOutputs) -> Evaluation:
         instance, first = self._fmus.instances[outputs.fmu], self._signals.fmu(outputs.fmu).start
         whole = len(outputs.outputs) == len(instance.outputs)
+        signals = self._signals
         return Evaluation(
             outputs.needs,
+            [
+                (signals.hold(c.name), np.array(signals.sources(c), np.intp))
+                for c in outputs.needs
+                if c.hold
+            ],
             [first + i for i in outputs.outputs],
             self._fmus.setter(outputs.needs, self._signals.places)
             if outputs.needs
@@ -150,9 +161,8 @@ class StartValues:
         """All outputs of `evaluations` by the signals as they are."""
         values = self._signals.values
         for each in evaluations:
-            for c in each.needs:
-                if c.hold:
-                    values[self._signals.hold(c.name)] = values[self._signals.sources(c)]
+            for held, samples in each.held:
+                values[held] = values[samples]
             each.set_inputs(values)
         for each in evaluations:
             each.read()

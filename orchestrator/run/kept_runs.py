@@ -1,6 +1,6 @@
-"""Runs that a process keeps for the next system that differs from theirs in start values alone:
-FMUs, holds, meters and operations stay as they are, and their memory is put back to what it was
-before the start.
+"""Runs that a process keeps for the next system that differs from theirs in start values and
+clocks alone: FMUs, holds and meters stay as they are, and their memory is put back to what it was
+before the start; with the same clocks operations stay too.
 
 A run is kept if C carries out all of it, in FMUs that can be reset, with results in memory; and if
 it came to its end without a fault, and nothing in the memory of the loop has grown.
@@ -11,7 +11,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ from hapticlink.orchestrator.run.compiled.structures import POINTERS
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.system import System
 
-MOST = 4
+MOST = 8
 """Runs that a process keeps."""
 Words = NDArray[np.uint64]
 
@@ -125,13 +125,21 @@ class KeptRun:
                 raise fault
         return all([instance.reset() for instance in instances])
 
-    def begin_again(self, system: System, results: RunResults, stack: ExitStack) -> None:
-        """Stand before the first event of a run of `system`. Raises as a start does."""
+    def begin_again(self, plan: Plan, results: RunResults, stack: ExitStack) -> KeptRun:
+        """This run, before the first event of one of the system of `plan`. Raises as a start
+        does."""
+        again = self
         self.memory.put_back()
         self.loop.complete = 0
-        self.simulation.begin_again(system, results, stack)
+        same_time = plan.system.timeline == self.simulation.system.timeline
+        self.simulation.begin_again(plan.system, results, stack)
         self.simulation.start()
-        self.loop.begin_again()
+        if same_time:
+            self.loop.begin_again()
+        else:
+            self.loop.take_plan(plan)
+            again = replace(self, plan=plan)
+        return again
 
 
 _RUNS: shelf.Shelf[KeptRun] = shelf.Shelf(MOST, lambda run: run.opened.close())
@@ -150,7 +158,7 @@ def may_be_kept(simulation: Simulation, results: RunResults) -> bool:
 
 
 def take(system: System) -> KeptRun | None:
-    """A run whose system differs from `system` in start values alone."""
+    """A run whose system differs from `system` in start values and clocks alone."""
     return _RUNS.take(lambda run: run.simulation.system.is_alike(system))
 
 

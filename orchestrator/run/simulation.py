@@ -69,7 +69,6 @@ class Simulation(LoadedFmus):
         self.late = 0
         self.loops_at_start = False
         self._order: StartOrder | None = None
-        self.seconds = system.timeline.seconds
         self._results, self._stack = results, stack
         repeated = system.coupling.scheme == "iterated"
         self.step_checks = {
@@ -80,13 +79,18 @@ class Simulation(LoadedFmus):
             and StepCheck.possible(fmu.description)
         }
         self.loop = structures.Loop()
-        self.loop.fill(system.timeline.base, "numerator", "denominator")
         self.loop.fill(self.signals, "values")
         self.holds, self.springs = make_holds(library, self.loop, self.signals)
         self.meters = Meters(library, self.signals)
         self.balance = Balance(self.signals)
+        self._take_time()
         self.recorders: dict[str, Recorder] = {}
         self.setters: dict[tuple[str, bool], Set] = {}
+
+    def _take_time(self) -> None:
+        time = self.system.timeline
+        self.seconds, self.meters.tick_s = time.seconds, float(time.base)
+        self.loop.fill(time.base, "numerator", "denominator")
 
     def _dismiss(self) -> None:
         for instance in self.instances.values():
@@ -113,9 +117,11 @@ class Simulation(LoadedFmus):
         return self._order
 
     def begin_again(self, system: System, results: RunResults, stack: ExitStack) -> None:
-        """Stand as before `start`, for a `system` that differs in start values alone. The memory of
-        the loop is put back by whoever keeps it."""
+        """Stand as before `start`, for a `system` that differs in start values and clocks alone.
+        The memory of the loop is put back by whoever keeps it."""
         self.system, self._results, self._stack = system, results, stack
+        self.signals.system = system
+        self._take_time()
         for fmu in system.fmus:
             instance = self.instances[fmu.name]
             assert isinstance(instance, InProcess)

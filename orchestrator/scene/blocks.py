@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
@@ -35,6 +35,8 @@ class BlockPlan:
     settings: dict[str, Any]
     engine: str | None = None
     """The physics engine by which it is made, in place of our equations."""
+    starts: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """Start values of its variables, by name, that are not among the settings."""
 
 
 @dataclass(frozen=True)

@@ -108,14 +108,17 @@ def _key(option: str) -> tuple[tuple[str, ...], str, str]:
     return tuple(name.strip() for name in key.split(".")), equals, text
 
 
-def apply(data: dict[str, Any], option: str) -> Path:
+def apply(
+    data: dict[str, Any], option: str, parsed: tuple[tuple[str, ...], Any] | None = None
+) -> Path:
     """Set the key in `data`; returns the path of the key, or of the first table created for it.
+    parsed: what `parse` gives for the option, if that is known.
 
     Entries of an array of tables are addressed by name or by index (from 0), and + appends one:
     `linkage.body.link1.mass=2`, `fmu.+={ name = "filter", path = "filter.fmu" }`.
     Raises InputFault where there is no such entry, or where a part of the key is no table.
     """
-    names, value = parse(option)
+    names, value = parsed or parse(option)
     names = flatten_path(names)
     node: Any = data
     path: Path = ()

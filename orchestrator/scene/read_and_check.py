@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from copy import deepcopy
 from dataclasses import replace
-from itertools import islice
+from itertools import compress, islice
+from operator import not_
 from pathlib import Path as FilePath
 
 import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
+from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
 from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
 from hapticlink.orchestrator.scene.rates import find_traces, read_frame_times
@@ -43,16 +44,18 @@ def read_scene(
 
 def from_source(source: Source) -> Scene:
     """The scene of the tables of `source`, changed by its options; raises as `read` does."""
-    data, set_by = deepcopy(dict(source.tables)), dict(source.set_by)
+    data, set_by = plain(dict(source.tables)), dict(source.set_by)
     # Options of the family come first, since others may change the bodies that it expands to.
-    of_family = [o for o in source.options if families.is_argument(overrides.parse(o)[0])]
-    set_by |= {overrides.apply(data, option): option for option in of_family}
+    given = [(option, overrides.parse(option)) for option in source.options]
+    of_family = [families.is_argument(names) for _, (names, _) in given]
+    set_by |= {overrides.apply(data, *each): each[0] for each in compress(given, of_family)}
     try:
         data = with_family(data)
     except families.FamilyError as error:
         origin = replace(source, tables=data, options=(), set_by=set_by)
         raise SceneFault(source.name, [origin.finding(error.path, error.message)]) from None
-    set_by |= {overrides.apply(data, o): o for o in source.options if o not in of_family}
+    others = compress(given, map(not_, of_family))
+    set_by |= {overrides.apply(data, *each): each[0] for each in others}
     origin = replace(source, tables=data, options=(), set_by=set_by)
 
     moved: dict[int, int] = {}

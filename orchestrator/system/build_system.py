@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import plugins, shelf, temporary_folders
 from hapticlink.orchestrator.base.errors import SceneFault
@@ -34,6 +33,7 @@ from hapticlink.orchestrator.system.assign_holds import assign, find_energy_port
 from hapticlink.orchestrator.system.connections import check_partial_vectors, connect, with_texts
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.outputs_to_record import choose_outputs, read_recorded
+from hapticlink.orchestrator.system.start_values import separate_start_values
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
     Connection,
@@ -55,60 +55,70 @@ def build_system(scene: Scene, starts: Mapping[str, Starts] | None = None) -> It
     """
     with temporary_folders.folder_if_needed() as room:
         planned = blocks(scene)
-        time = timeline(scene, planned)
-        files = fmu_files(scene, planned, time, room, starts=starts)
         if starts is not None:
+            time = timeline(scene, planned)
+            files = fmu_files(scene, planned, time, room, starts=starts)
             yield _assemble(scene, planned, time, files, exported=True)
+            return
+        planned = separate_start_values(planned)
+        made_of = MadeOf.of(scene, planned)
+        known = made_of and _SYSTEMS.take(lambda item: item.made_of == made_of)
+        time = known.system.timeline if known else timeline(scene, planned)
+        files = fmu_files(scene, planned, time, room)
+        described = [describe_once(files[b.name]) for b in planned.own]
+        if known and known.described != described:
+            known, time = None, timeline(scene, planned)
+        if known:
+            system = _with_starts(scene, planned, known.system)
         else:
-            yield _assemble_once(scene, planned, time, files)
+            system = _assemble(scene, planned, time, files)
+        if made_of:
+            _SYSTEMS.put(known or Assembled(made_of, described, system))
+        yield system
+
+
+MAX_SYSTEMS = 32
+"""Systems that a process keeps; those that differ in start values alone count as one."""
 
 
 @dataclass(frozen=True)
-class Assembled:
-    """A system with all that it follows from but start values: the scene without these, its events
-    as text, in which 0.0 is not -0.0, nor 1 true, the common settings of its blocks, and what their
-    FMU files contain."""
+class MadeOf:
+    """What a system follows from but start values: the scene without these, its events as text, in
+    which 0.0 is not -0.0, nor 1 true, and the common settings of its blocks."""
 
     scene: Scene
     events: str
     settings: Sequence[tuple[str, Mapping[str, Any]]]
+
+    @classmethod
+    def of(cls, scene: Scene, planned: Blocks) -> MadeOf | None:
+        """None where this process keeps no system, or FMUs of others may change."""
+        if not shelf.is_keeping() or scene.fmu or scene.connection or plugins.list_plugins():
+            return None
+        common = replace(
+            scene.plain(),
+            title="",
+            description="",
+            hand=None,
+            hands={},
+            controller=None,
+            controllers={},
+            linkage=scene.linkage and replace(scene.linkage, start={}),
+        )
+        return cls(common, repr(scene.at), [(b.name, b.settings) for b in planned.own])
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """A system that this process keeps for others that differ in start values alone, what it is
+    made of, and what its FMU files contain."""
+
+    made_of: MadeOf
     described: Sequence[Description]
     system: System
 
 
-_SYSTEMS: shelf.Shelf[Assembled] = shelf.Shelf(8)
-
-
-def _assemble_once(
-    scene: Scene, planned: Blocks, time: Timeline, files: Mapping[str, Path]
-) -> System:
-    """As `_assemble`; of scenes that differ in start values alone, which this process assembles one
-    after the other, only these are set anew."""
-    if not shelf.is_keeping() or scene.fmu or scene.connection or plugins.list_plugins():
-        return _assemble(scene, planned, time, files)
-    common = replace(
-        scene.plain(),
-        title="",
-        description="",
-        hand=None,
-        hands={},
-        controller=None,
-        controllers={},
-    )
-    events = repr(scene.at)
-    settings = [(b.name, without_start_values(b.block, b.settings)[0]) for b in planned.own]
-    described = [describe_once(files[b.name]) for b in planned.own]
-
-    def is_same(known: Assembled) -> bool:
-        own = known.events, known.described, known.settings, known.scene
-        return own == (events, described, settings, common)
-
-    if known := _SYSTEMS.take(is_same):
-        system = _with_starts(scene, planned, known.system)
-    else:
-        system = _assemble(scene, planned, time, files)
-    _SYSTEMS.put(known or Assembled(common, events, settings, described, system))
-    return system
+_SYSTEMS: shelf.Shelf[Assembled] = shelf.Shelf(MAX_SYSTEMS)
 
 
 def _with_starts(scene: Scene, planned: Blocks, system: System) -> System:
@@ -193,11 +203,11 @@ def _assemble(
 
 def _started(fmu: Fmu, block: BlockPlan) -> Fmu:
     """A block's FMU with the start values that its settings give parameters."""
-    _, starts = without_start_values(block.block, block.settings)
     given = (
         (s, value)
-        for parameter, values in starts.items()
-        for s, value in zip(fmu.description.port(parameter, "parameter"), values, strict=True)
+        for port, values in block.starts.items()
+        if (scalars := fmu.description.port(port, "parameter", "input"))
+        for s, value in zip(scalars, values, strict=True)
     )
     return replace(fmu, starts=tuple(given))
 

@@ -12,7 +12,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.fmus.blocks import Starts, find_block, has_compiled
 from hapticlink.fmus.cache import folder, remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
@@ -61,7 +60,7 @@ def fmu_files(
     the settings (a loop that does not close), Fault where the compiler fails.
     """
     every = (*blocks.built, *blocks.engines)
-    begun = count(1)
+    begun, cached_in = count(1), folder()
 
     def find(block: BlockPlan) -> Path | Callable[[], Path]:
         interrupt.raise_if_interrupted()
@@ -69,8 +68,6 @@ def fmu_files(
         given: Starts = {}
         experiment: dict[str, float] = {}
         settings, packaging = block.settings, scene.packaging
-        if starts is None and block in blocks.own:
-            settings, _ = without_start_values(block.block, settings)
         if _prefers_compiled.get() and not block.engine and has_compiled(block.block, settings):
             packaging = "native"
         if starts is not None:
@@ -90,7 +87,7 @@ def fmu_files(
         }
         compiled = packaging == "native" and not block.engine
         compiler = compiler_version() if compiled else ""
-        made_of = repr((block.block, settings, how, folder(), compiler))
+        made_of = repr((block.block, settings, how, cached_in, compiler))
         if path := _find_again(made_of):
             return path
         own = room / block.name  # two hands are two files of one name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 
@@ -197,10 +198,25 @@ class System:
         return fmu if fmu in self.replacements else self.fmu[fmu].description.block
 
     def is_alike(self, other: System) -> bool:
-        """Whether `other` differs in start values of FMUs alone, and no hold depends on these."""
+        """Whether `other` differs in start values of FMUs and the ticks of its clocks alone, and no
+        hold depends on these."""
         if any(c.needs in ("spring", "power") for c in self.connections):
             return self == other
-        return _without_starts(self) == _without_starts(other)
+        return self._of_objects == other._of_objects
+
+    @cached_property
+    def _of_objects(self) -> tuple[object, ...]:
+        """What the objects of a run are made of: the system without start values and gains of
+        springs, but with their names and number, the clocks' ticks only where latencies are drawn
+        in these, and the values of changes as text, in which 0.0 is not -0.0."""
+        fmus = tuple(replace(fmu, starts=()) for fmu in self.fmus)
+        names = [[scalar.name for scalar, _ in fmu.starts] for fmu in self.fmus]
+        changed = repr([change.values for change in self.changes])
+        time = self.timeline
+        late = any(c.latency for c in self.connections)
+        clocks = time if late else ([c.name for c in time.clocks], time.of)
+        rest = replace(self, fmus=fmus, energy=replace(self.energy, springs=()), timeline=_NO_TIME)
+        return rest, names, len(self.energy.springs), changed, clocks
 
     def into(self, name: str) -> tuple[Connection, ...]:
         return tuple(c for c in self.connections if c.target == name and not c.initial)
@@ -209,15 +225,7 @@ class System:
         return tuple(c for c in self.connections if c.source == name and not c.initial)
 
 
-def _without_starts(system: System) -> tuple[object, ...]:
-    """The system without start values and gains of springs, the names of those, the number of
-    springs, and the values of changes as text, in which 0.0 is not -0.0."""
-    fmus = tuple(replace(fmu, starts=()) for fmu in system.fmus)
-    energy = replace(system.energy, springs=())
-    names = [[scalar.name for scalar, _ in fmu.starts] for fmu in system.fmus]
-    changed = repr([change.values for change in system.changes])
-    rest = replace(system, fmus=fmus, energy=energy)
-    return rest, names, len(system.energy.springs), changed
+_NO_TIME = Timeline(Fraction(1), 0, (), {})
 
 
 @dataclass(frozen=True)

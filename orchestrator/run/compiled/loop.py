@@ -152,12 +152,25 @@ class CompiledLoop:
     """
 
     def __init__(self, plan: Plan, simulation: Simulation) -> None:
-        self._plan, self._simulation = plan, simulation
-        self._delays: dict[int, dict[str, Delay]] = {}
+        self._simulation, self.complete = simulation, 0
         self._machine = machine = Machine(simulation)
-        timeline, pace = plan.system.timeline, simulation.pace
-        self.change_hold, self.in_python, self.complete = machine.change_hold, machine.in_python, 0
-        self.events = Events(machine, timeline, self._block, pace, simulation.sides)
+        self.change_hold, self.in_python = machine.change_hold, machine.in_python
+        self._take(plan)
+
+    def _take(self, plan: Plan) -> None:
+        self._plan, simulation = plan, self._simulation
+        self._delays: dict[int, dict[str, Delay]] = {}
+        timeline = plan.system.timeline
+        self.events = Events(
+            self._machine, timeline, self._block, simulation.pace, simulation.sides
+        )
+
+    def take_plan(self, plan: Plan) -> None:
+        """Stand at the first event of another plan, for the objects that there are."""
+        self._machine.forget_operations()
+        self._machine.begin_again()
+        self._take(plan)
+        self.events.prepare(self.events.coming())
 
     def begin_again(self) -> None:
         """Stand at the first event, with the kinds of events that are known."""

@@ -99,6 +99,11 @@ class Machine:
         self.loop.fill(ops=(Op * len(self._ops))(*self._ops))
         return first, len(self._instructions)
 
+    def forget_operations(self) -> None:
+        """Be without operations, but with all that they work on."""
+        for each in (self._instructions, self._records, self._ops, self._points, self.in_python):
+            each.clear()
+
     def joined(self, sequence: Sequence[Instruction]) -> Call:
         """One call that carries out a sequence of instructions at a tick."""
         first, last = self.block(sequence)

@@ -95,14 +95,14 @@ def _grown(array: Rows, rows: int) -> Rows:
 
 class Meters:
     """One meter for each connection that carries power, of the efforts that its target gets: `of`
-    by its name, of_source and of_target the names by FMU. The gets and sets of a run update them
-    (`instructions`)."""
+    by its name, of_source and of_target the names by FMU; tick_s: a tick (s). The gets and sets of
+    a run update them (`instructions`)."""
 
     def __init__(self, library: ctypes.CDLL, signals: SignalVector) -> None:
         self.of: dict[str, Meter] = {}
         self.of_source: dict[str, list[str]] = {}
         self.of_target: dict[str, list[str]] = {}
-        self._seconds, self._values = float(signals.system.timeline.base), signals.values
+        self.tick_s, self._values = float(signals.system.timeline.base), signals.values
         for c, readers in metered(signals):
             self.of[c.name] = Meter(library, *readers)
             self.of_source.setdefault(c.source, []).append(c.name)
@@ -123,7 +123,7 @@ class Meters:
 
     def energies(self) -> dict[str, Energy]:
         """The energies (J) of each connection that carries power, by its name."""
-        return {name: meter.energy(self._seconds) for name, meter in self.of.items()}
+        return {name: meter.energy(self.tick_s) for name, meter in self.of.items()}
 
 
 def metered(signals: SignalVector) -> Iterator[tuple[Connection, tuple[Reader, Reader, Reader]]]:

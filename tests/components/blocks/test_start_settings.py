@@ -43,11 +43,12 @@ def _cases() -> Iterator[tuple[str, dict[str, Any]]]:
         yield "controller", {"controller": spec, "linkage": LINKAGE, "directions": Directions()}
 
 
-def _content(of: Component) -> dict[str, Any]:
-    """All of a component but the start values of its parameters."""
+def content(of: Component, *started: str) -> dict[str, Any]:
+    """All of a component but the start values of its parameters, and of others that are
+    `started`."""
     functions = (of.initialize, of.step, of.output, of.substep)
     return {f.name: getattr(of, f.name) for f in fields(of)} | {
-        "parameters": [replace(v, start=0.0) for v in of.parameters],
+        **{n: [replace(v, start=0.0) for v in getattr(of, n)] for n in ("parameters", *started)},
         "look_ups": [vars(look_up).keys() for look_up in of.look_ups],
         "functions": [f and f.serialize() for f in functions],
         **dict.fromkeys(("initialize", "step", "output", "substep")),
@@ -58,7 +59,7 @@ def _content(of: Component) -> dict[str, Any]:
 def test_only_start_values_of_parameters_change(block: str, settings: dict[str, Any]) -> None:
     common, starts = without_start_values(block, settings)
     whole, of_common = component(block, settings), component(block, common)
-    assert _content(whole) == _content(of_common)
+    assert content(whole) == content(of_common)
     assert starts
     started = {v.name: starts.get(v.name, v.starts) for v in of_common.parameters}
     assert started == {v.name: v.starts for v in whole.parameters}

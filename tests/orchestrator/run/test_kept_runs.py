@@ -2,6 +2,7 @@
 runs give, to the byte."""
 
 import random
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -11,13 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.base import shelf
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.experiment import Experiment, simulate
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.run import execute_plan, kept_runs
-from hapticlink.orchestrator.system import fmu_files
+from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
+from hapticlink.orchestrator.system import build_system, fmu_files
 from hapticlink.orchestrator.system.fmu_files import prefer_compiled
 
 BASE = ("packaging=native", "duration=0.25")
@@ -38,6 +41,8 @@ KEYS: dict[str, list[str]] = {
     "coupling": ["jacobi"],
     "duration": ["0.2"],
     "at": ['[{ time = 0.1, set = { "hand.wrench" = [-0.1, 0.0, 0.0] } }]'],
+    "linkage.start.shoulder1": ["0.7", "0.85", "2.5"],  # of which the last one does not close
+    "linkage.start.elbow2": ["1.5", "-1.5"],
     "stop_when": ["'haptic_device.workspace_margin < 1.0'"],
 }
 DIVERGES = ("graphics.rate=4", "duration=2.0", "controller.teleoperation.stiffness=[9e4, 9e4, 9e2]")
@@ -116,6 +121,12 @@ def test_draws_of_gains_and_hands_of_other_scenes(scene: str, tmp_path: Path) ->
 
 ZEROS = (
     ("pendulum", "linkage.start.pivot={}", "0.0", "-0.0"),
+    (
+        "serial",
+        "linkage.start={}",
+        "{ shoulder1 = 0.0, elbow1 = -1.5 }",
+        "{ shoulder1 = -0.0, elbow1 = -1.5 }",
+    ),
     ("closed-loop-ideal", AT, "0.0", "-0.0"),
     ("closed-loop-ideal", AT, "1.0", "1"),
     ("closed-loop-ideal", AT, "1.0", "true"),  # which is refused
@@ -201,6 +212,40 @@ def test_gains_and_hands_load_no_fmu_and_prepare_nothing(
             simulate("closed-loop-ideal", tmp_path / "run", options, in_memory=True)
     assert len(prepared) == 1
     assert len(loads) == len({*loads})
+
+
+def test_rates_and_start_poses_load_no_fmu_and_build_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of other clocks the operations are made anew, of other poses nothing."""
+    made = Counter[str]()
+
+    def count(of: Any, name: str) -> None:
+        function = getattr(of, name)
+        monkeypatch.setattr(of, name, lambda *a, **k: (made.update([name]), function(*a, **k))[1])
+
+    for of, name in (
+        (InProcess, "_load"),
+        (fmu_files, "find_block"),
+        (build_system, "_assemble"),
+        (experiment, "setup"),
+        (execute_plan, "Simulation"),
+        (CompiledLoop, "take_plan"),
+    ):
+        count(of, name)
+    rates, poses = ("25", "37.4", "60"), ("0.7", "0.75", "0.8", "0.85", "0.9")
+    points = [f"graphics.rate={rate}" for rate in rates]
+    points += [f"linkage.start.shoulder1={pose}" for pose in poses]
+    with nothing_kept(), process_cache.keep_unpacked():
+        found = [
+            simulate("closed-loop-ideal", tmp_path / "run", (*BASE, point), in_memory=True)
+            for point in points
+        ]
+    blocks = len(found[0].system.fmus)
+    assert made["_load"] == made["find_block"] == blocks
+    assert made["Simulation"] == 1
+    assert made["take_plan"] == len(rates)  # and back to the scene's rate
+    assert made["_assemble"] == made["setup"] == len(rates) + 1
 
 
 def test_an_fmu_that_cannot_be_reset_is_loaded_again(
