@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6050,
+    "components": 6141,
     "fmus": 2816,
-    "orchestrator": 13417,
+    "orchestrator": 13421,
     "programs": 1021,
-    "analysis": 7303,
+    "analysis": 7313,
     "visualization": 3371,
     "api": 448,
     "commands": 1409,

@@ -10,7 +10,7 @@ in more than three quarters of the draws are within the spread.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from hapticlink.analysis.search.settings import GAINS, HOLDS
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.run_sweep import sweep
+from hapticlink.components.specs.device import Observer
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import InputFault
@@ -43,6 +44,8 @@ ROUND = 8
 """Methods of a round."""
 OWN = "own"
 """The gains of the scene."""
+OTHER_OBSERVER = "device.observer.law=kalman"
+"""Which with encoders changes more than holds do (results/observer)."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,8 @@ class Advice:
     others: tuple[Measured, ...]
     screened: Mapping[Method, Row]
     limits: AcceptanceLimits
+    kalman: Measured | None = None
+    """`taken` with OTHER_OBSERVER, where the scene has the default observer of encoders."""
 
     def lines(self) -> Iterator[str]:
         """The result as text."""
@@ -114,6 +119,8 @@ class Advice:
             )
         yield f"take {self.taken.line}"
         yield from (f"  {as_command_line(option)}" for option in self.taken.method.options)
+        if self.kalman:
+            yield f"with {as_command_line(OTHER_OBSERVER)} too: {self.kalman.line}"
         for name, found in (("within the spread", self.ties), ("others", self.others)):
             if found:
                 yield f"{name}:"
@@ -179,7 +186,13 @@ def advise(
 
     ranked = _distinct(sorted(methods, key=rank), screened)
     ran = judge_best_first(ranked, on_all, lambda one: one.admitted, ROUND)
-    return _chosen(read.title, list(ran), screened, limits)
+    advice = _chosen(read.title, list(ran), screened, limits)
+    if read.sensing == "ideal" or replace(read.device.observer, beside=False) != Observer():
+        return advice
+    other, taken = (*options, OTHER_OBSERVER), advice.taken.method
+    draws_of_all = [(), *around]
+    found = on_draws(scene, other, [taken], draws_of_all, folder, processes=processes, tell=tell)
+    return replace(advice, kalman=_measured(taken, found[taken], limits))
 
 
 def all_methods(read: Scene) -> list[Method]:

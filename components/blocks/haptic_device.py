@@ -19,21 +19,20 @@ and tau_applied, the torques of the step that ends, 0 at t = 0.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import casadi as ca
 
 from hapticlink.components import integrators
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.device import pantograph
+from hapticlink.components.device import observer_laws, pantograph
 from hapticlink.components.device.motors_and_encoders import count
-from hapticlink.components.device.observer import HandleObserver, ObservedHandle
 from hapticlink.components.device.variables import (
     ENCODERS,
     F_HAND_OBSERVED,
     FRICTION,
     GEOMETRY,
     INERTIA,
-    OBSERVER_STATES,
     STOPS,
     TORQUE_LIMIT,
     X_START,
@@ -42,7 +41,6 @@ from hapticlink.components.device.variables import (
     Rows,
     V,
     X,
-    observer_gains,
     variables,
 )
 from hapticlink.components.port_space import PLANE
@@ -123,7 +121,7 @@ _COUNTED = BlockPart(
     "encoders", r"$q = \Delta\,[\varphi(x_D) / \Delta]$", "section 4.2.1, fig. 4.2",
     ("x_true", "encoder_resolution"), ("q", "counts", "q_true"),
 )  # fmt: skip
-_OBSERVED = (
+_NICOSIA = (
     BlockPart(
         "encoders", r"$x = \arg\min_x \|\varphi(x)$" "\n" r"$- \Delta\,[\varphi(x_D) / \Delta]\|$",
         "section 4.2.1, fig. 4.2",
@@ -138,6 +136,23 @@ _OBSERVED = (
         ("x", "tau", "omega_n", "k_D"), ("v", "F_hand_observed", "x_observer", "v_observer"),
     ),
 )  # fmt: skip
+
+
+def _observer_parts(block: Block) -> tuple[BlockPart, ...]:
+    """The parts of encoders and observer."""
+    if "k_D" in block.p:
+        return _NICOSIA
+    period = ("step_size",) if "step_size" in block.p else ()
+    kalman = BlockPart(
+        "Kalman observer",
+        r"$M_d \dot{v} = J_q^T \tau - C_d v + F_h,\ \dot{x} = v$" "\n"
+        r"$e = (J_q^T J_q)^{-1} J_q^T (q - \varphi(x))$" "\n"
+        r"$x, v, F_h \mathrel{+}= g_1 e,\ g_2 e,\ M_d g_3 e$",
+        "",
+        ("q", "tau", "omega_n", *period),
+        ("x", "v", "F_hand_observed", "x_observer", "v_observer", "F_observer"),
+    )  # fmt: skip
+    return replace(_COUNTED, gives=("q",)), kalman
 
 
 def _twin_part(block: Block) -> BlockPart:
@@ -188,20 +203,21 @@ def _with_observer(device: Device) -> Component:
         parameters=[
             *_parameters(device, (*TORQUE_LIMIT, *STOPS)),
             *encoders,
-            *observer_gains(device),
+            *observer_laws.parameters(device),
         ],
-        states=[*_STATES, *OBSERVER_STATES],
+        states=[*_STATES, *observer_laws.states(device)],
         outputs=[X, V, F_HAND_OBSERVED, M, C, *_TRUE_OUTPUTS],
     )
     u, p = block.u, block.p
-    observer = HandleObserver(pantograph, p, device.observer.rule)
-    now = ObservedHandle.of(block.x)
-    tau = pantograph.motor_torques(u["F_motor"], now.pose, p)
+    observer = observer_laws.observer(device, p)
+    now = observer.read(block.x)
+    output = observer.outputs(now)
+    tau = pantograph.motor_torques(u["F_motor"], output["x"], p)
     motion = _motion(block, device, tau)
     first = observer.start(_measured(block, p["x_start"])[0], p["x_start"])
     after = observer.advance(now, _measured(block, motion["x_true"])[0], tau, block.h)
-    output = observer.outputs(now)
-    sensing, parts = "encoders and observer", [_MOTORS, _twin_part(block), *_OBSERVED, _MATRICES]
+    sensing, observed = "encoders and observer", _observer_parts(block)
+    parts = [_MOTORS, _twin_part(block), *observed, _MATRICES]
     return _component(block, sensing, first.states, motion | after.states, output, parts)
 
 

@@ -7,7 +7,8 @@ an observer within the device. a = M^-1 (J_q' tau + F_hand_observed - c) is the 
 before t_k. The first sample starts the observer: at rest, without a force, at the pose next to
 x_start that belongs to q.
 
-The equations are in components/device/observer.py, the device's kinematics in pantograph.py.
+The equations are in components/device/observer.py and kalman_observer.py, the device's kinematics
+in pantograph.py.
 """
 
 from __future__ import annotations
@@ -15,19 +16,16 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.device import pantograph
-from hapticlink.components.device.observer import HandleObserver, ObservedHandle
+from hapticlink.components.device import observer_laws, pantograph
 from hapticlink.components.device.variables import (
     F_HAND_OBSERVED,
     GEOMETRY,
     INERTIA,
-    OBSERVER_STATES,
     X_START,
     C,
     M,
     V,
     X,
-    observer_gains,
     variables,
 )
 from hapticlink.components.port_space import PLANE
@@ -49,18 +47,17 @@ def observer(device: Device) -> Component:
         parameters=[
             X_START,
             *variables(device, (*GEOMETRY, *INERTIA), "fixed"),
-            *observer_gains(device),
+            *observer_laws.parameters(device),
         ],
-        states=[*OBSERVER_STATES, _PERIOD],
+        states=[*observer_laws.states(device), _PERIOD],
         outputs=[X, V, _A, F_HAND_OBSERVED, M, C],
     )
     x, u, p = block.x, block.u, block.p
-    law = HandleObserver(pantograph, p, device.observer.rule)
-    before = ObservedHandle.of(x)
-    now = law.advance(before, u["q"], u["tau"], x["period"])
-    first = law.start(u["q"], p["x_start"])
-    # The first output advances the start by a period of 0, which finds the pose again from x_start.
-    initial = first._replace(pose=p["x_start"]).states | {"period": ca.SX(0)}
+    law = observer_laws.observer(device, p)
+    now = law.advance(law.read(x), u["q"], u["tau"], x["period"])
+    # The first output advances the start by a period of 0.
+    first = law.start(u["q"], p["x_start"]).unsampled(p["x_start"])
+    initial = first.states | {"period": ca.SX(0)}
     return block.component(
         "observer",
         "Observer of a twin pantograph's handle and of the hand's wrench on it",

@@ -88,8 +88,10 @@ class Kinematics(Protocol):
     """What the observer asks of a device, as functions of its parameters p: `pantograph`. Poses and
     velocities are (n,), angles and torques of the motors (m,)."""
 
-    def pose_from_angles(self, angles: ca.SX, guess: ca.SX, p: Parameters) -> ca.SX:
-        """The pose whose angles are nearest to those measured."""
+    def pose_from_angles(
+        self, angles: ca.SX, guess: ca.SX, p: Parameters, iterations: int = 2
+    ) -> ca.SX:
+        """The pose whose angles are nearest to those measured, by steps of Gauss-Newton."""
 
     def jacobian(self, pose: ca.SX, p: Parameters) -> ca.SX:
         """Of the angles with respect to the pose, (m, n)."""
@@ -107,16 +109,16 @@ class ObservedHandle(NamedTuple):
     pose: ca.SX
     state: State
 
-    @classmethod
-    def of(cls, x: Mapping[str, ca.SX]) -> ObservedHandle:
-        """That of a block with `OBSERVER_STATES`."""
-        return cls(x["x_measured"], State(x["x_observer"], x["v_observer"]))
-
     @property
     def states(self) -> dict[str, ca.SX]:
-        """By the names of `OBSERVER_STATES`."""
+        """By the names that they have in a block."""
         x1, x2 = self.state
         return {"x_measured": self.pose, "x_observer": x1, "v_observer": x2}
+
+    def unsampled(self, guess: ca.SX) -> ObservedHandle:
+        """The state before a first sample at which it is advanced by a period of 0: the pose is
+        found again from the guess."""
+        return self._replace(pose=guess)
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,10 @@ class HandleObserver:
     device: Kinematics
     p: Parameters
     rule: str
+
+    def read(self, x: Mapping[str, ca.SX]) -> ObservedHandle:
+        """That of a block with the states x."""
+        return ObservedHandle(x["x_measured"], State(x["x_observer"], x["v_observer"]))
 
     def start(self, angles: ca.SX, guess: ca.SX) -> ObservedHandle:
         """The handle at rest, without a force, with measured angles (rad) near a guessed pose."""

@@ -1,5 +1,5 @@
 """Variables that blocks of the device share: parameters by their names in [device], and what the
-observer puts out and keeps."""
+observer puts out."""
 
 from __future__ import annotations
 
@@ -17,11 +17,6 @@ F_HAND_OBSERVED = Variable(
 )
 M = Variable("M", *PLANE.inertia, 0.0, "inertia of the device at the handle", kind="semidefinite")
 C = Variable("c", *PLANE.wrench, description="C_d v, Coriolis and centrifugal terms at the handle")
-OBSERVER_STATES = (
-    Variable("x_measured", *PLANE.pose, description="pose from the encoders"),
-    Variable("x_observer", *PLANE.pose, description="observer state x1"),
-    Variable("v_observer", *PLANE.twist, description="observer state x2"),
-)
 
 X_START = Variable("x_start", *PLANE.pose, 0.0, "pose of the handle at the start", "fixed")
 GEOMETRY: Rows = (
@@ -62,13 +57,4 @@ def variables(device: Device, rows: Rows, variability: Variability) -> list[Vari
     return [
         Variable(name, (), unit, getattr(device, name), text, variability)
         for name, unit, text in rows
-    ]
-
-
-def observer_gains(device: Device) -> list[Variable]:
-    """Those of the device's observer."""
-    gains = device.observer
-    return [
-        Variable("omega_n", (), "rad/s", gains.omega_n, "bandwidth of the observer"),
-        Variable("k_D", (), "1/s", gains.k_D, "output gain of the observer"),
     ]

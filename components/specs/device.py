@@ -19,14 +19,18 @@ from hapticlink.components.specs.quantities import (
 
 @dataclass(frozen=True, kw_only=True)
 class Observer:
-    """Nicosia observer of the handle's velocity and of the hand's wrench (section 4.2.1)."""
+    """Observer of the handle's velocity and of the hand's wrench (section 4.2.1)."""
 
+    law: Literal["nicosia", "kalman"] = "nicosia"
+    """nicosia: the report's; kalman: pose, velocity and wrench by the device's dynamics, with about
+    half the tracking error at as much noise ([the device](device.md#the-kalman-observer))."""
     rule: Literal["forward", "backward", "trapezoidal"] = "backward"
-    """Discretisation rule of section 1.3.1."""
-    omega_n: Annotated[float, Quantity("rad/s", gt=0)] = 50.0
-    """Bandwidth."""
+    """Discretisation rule of section 1.3.1; of nicosia."""
+    omega_n: Annotated[float, Quantity("rad/s", gt=0)] | None = None
+    """Bandwidth; by default 50, of kalman that at which counts make an error of the force of 0.05 N
+    (rms), by inertia, counts and haptic rate."""
     k_D: Annotated[float, Quantity("1/s", gt=0)] = 100.0
-    """Output gain."""
+    """Output gain; of nicosia."""
     beside: bool = False
     """true: the observer is an FMU of its own beside the device. The device then takes torques
     and puts out base angles, as an observed device from elsewhere does; the numbers are the same.

@@ -63,6 +63,7 @@ CASES = {
         "closed-loop-ideal", f'{HALF}; {SLOW}; holds={{"virtual_mechanism.x"="foh-derivative"}}',
     ),
     "observer beside": ("closed-loop", f"{HALF}; device.observer.beside=true"),
+    "kalman": ("closed-loop", f"{HALF}; device.observer.law=kalman; haptics.rate=600"),
     "mean": ("two-users", "duration=0.2; downsampling=mean"),
 }  # fmt: skip
 """Scenes, and their options, each after "; "."""

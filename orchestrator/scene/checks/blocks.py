@@ -50,8 +50,7 @@ def check_needed_tables(scene: Scene) -> Iterator[Problem]:
         yield ("hand",), "[hand] holds a device or a linkage: add one, or take it out"
     if scene.sensing == "encoders" and not scene.device:
         yield ("sensing",), "'encoders' are the device's: add [device], or take sensing out"
-    if scene.sensing == "ideal":
-        yield from _observers(scene)
+    yield from _observers(scene)
     if not scene.graphics:
         if scene.mechanism_at == "graphics":
             yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
@@ -65,12 +64,18 @@ def check_needed_tables(scene: Scene) -> Iterator[Problem]:
 
 
 def _observers(scene: Scene) -> Iterator[Problem]:
-    """A problem for each observer that is asked for beside a device whose sensing is ideal."""
+    """A problem for each observer that is asked for beside a device whose sensing is ideal, and for
+    each key of a law that its observer does not have."""
     for user, device in scene.all_devices.items():
-        if device.observer.beside:
-            table: Path = ("devices", user) if user else ("device",)
+        spec = device.observer
+        table: Path = (*(("devices", user) if user else ("device",)), "observer")
+        if scene.sensing == "ideal" and spec.beside:
             message = (
                 "true, and with sensing = 'ideal' nothing is observed: take sensing = 'encoders', "
                 "or take it out"
             )
-            yield (*table, "observer", "beside"), message
+            yield (*table, "beside"), message
+        for key in ("rule", "k_D") if spec.law == "kalman" else ():
+            if getattr(spec, key) != getattr(type(spec)(), key):
+                message = "is of law = 'nicosia', and law = 'kalman' has no such key: take it out"
+                yield (*table, key), message

@@ -69,6 +69,25 @@ def test_a_scene_without_a_hand_gets_no_advice(tmp_path: Path) -> None:
         advise.advise("pendulum", (), tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("own", "told"),
+    [((), True), (("device.observer.k_D=120",), False), (("sensing=ideal",), False)],
+)
+def test_what_another_observer_makes_of_the_advice_is_what_its_run_says(
+    own: tuple[str, ...], told: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(advise, "HOLDS", {"zoh": advise.HOLDS["zoh"]})
+    monkeypatch.setattr(advise, "GAINS", {})
+    given = ("duration=0.3", "controller.bias=full", *own)
+    found = advise.advise("closed-loop", given, tmp_path, count=1)
+    lines = [line for line in found.lines() if advise.OTHER_OBSERVER in line]
+    assert len(lines) == told
+    if found.kalman:
+        run = hl.run("closed-loop", (*given, "hold=zoh", advise.OTHER_OBSERVER), figures=False)
+        assert found.kalman.error_mm[0] == run.measures().tracking[""].max_mm
+        assert found.kalman.error_mm[0] < found.taken.error_mm[0]
+
+
 def test_the_advice_of_a_scene_is_what_its_runs_say(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,6 +39,11 @@ CASES = {
         {**HELD, "graphics.rate": 128, "sensing": "encoders", "device.observer.beside": True},
         NORM,
     ),
+    "kalman": (
+        "closed-loop-direct",
+        {**HELD, "graphics.rate": 128, "sensing": "encoders", "device.observer.law": "kalman"},
+        NORM,
+    ),
     "graphics copy": ("closed-loop-ideal", {**HELD, "graphics.rate": 128}, NORM),
 }  # fmt: skip
 """Scene, options, and how many outputs of an FMU may have no slope at the equilibrium."""

@@ -145,22 +145,26 @@ def test_theta_is_continuous_over_many_turns():
     assert abs(y["x"][2] - y["x_true"][2]) < 6e-3
 
 
-@pytest.mark.parametrize("rule", ["forward", "backward", "trapezoidal"])
-def test_observer_converges_to_a_constant_force(rule):
+@pytest.mark.parametrize(
+    "own", [*({"rule": r} for r in ("forward", "backward", "trapezoidal")), {"law": "kalman"}]
+)
+def test_observer_converges_to_a_constant_force(own):
     """The motors balance the hand: the device stays, and the observed force is the hand's."""
     component = haptic_device(
-        Device(encoder_resolution=1e-6, observer=Observer(rule=rule)), encoders=True
+        Device(encoder_resolution=1e-6, observer=Observer(**own, omega_n=50.0)), encoders=True
     )
     hand = np.array([0.4, -0.3, 0.003])
     device = advance(at_start(component, F_hand=hand, F_motor=-hand), 1.0, 512)
     np.testing.assert_allclose(device.y["F_hand_observed"], hand, atol=2e-3 * np.abs(hand).max())
-    np.testing.assert_allclose(device.y["v"], 0, atol=2e-3)
+    np.testing.assert_allclose(device.y["v"], device.y["v_true"], atol=2e-3)
+    np.testing.assert_allclose(device.y["v_true"], 0, atol=4e-3)
 
 
-def test_observer_follows_a_moving_device():
+@pytest.mark.parametrize("law", ["nicosia", "kalman"])
+def test_observer_follows_a_moving_device(law):
     """A free push for 0.2 s, encoders of 0.09 degrees: force to .1 N, velocity to 10 mm/s."""
     hand = np.array([-0.3, 0.1, -0.001])
-    device = at_start(ENCODERS, F_hand=hand)
+    device = at_start(haptic_device(Device(observer=Observer(law=law)), True), F_hand=hand)
     forces, velocities = [], []
     for k in range(120):
         device.step(T)
@@ -189,7 +193,11 @@ def declared():
     found = {}
     for record in (Device, Observer):
         for name, hint in typing.get_type_hints(record, include_extras=True).items():
-            beside = getattr(hint, "__metadata__", ())
+            given = next(
+                (one for one in (hint, *typing.get_args(hint)) if hasattr(one, "__metadata__")),
+                hint,
+            )
+            beside = getattr(given, "__metadata__", ())
             found.update((name, each.unit) for each in beside if isinstance(each, Quantity))
     return found
 

@@ -39,10 +39,12 @@ class Beside:
         return seen
 
 
-@pytest.mark.parametrize("rule", ["forward", "backward", "trapezoidal"])
-def test_beside_the_device_it_sees_the_same_bits_at_any_steps(rule):
+@pytest.mark.parametrize(
+    "own", [*({"rule": r} for r in ("forward", "backward", "trapezoidal")), {"law": "kalman"}]
+)
+def test_beside_the_device_it_sees_the_same_bits_at_any_steps(own):
     def spec(beside):
-        return Device(observer=Observer(rule=rule, beside=beside))
+        return Device(observer=Observer(**own, beside=beside))
 
     within = Running(haptic_device(spec(False), True), {"F_hand": HAND}, {"x_start": START})
     beside = Beside(spec(True), F_hand=HAND)
@@ -64,10 +66,12 @@ def test_it_starts_at_rest_at_the_pose_of_its_angles():
         np.testing.assert_array_equal(seen[name], 0)
 
 
-def test_the_acceleration_is_that_of_the_true_motion():
+@pytest.mark.parametrize("law", ["nicosia", "kalman"])
+def test_the_acceleration_is_that_of_the_true_motion(law):
     """With fine encoders and known torques, against differences of the true velocity over a step,
     the acceleration in the middle of it."""
-    system = Beside(Device(encoder_resolution=1e-9, observer=Observer(beside=True)))
+    spec = Observer(law=law, omega_n=50.0, beside=True)
+    system = Beside(Device(encoder_resolution=1e-9, observer=spec))
     v, a = [], []
     for _ in range(240):
         a.append(system.step(T, MOTORS)["a"])

@@ -35,6 +35,7 @@ def texts(scene: str, options: tuple[tuple[str, Any], ...] = ()) -> Mapping[str,
 CASES = [
     ("device", "closed-loop", {}, "encoders", "closed-loop-ideal", {}),
     ("device", "closed-loop", {}, "Nicosia observer", "closed-loop-ideal", {}),
+    ("device", "closed-loop", {"device.observer.law": "kalman"}, "Kalman", "closed-loop", {}),
     ("device", "closed-loop-ideal", {}, "ideal sensing", "closed-loop", {}),
     ("device", "closed-loop", {}, "F_T", "closed-loop", {"controller.topology": False}),
     ("device", "closed-loop", {"controller.bias": "full"}, "a_{bias}", "closed-loop", {}),

@@ -1,0 +1,37 @@
+"""`python -m studies.observer`: what has no row in sweeps/observer yet is run, and results/observer
+written."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+from hapticlink.orchestrator.base import plugins
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m studies.observer", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("results/observer"))
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    asked = parser.parse_args()
+    plugins.load(("studies.observer.tried_observer",))
+    from hapticlink.analysis.sweep import table
+    from hapticlink.analysis.sweep.run_sweep import sweep
+    from studies.observer import cases, measure, page
+
+    jobs = cases.jobs()
+    every = max(1, len(jobs) // 20)
+
+    def tell(done: int) -> None:
+        if done % every == 0:
+            print(f"{done} of {len(jobs)} runs", flush=True)
+
+    rows = sweep(jobs, Path("sweeps/observer"), asked.jobs, tell=tell, measure=measure.of_run)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    table.write(asked.out / "runs.csv", [page.rounded(row) for row in rows])
+    print(page.write(asked.out, rows))
+
+
+if __name__ == "__main__":
+    main()
