@@ -160,7 +160,8 @@ def _indefinite(draw: Generator, A: Matrix) -> Matrix:
     """A with its first eigenvalue turned negative."""
     values, vectors = np.linalg.eigh(A)
     values[-1 if values[-1] > 0 else 0] *= -(10.0 ** draw.uniform(-2, 0))
-    return np.asarray(vectors @ np.diag(values) @ vectors.T)
+    made: Matrix = vectors @ np.diag(values) @ vectors.T
+    return (made + made.T) / 2
 
 
 @dataclass(frozen=True)

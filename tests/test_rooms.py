@@ -34,12 +34,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 5908,
     "fmus": 2816,
-    "orchestrator": 13020,
+    "orchestrator": 13036,
     "programs": 1021,
-    "analysis": 7089,
-    "visualization": 3333,
-    "api": 435,
-    "commands": 1397,
+    "analysis": 7375,
+    "visualization": 3377,
+    "api": 454,
+    "commands": 1445,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
