@@ -7,7 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hapticlink.analysis.maps.stability_map import Map, compute_map
+from hapticlink.analysis.maps.z_width import compute_z_width
 from hapticlink.analysis.sweep.grid import Vary, axes
+from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene import overrides
@@ -39,14 +41,50 @@ def stability_map(
     """
     from hapticlink.visualization.figures import stability_map_figure as drawing
 
-    if jobs is not None and jobs < 1:
-        raise InputFault(f"--jobs {jobs}: give 1 or more")
     if check < 0:
         raise InputFault(f"--check {check}: give 0 or more")
-    folder = folders.ensure(out)
-    processes = jobs or os.cpu_count() or 1
+    processes, folder = _processes(jobs), folders.ensure(out)
     tell = progress or (lambda done, of: None)
     given = overrides.write_options(options)
     found = compute_map(scene, given, axes(vary), folder, processes, check, seed, tell)
     figure_files.save({"map": drawing.draw(found)}, folder)
     return found
+
+
+def z_width(
+    scene: str | Path | Scene,
+    largest: str,
+    vary: Vary,
+    options: Options = (),
+    *,
+    out: str | Path,
+    jobs: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Row]:
+    """The largest value of a key with which a scene is stable in its own hand, and with which its
+    user's port is passive, at each combination of `vary` (as in `sweep`): a row for each, with
+    `largest_stable`, `largest_passive` and how each search ended, in `stable` and `passive`
+    ("limit", "at least", "none" or "refused"). `largest` is `key=value`, where the search begins,
+    e.g. "fmu.wall.start.stiffness=1000"; a list is scaled as a whole, and told by its first entry.
+    Walls with counts also have `largest_without_cycles`, and `cycle_m` (m) and `cycle_hz` of the
+    longest limit cycle between two counts at the first value.
+
+    Writes z-width.csv and z-width.png to `out`; the same call continues an interrupted one. Raises
+    InputFault for invalid input, Fault if it is interrupted.
+    """
+    from hapticlink.visualization.figures import z_width_figure as drawing
+
+    processes, folder = _processes(jobs), folders.ensure(out)
+    tell = progress or (lambda done, of: None)
+    over = axes(vary)
+    rows = compute_z_width(
+        scene, overrides.write_options(options), largest, over, folder, processes, tell
+    )
+    figure_files.save({"z-width": drawing.draw(rows, largest.partition("=")[0], over)}, folder)
+    return rows
+
+
+def _processes(jobs: int | None) -> int:
+    if jobs is not None and jobs < 1:
+        raise InputFault(f"--jobs {jobs}: give 1 or more")
+    return jobs or os.cpu_count() or 1

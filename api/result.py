@@ -74,8 +74,9 @@ class Run(Results):
         largest of each wrench (N); `motors`, the largest share of their torque limit; `closure_m`;
         `constrained`, the numbers of constrained directions; `folded`, frames with a folded
         graphics copy; `port`, the energy at the user's port (J); `held`, the energy of each hold
-        (J); `held_contacts`, what new frames of contacts did. Those of paths, forces and torques
-        are until a time (s), the others of the whole run.
+        (J); `held_contacts`, what new frames of contacts did; `noticed`, what a hand would notice,
+        by user. Those of paths, forces and torques are until a time (s), the others of the whole
+        run.
         """
         return Measures(self, until)
 

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 from hapticlink.commands.options import PRINTED, UNCHANGED, Output, Scene, SceneOptions, title
 from hapticlink.commands.progress import count_runs, steps, time_command, waiting
 from hapticlink.commands.sweep import Jobs, Vary
+from hapticlink.orchestrator.results.numbers import short
 
 if TYPE_CHECKING:
     from hapticlink.analysis.maps.stability_map import Map
@@ -37,6 +38,13 @@ Check = Annotated[
     Parameter(help="Points of the map to be checked by runs, near the boundary and far away."),
 ]
 Seed = Annotated[int, Parameter(help="Seed of the choice of these points.")]
+Largest = Annotated[
+    str | None,
+    Parameter(
+        help="key=value, with --vary: the largest stable and the largest passive value of the key, "
+        "searched from this one on, at each combination of the others."
+    ),
+]
 
 
 def stability(
@@ -51,6 +59,7 @@ def stability(
     equilibrium: Equilibrium = False,
     port: UserPort = False,
     vary: Vary = None,
+    largest: Largest = None,
     check: Check = 0,
     seed: Seed = 0,
     jobs: Jobs = None,
@@ -63,7 +72,8 @@ def stability(
     (default `runs/SCENE`, with options `runs/SCENE,key=value,...`).
 
     With --vary, a map over one or two numeric keys and others, refined at the boundary: map.csv
-    and map.png in OUT (default maps/SCENE); the same command continues an interrupted map.
+    and map.png in OUT (default maps/SCENE); the same command continues an interrupted map. With
+    --largest, the Z-width: z-width.csv and z-width.png.
 
     For example:
 
@@ -72,10 +82,14 @@ def stability(
         hapticlink stability virtual-wall --set fmu.wall.start.stiffness=5000
         hapticlink stability virtual-wall --port
         hapticlink stability virtual-wall --vary fmu.wall.start.stiffness=2000..8000:4 --check 2
+        hapticlink stability virtual-wall --largest fmu.wall.start.stiffness=1000 \\
+            --vary linkage.joint.rail.damping=1,5
     """
     import hapticlink as hl
 
     given, name, quiet = changes.options, title(scene), output.quiet
+    if largest:
+        return _z_width(scene, largest, vary or [], changes, jobs, output)
     if vary:
         folder = output.out or changes.folder("maps", scene)
         command = f"hapticlink stability {scene} --vary {' --vary '.join(vary)}"
@@ -119,6 +133,51 @@ def stability(
     write_json(folders.ensure(folder) / "stability.json", record)
     output.show(f"{name}: {judged.finding}", (*lines, f"{folder}/stability.json"), record)
     return 0
+
+
+def _z_width(
+    scene: str,
+    largest: str,
+    vary: Sequence[str],
+    changes: SceneOptions,
+    jobs: int | None,
+    output: Output,
+) -> int:
+    import hapticlink as hl
+
+    if not vary:
+        raise hl.InputFault("--largest needs --vary: over which keys, e.g. --vary haptics.rate=512")
+    folder, quiet = output.out or changes.folder("maps", scene), output.quiet
+    command = f"hapticlink stability {scene} --largest {largest} --vary {' --vary '.join(vary)}"
+    with time_command(command, hidden=quiet), count_runs(scene, hidden=quiet) as count:
+        rows = hl.z_width(
+            scene, largest, vary, changes.options, out=folder, jobs=jobs, progress=count
+        )
+    lines = [*_of_limits(rows, [text.partition("=")[0] for text in vary])]
+    found = {"folder": str(folder), "rows": rows}
+    key = largest.partition("=")[0]
+    files = f"{folder}/: z-width.csv, z-width.png"
+    output.show(f"{title(scene)}: largest {key}", [*lines, files], found)
+    return 0
+
+
+def _of_limits(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> Iterator[str]:
+    """A line for each point of a Z-width."""
+    for row in rows:
+        point = ", ".join(f"{key}={row[key]}" for key in keys)
+        said = []
+        for what in ("stable", "passive", "without_cycles"):
+            kind, value = row.get(what), short(row.get(f"largest_{what}") or 0.0)
+            name = what.replace("_", " limit ")
+            if kind:
+                end = {"limit": f"up to {value}", "at least": f"at least up to {value}"}
+                said.append(f"{name} {end.get(kind, 'with none that was tried')}")
+        if "cycle_m" in row:
+            cycle = f"{short(1e6 * row['cycle_m'])} um at {short(row['cycle_hz'])} Hz"
+            said.append(
+                f"where the search begins, limit cycles between two counts of up to {cycle}"
+            )
+        yield f"{point}: {'; '.join(said) or row.get('message', '')}"
 
 
 def _of_map(points: Map, keys: Sequence[str]) -> Iterator[str]:

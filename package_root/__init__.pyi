@@ -20,6 +20,7 @@ from hapticlink.api.compare import compare as compare
 from hapticlink.api.files import build as build
 from hapticlink.api.files import export as export
 from hapticlink.api.maps import stability_map as stability_map
+from hapticlink.api.maps import z_width as z_width
 from hapticlink.api.real_time import RealTime as RealTime
 from hapticlink.api.replay import Replay as Replay
 from hapticlink.api.replay import view as view

@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6141,
     "fmus": 2816,
-    "orchestrator": 13421,
+    "orchestrator": 13437,
     "programs": 1021,
-    "analysis": 7313,
-    "visualization": 3371,
-    "api": 448,
-    "commands": 1409,
+    "analysis": 7599,
+    "visualization": 3415,
+    "api": 467,
+    "commands": 1457,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.episodes import Episode, saturations
 from hapticlink.analysis.findings.forces import largest_torque, torques, wrenches
+from hapticlink.analysis.findings.noticed import noticed
 from hapticlink.analysis.findings.tracking import (
     UserSignals,
     constraint_counts,
@@ -25,7 +26,7 @@ from hapticlink.analysis.findings.user_port import user_port
 from hapticlink.orchestrator.base.signal_names import CLOSURE_ERROR
 from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import all_devices
-from hapticlink.orchestrator.results.run_record import Energy, HeldContacts, PortEnergy
+from hapticlink.orchestrator.results.run_record import Energy, HeldContacts, Noticed, PortEnergy
 
 
 class TrackingError(NamedTuple):
@@ -143,6 +144,11 @@ class Measures:
         from hapticlink.analysis.findings import held_contacts  # casadi
 
         return held_contacts.held_contacts(self._results)
+
+    @cached_property
+    def noticed(self) -> dict[str, Noticed]:
+        """What the hands of users with a device would notice in the whole run."""
+        return noticed(self._results)
 
     @cached_property
     def held(self) -> dict[str, Energy]:

@@ -13,6 +13,7 @@ from hapticlink.analysis.findings import friction_speed
 from hapticlink.analysis.findings.changes_of_point import describe_changes
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
+from hapticlink.analysis.findings.noticed import describe_noticed
 from hapticlink.analysis.findings.report_premises import describe_experiment
 from hapticlink.analysis.findings.tracking import UserSignals, of_block, of_port
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
@@ -62,6 +63,7 @@ def find(results: Results) -> Findings:
     record = {"user_port": port and content(port), "warnings": warned}
     if held:
         record["held_contacts"] = content(held)
+    record["noticed"] = {user: content(each) for user, each in measures.noticed.items()}
     return Findings(record, tuple(numbers(results, measures)))
 
 
@@ -127,6 +129,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
         peaks = (f"{name} {short(force)} N" for name, force in measures.forces.items())
         yield f"largest forces: {'; '.join(peaks)}"
         yield from _describe_saturation(measures)
+    yield from describe_noticed(measures.noticed)
     if port := measures.port:
         yield _energy(port, results.record.scene["record"]["every"])
     yield from describe_changes(results)

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, matrix_balance
 
+from hapticlink.analysis.findings.noticed import VIBRATION
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault
 
@@ -45,9 +46,6 @@ DOUBLED = 2.0
 """Spectral radius up to which a growing mode may be marginal."""
 NEAR = 1e-4
 """Largest |z - 1| of a neutral mode, however uncertain z is: one further off may grow."""
-
-VIBRATION = 40.0
-"""Frequency (Hz) from which on a mode is a vibration."""
 
 
 @dataclass(frozen=True)

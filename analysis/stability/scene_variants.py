@@ -14,6 +14,9 @@ import numpy as np
 
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.modes import judged_modes, modes, verdict
+from hapticlink.analysis.stability.passivity import Passivity
+from hapticlink.analysis.stability.passivity import of as passivity_of
+from hapticlink.analysis.stability.port_response import LARGEST, forces, hand_port
 from hapticlink.analysis.stability.poses import in_own_hand
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.smooth_scene import linearisable
@@ -73,6 +76,24 @@ class SceneVariants:
     def judge(self, options: Options) -> Radius:
         """The spectral radius of the scene with `options`, around its equilibrium in its own hand.
         Raises InputFault and FmuFault where it has none."""
+        self._rest(options)
+        hands = {HAND: hand_slopes(self._hand, self._place.T)} if self._hand else {}
+        period = self._place.period({}).held(hands)
+        leading = judged_modes(modes(period.linear, self._place.map.period))[:1]
+        radius, uncertainty = (abs(leading[0].z), leading[0].uncertainty) if leading else (0.0, 0.0)
+        return Radius(radius, uncertainty, self._place.map.period)
+
+    def port(self, options: Options) -> Passivity:
+        """The passivity of the user's port of the scene with `options`, without its two-port.
+        Raises as `judge` and `passivity`."""
+        self._rest(options)
+        hand = hand_port(self._place.map.system)
+        if (count := forces(self._place.map, hand, None)) > LARGEST:
+            raise InputFault(f"user's port: {count} forces in a hyperperiod, at most {LARGEST}")
+        return passivity_of(self._scene.title, self._place.period({}), hand, None, self._place.T)
+
+    def _rest(self, options: Options) -> None:
+        """Puts the scene with `options` at its equilibrium."""
         read = open_scene.load(self._scene, options)
         with linearisable(read) as (_, system, _):
             kind, starts = _kind(system), _starts(system)
@@ -83,11 +104,6 @@ class SceneVariants:
             self._kind = None
             raise
         self._starts = starts
-        hands = {HAND: hand_slopes(self._hand, self._place.T)} if self._hand else {}
-        period = self._place.period({}).held(hands)
-        leading = judged_modes(modes(period.linear, self._place.map.period))[:1]
-        radius, uncertainty = (abs(leading[0].z), leading[0].uncertainty) if leading else (0.0, 0.0)
-        return Radius(radius, uncertainty, self._place.map.period)
 
     def _load(self, read: Scene, kind: Hashable) -> None:
         self._open.close()

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from hapticlink.analysis.findings.noticed import DIRECTION, FORCE
 from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.hand_cases import Case, InHands
 from hapticlink.analysis.stability.hands import FREE, HANDS, free
@@ -48,13 +49,6 @@ from hapticlink.orchestrator.base.terminal_output import align_columns
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
-
-FORCE = 0.1
-"""Differential threshold of a force, 5 to 10 % from 2.5 to 10 N: Pang, Tan, Durlach, Perception &
-Psychophysics 49 (1991), 531."""
-DIRECTION = 25.6
-"""That of the direction of a force (degrees), by touch alone: Barbagli, Salisbury, Ho, Spence, Tan,
-ACM Trans. Applied Perception 3 (2006), 125."""
 
 HERTZ = np.geomspace(0.5, 50.0, 41)
 """The frequencies, up to the fastest that a hand is moved at and beyond."""

@@ -273,11 +273,42 @@ class HeldContacts:
 
 
 @dataclass(frozen=True)
+class NoticedError:
+    """For how long (s) of how many a hand would notice the tracking error, the force (N) of this
+    error where it is farthest beyond a threshold, beside the hand's, and when (s)."""
+
+    seconds: float
+    of: float
+    error: float
+    force: float
+    time: float
+
+
+@dataclass(frozen=True)
+class Shaking:
+    """The largest amplitude (m/s2) of a handle's acceleration at frequencies of vibration, and when
+    (s)."""
+
+    amplitude: float
+    time: float
+
+
+@dataclass(frozen=True)
+class Noticed:
+    """What a hand would notice (`analysis/findings/noticed.py`), None where it is not known."""
+
+    tracking: NoticedError | None
+    shaking: Shaking | None
+
+
+@dataclass(frozen=True)
 class RunRecord(RunEnding, RunSetup):
     """The content of run.json, which a run that was recovered has together with `recovered`."""
 
     user_port: PortEnergy | None = None
     held_contacts: HeldContacts | None = None
+    noticed: dict[str, Noticed] = field(default_factory=dict)
+    """By user, the first one's name empty."""
     warnings: list[str] | None = None
     """None of a run that goes on or was killed."""
 
@@ -288,7 +319,7 @@ class RunRecord(RunEnding, RunSetup):
         return in_time or bool(self.network)
 
 
-def content(section: RunSetup | RunEnding | PortEnergy | HeldContacts) -> dict[str, Any]:
+def content(section: RunSetup | RunEnding | PortEnergy | HeldContacts | Noticed) -> dict[str, Any]:
     """A section as run.json has it, in the same order; its end without what is not known."""
     values: dict[str, Any] = plain(section)
     if "end" in values:

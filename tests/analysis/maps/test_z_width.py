@@ -1,0 +1,107 @@
+"""Z-width: limits against closed forms, and how they are told."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis.maps import z_width
+from hapticlink.analysis.stability import wall_limits
+from tests.analysis.stability.own_hand import DAMPED as WALL
+
+M, D, T, QUANTUM, FRICTION = 0.3, 5.0, 1 / 512, 1e-4, 0.05
+STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
+FIRST = f"{STIFFNESS}=1000"
+
+
+def test_limits_are_those_of_the_closed_forms(tmp_path: Path) -> None:
+    """The lifted map knows nothing of them; a search is told to a thousandth, on the side that
+    holds."""
+    rows = hl.z_width(
+        "virtual-wall",
+        FIRST,
+        [f"{DAMPING}=0,2", f"delays.wall.F=0,{T}"],
+        {**WALL, "fmu.wall.settings.quantum": QUANTUM, "linkage.joint.rail.friction": FRICTION},
+        out=tmp_path,
+        jobs=1,
+    )
+    assert len(rows) == 4
+    for row in rows:
+        B, periods = float(row[DAMPING]), round(float(row["delays.wall.F"]) / T)
+        stable = wall_limits.stable(M, D, T, periods, B)
+        assert (row["stable"], row["passive"]) == ("limit", "limit")
+        assert 0.9985 * stable < row["largest_stable"] < 1.0001 * stable
+        if not periods:
+            passive = wall_limits.passive(D, T, B)
+            assert 0.9985 * passive < row["largest_passive"] < 1.0005 * passive
+        assert row["largest_without_cycles"] == max(0.0, 2 * (FRICTION / QUANTUM - B / T))
+        # at the first stiffness, friction just holds the counts alone
+        assert ("cycle_m" in row) == (B > 0)
+    with (tmp_path / "z-width.csv").open(encoding="utf-8") as file:
+        assert [row["stable"] for row in csv.DictReader(file)] == ["limit"] * 4
+    assert (tmp_path / "z-width.png").stat().st_size > 10_000
+
+
+def test_a_limit_that_was_not_reached_is_none(tmp_path: Path) -> None:
+    """Behind much damping 2 b/T is beyond the search, which ends after ten doublings."""
+    (row,) = hl.z_width(
+        "virtual-wall",
+        f"{STIFFNESS}=100",
+        ["linkage.joint.rail.damping=500"],
+        WALL,
+        out=tmp_path,
+        jobs=1,
+    )
+    assert (row["stable"], row["passive"]) == ("at least", "at least")
+    assert row["largest_stable"] == pytest.approx(102400.0)
+
+
+@pytest.mark.parametrize(
+    ("limited", "value", "refused", "kind"),
+    [
+        (True, 2.0, {}, "limit"),
+        (False, 2.0, {}, "at least"),
+        (True, 2.0, {2.0001: "diverges"}, "at least"),
+        (True, 2.0, {4.0: "diverges"}, "limit"),
+        (True, 0.0, {}, "none"),
+        (True, 0.0, {1.0: "diverges"}, "refused"),
+    ],
+)
+def test_what_is_told_of_a_search(
+    limited: bool, value: float, refused: dict[float, str], kind: str
+) -> None:
+    assert z_width._kind(z_width.Largest(value, limited), refused) == kind
+
+
+@pytest.mark.parametrize(
+    "first", ["stiffness", f"{STIFFNESS}=0", f"{STIFFNESS}=-3", f"{STIFFNESS}=[0.0, 1.0]", "a=no"]
+)
+def test_a_first_value_that_is_none_is_refused(first: str, tmp_path: Path) -> None:
+    with pytest.raises(hl.InputFault, match="--largest"):
+        hl.z_width("virtual-wall", first, ["haptics.rate=512"], WALL, out=tmp_path)
+
+
+def test_a_coupling_is_scaled_as_a_whole(tmp_path: Path) -> None:
+    """Half the graphics rate bears less; at the end of the search a run grows, just below not."""
+    options: dict[str, Any] = {
+        "hand": {
+            "type": "spring",
+            "stiffness": [300.0, 300.0, 1.0],
+            "damping": [5.0, 5.0, 0.01],
+            "target": [[0.0, 0.0445, 0.0148, -0.7878]],
+        }
+    }
+    rows = hl.z_width(
+        "closed-loop-direct",
+        "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
+        ["graphics.rate=32,64"],
+        options,
+        out=tmp_path,
+        jobs=1,
+    )
+    slow, fast = (row["largest_stable"] for row in rows)
+    assert 0 < slow < fast
