@@ -69,8 +69,10 @@ def z_width(
     Walls with counts also have `largest_without_cycles`, and `cycle_m` (m) and `cycle_hz` of the
     longest limit cycle between two counts at the first value.
 
-    Writes z-width.csv and z-width.png to `out`; the same call continues an interrupted one. Raises
-    InputFault for invalid input, Fault if it is interrupted.
+    Writes z-width.csv and z-width.png to `out`; the same call continues an interrupted one. `jobs`
+    is the number of processes; `progress` is called with the numbers of finished and of all
+    points. `options` are those of the scene. Raises InputFault for
+    invalid input, Fault if it is interrupted.
     """
     from hapticlink.visualization.figures import z_width_figure as drawing
 

@@ -46,20 +46,6 @@ def test_limits_are_those_of_the_closed_forms(tmp_path: Path) -> None:
     assert (tmp_path / "z-width.png").stat().st_size > 10_000
 
 
-def test_a_limit_that_was_not_reached_is_none(tmp_path: Path) -> None:
-    """Behind much damping 2 b/T is beyond the search, which ends after ten doublings."""
-    (row,) = hl.z_width(
-        "virtual-wall",
-        f"{STIFFNESS}=100",
-        ["linkage.joint.rail.damping=500"],
-        WALL,
-        out=tmp_path,
-        jobs=1,
-    )
-    assert (row["stable"], row["passive"]) == ("at least", "at least")
-    assert row["largest_stable"] == pytest.approx(102400.0)
-
-
 @pytest.mark.parametrize(
     ("limited", "value", "refused", "kind"),
     [
