@@ -37,7 +37,7 @@ CODE_LINES = {
     "orchestrator": 13054,
     "programs": 1021,
     "analysis": 7190,
-    "visualization": 3333,
+    "visualization": 3335,
     "api": 435,
     "commands": 1398,
 }
