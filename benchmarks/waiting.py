@@ -2,8 +2,8 @@
 the floors beneath them: Python with the modules of a run, and the event loop alone.
 
 Each command is a process of its own, with one thread of BLAS; of ROUNDS the least time counts,
-after one more that fills the cache. Memory is the largest that the process had. The counts of a
-verdict (equilibria searched, operations differentiated, products of matrices) depend on no machine.
+after one more that fills the cache. The counts of a verdict (equilibria searched, operations
+differentiated, products of matrices) depend on no machine.
 
 `HAPTICLINK_BEFORE`, the command `hapticlink` of another checkout, is measured by turns with this
 one. `beside` is the ratio of both while another process runs on the same core.
@@ -24,7 +24,7 @@ from benchmarks.rows import Rows
 from hapticlink.orchestrator.base import temporary_folders
 
 ROUNDS = 3
-COLUMNS = ("what", "before_s", "after_s", "beside", "memory_mb", "counts")
+COLUMNS = ("what", "before_s", "after_s", "beside", "counts")
 BEFORE = "HAPTICLINK_BEFORE"
 IMPORTS = "import hapticlink as hl, hapticlink.commands.run; hl.run"
 LOOP = """
@@ -58,10 +58,9 @@ VERDICTS = (
 
 @dataclass(frozen=True)
 class Taken:
-    """What a command took: processor time (s), memory (MB), and what it printed."""
+    """What a command took: processor time (s), and what it printed."""
 
     seconds: float
-    memory: float
     printed: str
 
 
@@ -76,7 +75,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
         progress(what, k, len(items))
         rows.add(what, *_measured(arguments, both, 1 if quick else ROUNDS))
     shown = [[row[column] or "-" for column in COLUMNS] for row in rows.rows.values()]
-    heads = "what | before (s) | after (s) | ratio beside a neighbour | memory (MB) | counts"
+    heads = "what | before (s) | after (s) | ratio beside a neighbour | counts"
     return "\n".join(
         [
             "# What a user waits for",
@@ -85,7 +84,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
             f"{system()}, at a load of {load_average():.1f}. What is measured: "
             "[waiting.py](../../benchmarks/waiting.py).",
             "",
-            *table(heads, "lrrrrl", shown),
+            *table(heads, "lrrrl", shown),
             "",
         ]
     )
@@ -115,10 +114,10 @@ def _long(seconds: int) -> list[str]:
 
 def _measured(
     arguments: list[str], both: list[str], rounds: int
-) -> tuple[float | str, float, float | str, float, str]:
+) -> tuple[float | str, float, float | str, str]:
     commands = [command for command in both if command]
     with temporary_folders.temporary_folder() as room:
-        first = {command: _take(command, arguments, room) for command in commands}
+        _least(commands, arguments, room, 1)
         quiet = _least(commands, arguments, room, rounds)
         ratio: float | str = ""
         if len(commands) > 1:
@@ -131,7 +130,7 @@ def _measured(
             told = {c: _take(c, ["-c", COUNTS, scene, *options], room).printed for c in commands}
             counts = " / ".join(text.strip() for text in told.values())
         before = round(quiet[commands[0]], 3) if len(commands) > 1 else ""
-        return before, round(quiet[both[1]], 3), ratio, round(first[both[1]].memory), counts
+        return before, round(quiet[both[1]], 3), ratio, counts
 
 
 def _least(
@@ -166,7 +165,7 @@ def _take(command: str, arguments: list[str], room: Path, core: int | None = Non
     seconds = usage.ru_utime + usage.ru_stime
     if arguments == ["-c", LOOP]:
         seconds = float(text.split()[-1])
-    return Taken(seconds, usage.ru_maxrss / 1e3, text)
+    return Taken(seconds, text)
 
 
 @contextmanager
