@@ -92,8 +92,9 @@ def _judge(job: Job, _: Path, key: str, values: Any) -> Row:
     unit = float(values[0] if many else values)
     row: Row = {"end": DONE}
     with SceneVariants(job.scene) as session:
-        row |= _largest(STABLE, unit, lambda s: session.judge([option(s)]).verdict == "stable")
-        row |= _largest(PASSIVE, unit, lambda s: session.port([option(s)]).passive)
+        row |= _largest(STABLE, unit, lambda s: session.judge([option(s)]).verdict)
+        passive = {True: PASSIVE, False: "not passive"}
+        row |= _largest(PASSIVE, unit, lambda s: passive[bool(session.port([option(s)]).passive)])
     wall = wall_closed_form.counted_wall(job.scene)
     if wall and key == wall_closed_form.START.format(wall.name, "stiffness"):
         row |= {f"largest_{QUIET}": wall.counted.quiet, QUIET: LIMIT}
@@ -102,21 +103,29 @@ def _judge(job: Job, _: Path, key: str, values: Any) -> Row:
     return row
 
 
-def _largest(what: str, unit: float, holds: Callable[[float], bool]) -> Row:
-    """The columns of a search."""
+def _largest(what: str, unit: float, verdict: Callable[[float], str]) -> Row:
+    """The columns of a search for the largest value with the verdict `what`; where none has it,
+    those that there were are told."""
     refused: dict[float, str] = {}
+    others: dict[str, None] = {}
 
     def tried(scale: float) -> bool:
         try:
-            return holds(scale)
+            given = verdict(scale)
         except (InputFault, FmuFault) as fault:
             refused[scale] = " ".join(str(fault).split())
             return False
+        if given != what:
+            others[given] = None
+        return given == what
 
     found = largest_scale(tried, FINE)
-    return {f"largest_{what}": unit * found.value, what: _kind(found, refused)} | (
-        {f"message_{what}": next(iter(refused.values()))} if refused else {}
-    )
+    row: Row = {f"largest_{what}": unit * found.value, what: _kind(found, refused)}
+    if refused:
+        return row | {f"message_{what}": next(iter(refused.values()))}
+    if not found.value:
+        return row | {f"message_{what}": f"all that was tried is {' or '.join(others)}"}
+    return row
 
 
 def _kind(found: Largest, refused: dict[float, str]) -> str:

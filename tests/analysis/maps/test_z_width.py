@@ -72,7 +72,7 @@ def test_a_first_value_that_is_none_is_refused(first: str, tmp_path: Path) -> No
 
 
 def test_a_coupling_is_scaled_as_a_whole(tmp_path: Path) -> None:
-    """Half the graphics rate bears less; at the end of the search a run grows, just below not."""
+    """Half the graphics rate bears less."""
     options: dict[str, Any] = {
         "hand": {
             "type": "spring",
@@ -91,3 +91,14 @@ def test_a_coupling_is_scaled_as_a_whole(tmp_path: Path) -> None:
     )
     slow, fast = (row["largest_stable"] for row in rows)
     assert 0 < slow < fast
+
+
+def test_where_nothing_is_stable_the_verdicts_are_told(tmp_path: Path) -> None:
+    """Damping by differences of B T > 2 m alone turns the velocity over at each step: no stiffness
+    helps."""
+    options = {**WALL, DAMPING: 500}
+    (row,) = hl.z_width(
+        "virtual-wall", FIRST, [f"delays.wall.F={T}"], options, out=tmp_path, jobs=1
+    )
+    assert (row["largest_stable"], row["stable"]) == (0.0, "none")
+    assert row["message_stable"] == "all that was tried is unstable"
