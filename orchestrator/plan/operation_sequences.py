@@ -35,11 +35,28 @@ def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
 
 
 def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:
-    """Read the outputs of an FMU and push them into the holds of its connections."""
+    """Read the outputs of an FMU and push them into the holds of its connections, but for those
+    that had them when its step began."""
     yield Get(fmu.name, ahead)
     for connection in system.out_of(fmu.name):
-        if connection.hold:
+        if connection.hold and connection.needs != "step":
             yield Push(connection.name, ahead)
+
+
+def publish_early(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
+    """Read the outputs of an FMU whose step was just taken from this event on, and push them into
+    the holds that want them now; they describe the end of the step."""
+    ahead = dticks(event, fmu)
+    yield Get(fmu.name, ahead)
+    for connection in system.out_of(fmu.name):
+        if connection.needs == "step":
+            yield Push(connection.name, ahead)
+
+
+def early_first(system: System, plants: list[Fmu]) -> tuple[list[Fmu], list[Fmu]]:
+    """The plants of clocks at which steps are taken early, and the others."""
+    clocks = {system.fmu[name].clock for name in system.early}
+    return [u for u in plants if u.clock in clocks], [u for u in plants if u.clock not in clocks]
 
 
 def publish_ended(system: System, event: Event, continuous: list[Fmu]) -> Iterator[Operation]:

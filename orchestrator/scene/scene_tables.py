@@ -204,6 +204,8 @@ class SetSpring:
     force: str = ""
     """The output that is F, which acts with - on the FMU that sets the far end: with it the energy
     that either side puts in is available to both."""
+    mobility: str = ""
+    """The input with the mobility of both ends, where F is all that moves them apart."""
 
     @property
     def ports(self) -> tuple[str, ...]:

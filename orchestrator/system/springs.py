@@ -13,6 +13,9 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.ports import size
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
+MOST = 6
+"""Entries of a spring-damper up to which its force is taken for the middle of a step."""
+
 
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     """The spring whose set position or set velocity a connection feeds; None if there is none."""
@@ -29,7 +32,7 @@ def find_declared_springs(
     for fmu in fmus:
         for spring in fmu.description.springs:
             if not {(fmu.name, spring.stiffness), (fmu.name, spring.damping)} & fed:
-                given = {port: getattr(spring, port) for port in SPRING_ENDS}
+                given = {port: getattr(spring, port) for port in (*SPRING_ENDS, "mobility")}
                 yield SetSpring(
                     stiffness=_start_values(fmu, spring.stiffness),
                     damping=_start_values(fmu, spring.damping),
@@ -44,14 +47,16 @@ def _start_values(fmu: Fmu, parameter: str) -> tuple[float, ...]:
 
 
 def find_limited_gains(system: System) -> set[str]:
-    """The gains, `fmu.parameter`, of springs whose energy a hold limits: its tank has their values
-    at the start, so that they may not change while the scene runs."""
+    """The gains, `fmu.parameter`, of springs whose energy a hold limits, or whose force it takes
+    for the middle of a step: it has their values at the start, so that they may not change while
+    the scene runs."""
     held = {_end(c) for c in system.connections if c.needs == "spring"}
+    mids = {(c.source, c.source_port) for c in system.connections if c.needs == "coupling"}
     return {
         f"{fmu.name}.{gain}"
         for fmu in system.fmus
         for spring in fmu.description.springs
-        if f"{fmu.name}.{spring.set_position}" in held
+        if f"{fmu.name}.{spring.set_position}" in held or (fmu.name, spring.force) in mids
         for gain in (spring.stiffness, spring.damping)
         if gain
     }
@@ -87,6 +92,25 @@ def why_unlimited(
     return None
 
 
+def ends(of: SetSpring) -> tuple[str, ...]:
+    """The inputs with both ends of a spring-damper, their rates and the mobility."""
+    return of.set_position, of.position, of.set_velocity, of.velocity, of.mobility
+
+
+def coupling(
+    c: Connection, springs: Iterable[SetSpring], connections: Iterable[Connection]
+) -> SetSpring | None:
+    """The spring-damper whose force a connection has, if both its ends move with a mobility that is
+    known, and each of these is brought by one connection."""
+    force, n = f"{c.source}.{c.source_port}", len(c.inputs)
+    own = next((s for s in springs if s.force == force and all(ends(s))), None)
+    if own is None or n > MOST:
+        return None
+    brought = {f"{k.target}.{k.target_port}": len(k.inputs) for k in connections if not k.initial}
+    sizes = [brought.get(end) for end in ends(own)]
+    return own if sizes == [n, n, n, n, n * n] else None
+
+
 def check_springs(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
     """A finding for each [[spring]] with ports that do not exist or that do not fit together."""
     for i, s in enumerate(scene.spring):
@@ -104,6 +128,9 @@ def check_springs(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
             elif inputs and entries != inputs:
                 message = f"{port} has {entries} entries, {s.set_position} {inputs}"
                 yield ("spring", i, end), message
+        if s.mobility and size(s.mobility, fmus, "input") != inputs * inputs:
+            message = f"there is no input {s.mobility} with {inputs} times {inputs} entries"
+            yield ("spring", i, "mobility"), message
         for gain in ("stiffness", "damping"):
             values = getattr(s, gain)
             if inputs and len(values) != inputs and (values or gain == "stiffness"):

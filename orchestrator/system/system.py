@@ -196,9 +196,15 @@ class System:
 
     def is_alike(self, other: System) -> bool:
         """Whether `other` differs in start values of FMUs alone, and no hold depends on these."""
-        if any(c.needs in ("spring", "power") for c in self.connections):
+        if any(c.needs in ("spring", "power", "coupling") for c in self.connections):
             return self == other
         return _without_starts(self) == _without_starts(other)
+
+    @cached_property
+    def early(self) -> frozenset[str]:
+        """The FMUs whose steps are taken as soon as they begin, before those of others: their
+        samples describe the end of a step."""
+        return frozenset(c.source for c in self.connections if c.needs == "step")
 
     def into(self, name: str) -> tuple[Connection, ...]:
         return tuple(c for c in self.connections if c.target == name and not c.initial)

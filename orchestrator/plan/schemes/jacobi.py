@@ -28,4 +28,6 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     for unit in started:
         if unit not in divided:
             operations += operation_sequences.step(system, event, unit)
+    for unit in (u for u in started if u.name in system.early):
+        operations += operation_sequences.publish_early(system, event, unit)
     return tuple(operations)
