@@ -1,0 +1,255 @@
+"""The hold that knows the model, with the mechanism at the graphics rate, against shipped holds.
+
+    python -m studies.model_hold results/model
+
+Every method runs on the same fresh draws of hands (SEED on, of which no choice was made) on each
+linkage of the study of the mismatch, with Coriolis compensation and ideal sensing. Cells, in which
+the rates and gains are those of below; the oracle has the mechanism at 512 Hz, so that nothing of
+it is held. Limits are those of `advise`. Writes README.md, runs.csv and model.png.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.search.acceptance import AcceptanceLimits, judged_numbers
+from hapticlink.analysis.search.settings import GAINS as NAMED
+from hapticlink.analysis.search.settings import HOLDS
+from hapticlink.analysis.sweep import table
+from hapticlink.analysis.sweep.job import Job, job
+from hapticlink.analysis.sweep.row import METRIC, Row
+from hapticlink.analysis.sweep.run_sweep import sweep
+from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator.experiment import Experiment
+from hapticlink.orchestrator.results import folders
+from hapticlink.orchestrator.results.numbers import short
+from studies.draw import BLUE, GREY, ORANGE, panels, save
+from studies.mismatch.cases import LINKAGES, Case
+
+SEED = 44001
+HANDS = ("constant", "profile", "arm 300")
+RATES = ("10", "20", "30", "10..50")
+FIRM = (
+    "controller.teleoperation.stiffness=[400, 400, 0.4]",
+    "controller.teleoperation.damping=[40, 40, 0.04]",
+)
+GAINS = {"soft": NAMED["soft"], "medium": NAMED["medium"], "firm": FIRM}
+SHIPPED = ("zoh", "foh", "second-order", "passive")
+METHODS = (*SHIPPED, "model")
+ORACLE = "oracle"
+WORSE = 1.05
+"""Ratio of errors from which on a method counts as worse."""
+Cell = tuple[str, str, str]
+"""Case, rate and gains."""
+
+
+def cases() -> list[Case]:
+    """The draws, each with a seed of its own."""
+    kinds = product(LINKAGES, HANDS)
+    return [Case(*kind, False, SEED + i) for i, kind in enumerate(kinds)]
+
+
+def runs() -> Iterator[Job]:
+    """All runs, case by case; the oracle's has no rate, and is taken at the first one."""
+    for case, gains, rate in product(cases(), GAINS, RATES):
+        for method in (*METHODS, *((ORACLE,) if rate == RATES[0] else ())):
+            yield _run(case, method, gains, rate)
+
+
+def _run(case: Case, method: str, gains: str, rate: str) -> Job:
+    options = [*case.options, *GAINS[gains], "controller.bias=full", "sensing=ideal"]
+    options.append("directions_from=mechanism")
+    varies = f"{{ min = 10, max = 50, seed = {case.seed} }}"
+    options.append(f"graphics.rate={varies if '..' in rate else rate}")
+    if method != ORACLE:
+        options += ["mechanism_at=graphics", *HOLDS[method]]
+    if method == "model":
+        options.append("downsampling=model")
+    point = {"case": case.name, "linkage": case.linkage, "hand": case.hand, "seed": str(case.seed)}
+    return job(case.scene, options, point | {"method": method, "gains": gains, "rate": rate})
+
+
+def _measure(experiment: Experiment) -> Row:
+    return judged_numbers(experiment.results)
+
+
+class Found:
+    """The runs by cell and method: errors (mm), and which are within the limits."""
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        limits = AcceptanceLimits.of(Device())
+        self.error: dict[Cell, dict[str, float]] = {}
+        for row in rows:
+            value = float(row[METRIC]) if not limits.why_not(row) else np.inf
+            for rate in RATES if row["method"] == ORACLE else (row["rate"],):
+                of = self.error.setdefault((row["case"], rate, row["gains"]), {})
+                of[row["method"]] = value
+
+    def within(self, method: str, cells: Iterable[Cell]) -> int:
+        return sum(np.isfinite(self.error[cell][method]) for cell in cells)
+
+    def best(self, case: str, rate: str, methods: Iterable[str]) -> float:
+        """The least error over gains and methods, infinite where none is within the limits."""
+        every = (self.error[case, rate, g][m] for g, m in product(GAINS, methods))
+        return float(min(every))
+
+    @property
+    def kept(self) -> list[Cell]:
+        """The cells in which the oracle keeps the limits."""
+        return [cell for cell, of in self.error.items() if np.isfinite(of[ORACLE])]
+
+    def ratios(self, rate: str) -> list[tuple[float, str]]:
+        """Best shipped over best `model` of each case, where one of both is within the limits."""
+        names = {case for case, *_ in self.error}
+        found = []
+        for case in sorted(names):
+            shipped, own = (self.best(case, rate, m) for m in (SHIPPED, ("model",)))
+            if np.isfinite(min(shipped, own)):
+                found.append((float(np.inf if np.isinf(shipped) else shipped / own), case))
+        return found
+
+
+def _quartiles(values: Sequence[float]) -> str:
+    if not values:
+        return ""
+    return ", ".join(
+        short(float(q)) for q in np.quantile(values, (0, 0.25, 0.5, 0.75, 1), method="nearest")
+    )
+
+
+def page(found: Found) -> Iterator[str]:
+    """The lines of README.md."""
+    yield "# The hold that knows the model, mechanism at the graphics rate"
+    yield f"`python -m studies.model_hold results/model`: {len(cases())} draws from seed {SEED} on"
+    ratios = {rate: found.ratios(rate) for rate in RATES}
+    every = [value for each in ratios.values() for value, _ in each]
+    worse = [(v, case, rate) for rate, each in ratios.items() for v, case in each if v < 1 / WORSE]
+    yield "## Where it loses"
+    yield (
+        f"With the best gains of each, `model` is worse than the best of {', '.join(SHIPPED)} by "
+        f"more than 5 % in {len(worse)} of {len(every)} (draw, rate):"
+    )
+    yield (
+        "\n".join(f"- {case} at {rate} Hz: {short(v)}" for v, case, rate in sorted(worse)) or "none"
+    )
+    by_gains = []
+    for gains in GAINS:
+        pairs = _pairs(found, gains)
+        lost = sum(a < b / WORSE for a, b in pairs)
+        by_gains.append(f"{gains} {lost} of {len(pairs)}")
+    both = "With the same gains, of the cells in which both are within the limits"
+    yield f"{both}: {', '.join(by_gains)}."
+    kept = found.kept
+    yield "## Within the limits"
+    yield _table(
+        ("gains, Hz", "oracle", *METHODS),
+        (
+            (
+                f"{g}, {r}",
+                *(
+                    str(found.within(m, [c for c in kept if c[1:] == (r, g)]))
+                    for m in (ORACLE, *METHODS)
+                ),
+            )
+            for g, r in product(GAINS, RATES)
+        ),
+    )
+    counts = ", ".join(f"`{m}` {found.within(m, kept)}" for m in METHODS)
+    yield f"Of the {len(kept)} cells in which the oracle is within the limits: {counts}."
+    yield "## Errors"
+    yield "Median of the largest distance of handle and point (mm) where the limits are kept:"
+    yield _table(("gains, Hz", ORACLE, *METHODS), _errors(found))
+    yield "## With the best gains"
+    yield (
+        "Best shipped over best `model` by draw: least, quartiles, largest (inf: no shipped hold "
+        "keeps the limits)."
+    )
+    rows = [(r, str(len(each)), _quartiles([v for v, _ in each])) for r, each in ratios.items()]
+    yield _table(("Hz", "draws", "ratio"), [*rows, ("all", str(len(every)), _quartiles(every))])
+    yield "![Errors with the best gains, by rate](model.png)"
+
+
+def _pairs(found: Found, gains: str) -> list[tuple[float, float]]:
+    """Errors of the best shipped hold and of `model` where both are within the limits."""
+    each = (of for cell, of in found.error.items() if cell[2] == gains)
+    pairs = ((min(of[m] for m in SHIPPED), of["model"]) for of in each)
+    return [pair for pair in pairs if np.isfinite(pair).all()]
+
+
+def _errors(found: Found) -> Iterator[tuple[str, ...]]:
+    for gains, rate in product(GAINS, RATES):
+        row = [f"{gains}, {rate}"]
+        for method in (ORACLE, *METHODS):
+            of = [e[method] for c, e in found.error.items() if c[1:] == (rate, gains)]
+            known = [value for value in of if np.isfinite(value)]
+            row.append(f"{short(float(np.median(known)))} ({len(known)})" if known else "")
+        yield tuple(row)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def draw(found: Found, folder: Path) -> None:
+    """The errors with the best gains by rate, each draw a point, medians as bars."""
+    figure, (axes,) = panels(1, width=7.0, height=4.2)
+    methods: Mapping[str, tuple[Any, str]] = {
+        "best shipped": (SHIPPED, ORANGE),
+        "model": (("model",), BLUE),
+        ORACLE: ((ORACLE,), GREY),
+    }
+    names = sorted({case for case, *_ in found.error})
+    for i, (label, (of, colour)) in enumerate(methods.items()):
+        for x, rate in enumerate(RATES):
+            values = [found.best(case, rate, of) for case in names]
+            known = [v for v in values if np.isfinite(v)]
+            at = x + 0.27 * (i - 1)
+            spread = np.linspace(-0.08, 0.08, max(len(known), 1))
+            axes.plot(at + spread[: len(known)], known, ".", color=colour, alpha=0.6)
+            if known:
+                axes.plot(
+                    [at - 0.1, at + 0.1],
+                    [np.median(known)] * 2,
+                    color=colour,
+                    lw=2.5,
+                    label=label if x == 0 else None,
+                )
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_xticks(range(len(RATES)), RATES)
+    axes.set_xlabel("graphics rate (Hz)")
+    axes.set_ylabel("largest distance of handle and point (mm)")
+    axes.set_title("Mechanism at the graphics rate, best gains of each draw", fontsize="medium")
+    axes.legend(fontsize="small")
+    save(figure, folder, "model.png")
+
+
+def study(folder: Path, room: Path, processes: int = 2) -> None:
+    """Runs what has no row in `room` yet, and writes the results to `folder`."""
+    folders.ensure(folder)
+    every = list(runs())
+    step = max(1, len(every) // 100)
+
+    def tell(done: int) -> None:
+        if done % step == 0:
+            print(f"{done} of {len(every)}", flush=True)
+
+    rows = sweep(every, room, processes, tell=tell, measure=_measure)
+    kept = ("end", METRIC, "theta_max_rad", "port_peak_J", "hand_work_J")
+    columns = ("case", "linkage", "hand", "seed", "method", "gains", "rate", *kept)
+    table.write(folder / "runs.csv", [{k: row.get(k, "") for k in columns} for row in rows])
+    found = Found(rows)
+    draw(found, folder)
+    (folder / "README.md").write_text("\n\n".join(page(found)) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1])
+    study(target, Path(sys.argv[2]) if len(sys.argv) > 2 else target / "rows")
