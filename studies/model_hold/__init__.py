@@ -10,7 +10,6 @@ it is held. Limits are those of `advise`. Writes README.md, runs.csv and model.p
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -248,8 +247,3 @@ def study(folder: Path, room: Path, processes: int = 2) -> None:
     found = Found(rows)
     draw(found, folder)
     (folder / "README.md").write_text("\n\n".join(page(found)) + "\n", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    target = Path(sys.argv[1])
-    study(target, Path(sys.argv[2]) if len(sys.argv) > 2 else target / "rows")
