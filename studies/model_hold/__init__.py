@@ -32,6 +32,8 @@ from studies.draw import BLUE, GREY, ORANGE, panels, save
 from studies.mismatch.cases import LINKAGES, Case
 
 SEED = 44001
+DRAWS = 3
+"""The first was run alone; two more for the spread, with nothing changed between."""
 HANDS = ("constant", "profile", "arm 300")
 RATES = ("10", "20", "30", "10..50")
 FIRM = (
@@ -49,8 +51,8 @@ Cell = tuple[str, str, str]
 
 
 def cases() -> list[Case]:
-    """The draws, each with a seed of its own."""
-    kinds = product(LINKAGES, HANDS)
+    """The draws, DRAWS of each linkage in each hand, each with a seed of its own."""
+    kinds = [kind for _ in range(DRAWS) for kind in product(LINKAGES, HANDS)]
     return [Case(*kind, False, SEED + i) for i, kind in enumerate(kinds)]
 
 
@@ -87,7 +89,8 @@ class Found:
         for row in rows:
             value = float(row[METRIC]) if not limits.why_not(row) else np.inf
             for rate in RATES if row["method"] == ORACLE else (row["rate"],):
-                of = self.error.setdefault((row["case"], rate, row["gains"]), {})
+                name = f"{row['case']}, seed {row['seed']}"
+                of = self.error.setdefault((name, rate, row["gains"]), {})
                 of[row["method"]] = value
 
     def within(self, method: str, cells: Iterable[Cell]) -> int:

@@ -125,7 +125,7 @@ def test_mid_is_the_force_of_both_ends_and_its_energy_does_not_grow(seed):
     inertia = np.linalg.inv(mobility)
     W, W1 = (r @ inertia @ r / 2 + x @ (K * x) for x, r in ((e, rate), (e1, rate1)))
     lost = taken + (e1 - e) @ (B * (e1 - e)) / H
-    assert W1 - W == pytest.approx(-lost, abs=1e-6 * (1 + W))
+    assert pytest.approx(-lost, abs=1e-6 * (1 + W)) == W1 - W
     assert W1 <= W * (1 + 1e-6)
 
 
