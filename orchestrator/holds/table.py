@@ -46,8 +46,8 @@ TABLE: dict[str, HoldRow] = {
     "pspm": HoldRow("set_position", "set_position", needs="spring"),
     "latest": HoldRow("samples", "zero_order", gives_samples=True, downsamples=True),
     "mean": HoldRow("mean", "mean", remembers=3, downsamples=True),
-    "half-lead": HoldRow("mean", "half_lead", remembers=3),
-    "mid": HoldRow("samples", "mid", remembers=1, needs="coupling"),
+    "half-lead": HoldRow("mean", "half_lead", remembers=3, downsamples=True),
+    "mid": HoldRow("samples", "mid", remembers=1, needs="coupling", downsamples=True),
 }
 """By the name in a scene, which tells what a hold is: docs/holds.md."""
 IN_PYTHON = HoldRow("in_python", "in_python")

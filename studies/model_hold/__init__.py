@@ -30,6 +30,7 @@ from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.numbers import short
 from studies.draw import BLUE, GREY, ORANGE, panels, save
 from studies.mismatch.cases import LINKAGES, Case
+from studies.mismatch.measure import rounded
 
 SEED = 44001
 DRAWS = 3
@@ -46,6 +47,14 @@ METHODS = (*SHIPPED, "model")
 ORACLE = "oracle"
 WORSE = 1.05
 """Ratio of errors from which on a method counts as worse."""
+OTHERWISE = {
+    "encoders and observer": ("sensing=encoders",),
+    "no Coriolis compensation": ("controller.bias=none",),
+    "result after half a frame": ("computing_time=0.025",),
+}
+"""What the grid leaves out, tried at OTHER_RATE on the first draw of each linkage and hand."""
+OTHER_RATE = "20"
+COMPARED = ("foh", "passive", "model")
 Cell = tuple[str, str, str]
 """Case, rate and gains."""
 
@@ -56,6 +65,14 @@ def cases() -> list[Case]:
     return [Case(*kind, False, SEED + i) for i, kind in enumerate(kinds)]
 
 
+def others() -> Iterator[Job]:
+    """The runs of OTHERWISE; without a computing time those of the grid are compared with it."""
+    for case, (name, options) in product(cases()[: len(LINKAGES) * len(HANDS)], OTHERWISE.items()):
+        for gains, method in product(GAINS, COMPARED):
+            if method == "model" or "computing" not in options[0]:
+                yield _run(case, method, gains, OTHER_RATE, name, options)
+
+
 def runs() -> Iterator[Job]:
     """All runs, case by case; the oracle's has no rate, and is taken at the first one."""
     for case, gains, rate in product(cases(), GAINS, RATES):
@@ -63,8 +80,10 @@ def runs() -> Iterator[Job]:
             yield _run(case, method, gains, rate)
 
 
-def _run(case: Case, method: str, gains: str, rate: str) -> Job:
-    options = [*case.options, *GAINS[gains], "controller.bias=full", "sensing=ideal"]
+def _run(
+    case: Case, method: str, gains: str, rate: str, name: str = "", otherwise: Sequence[str] = ()
+) -> Job:
+    options = [*case.options, *GAINS[gains], "controller.bias=full", "sensing=ideal", *otherwise]
     options.append("directions_from=mechanism")
     varies = f"{{ min = 10, max = 50, seed = {case.seed} }}"
     options.append(f"graphics.rate={varies if '..' in rate else rate}")
@@ -73,7 +92,8 @@ def _run(case: Case, method: str, gains: str, rate: str) -> Job:
     if method == "model":
         options.append("downsampling=model")
     point = {"case": case.name, "linkage": case.linkage, "hand": case.hand, "seed": str(case.seed)}
-    return job(case.scene, options, point | {"method": method, "gains": gains, "rate": rate})
+    point |= {"method": method, "gains": gains, "rate": rate, "otherwise": name}
+    return job(case.scene, options, point)
 
 
 def _measure(experiment: Experiment) -> Row:
@@ -125,7 +145,7 @@ def _quartiles(values: Sequence[float]) -> str:
     )
 
 
-def page(found: Found) -> Iterator[str]:
+def page(found: Found, elsewhere: Mapping[str, Found]) -> Iterator[str]:
     """The lines of README.md."""
     yield "# The hold that knows the model, mechanism at the graphics rate"
     yield f"`python -m studies.model_hold results/model`: {len(cases())} draws from seed {SEED} on"
@@ -147,6 +167,15 @@ def page(found: Found) -> Iterator[str]:
         by_gains.append(f"{gains} {lost} of {len(pairs)}")
     both = "With the same gains, of the cells in which both are within the limits"
     yield f"{both}: {', '.join(by_gains)}."
+    yield f"## Outside of its premises, at {OTHER_RATE} Hz"
+    yield (
+        "Draws of the first of each hand within the limits with some gains, and the median of "
+        "their least errors (mm):"
+    )
+    draws = {case for each in elsewhere.values() for case, *_ in each.error}
+    settings = {"as in the grid": found, **elsewhere}
+    rows = (_elsewhere(name, of, draws) for name, of in settings.items())
+    yield _table(("", *COMPARED), rows)
     kept = found.kept
     yield "## Within the limits"
     yield _table(
@@ -172,9 +201,22 @@ def page(found: Found) -> Iterator[str]:
         "Best shipped over best `model` by draw: least, quartiles, largest (inf: no shipped hold "
         "keeps the limits)."
     )
-    rows = [(r, str(len(each)), _quartiles([v for v, _ in each])) for r, each in ratios.items()]
-    yield _table(("Hz", "draws", "ratio"), [*rows, ("all", str(len(every)), _quartiles(every))])
+    by_rate = [(r, str(len(each)), _quartiles([v for v, _ in each])) for r, each in ratios.items()]
+    yield _table(("Hz", "draws", "ratio"), [*by_rate, ("all", str(len(every)), _quartiles(every))])
     yield "![Errors with the best gains, by rate](model.png)"
+
+
+def _elsewhere(name: str, found: Found, draws: Iterable[str]) -> tuple[str, ...]:
+    """The row of a setting that the grid leaves out."""
+    row = [name]
+    for method in COMPARED:
+        ran = any(method in of for of in found.error.values())
+        every = [found.best(case, OTHER_RATE, [method]) for case in draws] if ran else []
+        known = [value for value in every if np.isfinite(value)]
+        row.append(
+            f"{short(float(np.median(known)))} ({len(known)} of {len(every)})" if known else ""
+        )
+    return tuple(row)
 
 
 def _pairs(found: Found, gains: str) -> list[tuple[float, float]]:
@@ -243,10 +285,15 @@ def study(folder: Path, room: Path, processes: int = 2) -> None:
         if done % step == 0:
             print(f"{done} of {len(every)}", flush=True)
 
-    rows = sweep(every, room, processes, tell=tell, measure=_measure)
+    further = list(others())
+    rows = sweep([*every, *further], room, processes, tell=tell, measure=_measure)
     kept = ("end", METRIC, "theta_max_rad", "port_peak_J", "hand_work_J")
-    columns = ("case", "linkage", "hand", "seed", "method", "gains", "rate", *kept)
-    table.write(folder / "runs.csv", [{k: row.get(k, "") for k in columns} for row in rows])
-    found = Found(rows)
+    columns = ("case", "seed", "method", "gains", "rate", "otherwise", *kept)
+    table.write(
+        folder / "runs.csv", [{k: rounded(row).get(k, "") for k in columns} for row in rows]
+    )
+    found = Found(rows[: len(every)])
+    elsewhere = {n: Found(r for r in rows if r["otherwise"] == n) for n in OTHERWISE}
     draw(found, folder)
-    (folder / "README.md").write_text("\n\n".join(page(found)) + "\n", encoding="utf-8")
+    lines = "\n\n".join(page(found, elsewhere))
+    (folder / "README.md").write_text(f"{lines}\n", encoding="utf-8")
