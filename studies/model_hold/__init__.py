@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.search.acceptance import AcceptanceLimits, judged_numbers
+from hapticlink.analysis.search.settings import EARLY, HOLDS
 from hapticlink.analysis.search.settings import GAINS as NAMED
-from hapticlink.analysis.search.settings import HOLDS
 from hapticlink.analysis.sweep import table
 from hapticlink.analysis.sweep.job import Job, job
 from hapticlink.analysis.sweep.row import METRIC, Row
@@ -88,9 +88,7 @@ def _run(
     varies = f"{{ min = 10, max = 50, seed = {case.seed} }}"
     options.append(f"graphics.rate={varies if '..' in rate else rate}")
     if method != ORACLE:
-        options += ["mechanism_at=graphics", *HOLDS[method]]
-    if method == "model":
-        options.append("downsampling=model")
+        options += ["mechanism_at=graphics", *HOLDS[EARLY if method == "model" else method]]
     point = {"case": case.name, "linkage": case.linkage, "hand": case.hand, "seed": str(case.seed)}
     point |= {"method": method, "gains": gains, "rate": rate, "otherwise": name}
     return job(case.scene, options, point)

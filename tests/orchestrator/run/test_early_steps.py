@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 import hapticlink as hl
+from hapticlink.analysis.findings.summary import warnings
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import uses
@@ -133,3 +134,21 @@ def test_what_cannot_be_is_refused_with_the_reason(options, said):
     with pytest.raises(InputFault) as refused:
         system_of("closed-loop-ideal", *own, *named, *options)
     assert said in str(refused.value)
+
+
+def test_what_gains_nothing_is_told(tmp_path):
+    arm = {"type": "arm", "stiffness": [300.0, 300.0, 0.0], "damping": [20.0, 20.0, 0.01]}
+    start = {"target": [[0.0, 0.04452, 0.0148, -0.7878]]}
+    cases = {
+        "with encoders": {"sensing": "encoders"},
+        "without Coriolis": {"controller.bias": "none"},
+        "k lambda H^2 is 1.9": {"hand": arm | start, "graphics.rate": 10},
+    }
+    for said, options in cases.items():
+        for hold, told in (("model", True), ("zoh", False)):
+            own = MODEL | {"duration": 0.2, "hold": hold} | options
+            r = hl.run("closed-loop-ideal", own, figures=False)
+            lines = [line for line in warnings(r) if "gains little" in line]
+            assert (len(lines), any(said in line for line in lines)) == (told, told), (said, lines)
+    r = run(tmp_path, **{"hand": arm | start, "graphics.rate": 30})
+    assert not any("gains little" in line for line in warnings(r))
