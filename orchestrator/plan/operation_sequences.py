@@ -28,10 +28,11 @@ def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
     return [u for u in due if u.sampled], [u for u in due if not u.sampled]
 
 
-def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
-    """The plants that start a step; steps that would pass the end of the run are not started."""
+def starting(system: System, event: Event, continuous: list[Fmu]) -> list[Fmu]:
+    """The plants that start a step; steps that would pass the end of the run are not started, but
+    for those whose samples are wanted before it."""
     started = {f.clock for f in event.firings if not f.final}
-    return [u for u in continuous if u.clock in started]
+    return [u for u in continuous if u.clock in started or u.name in system.early]
 
 
 def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:

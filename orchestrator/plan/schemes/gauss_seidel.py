@@ -19,7 +19,7 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
     operations = before_plants(system, event)
     continuous = operation_sequences.firing(system, event)[1]
-    starting = operation_sequences.starting(event, continuous)
+    starting = operation_sequences.starting(system, event, continuous)
     slow, others = operation_sequences.early_first(system, starting)
     for fmu in slow:
         operations += operation_sequences.feed(system, event, fmu)
