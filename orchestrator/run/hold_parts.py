@@ -18,7 +18,7 @@ from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene_tables import Latency, SetSpring
 from hapticlink.orchestrator.system import ports
 from hapticlink.orchestrator.system.read_beside import read_beside
-from hapticlink.orchestrator.system.springs import coupling, spring
+from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
 
@@ -173,7 +173,7 @@ def _beside(connection: Connection, signals: SignalVector) -> Reader | None:
 
 def _gains(connection: Connection, system: System) -> tuple[Vector, Vector]:
     """K and B of the spring-damper whose force a connection has."""
-    of = coupling(connection, system.energy.springs, system.connections)
+    of = system.energy.coupling(connection, system.connections)
     assert of is not None
     K = np.array(of.stiffness)
     return K, np.array(of.damping) if of.damping else np.zeros_like(K)

@@ -211,3 +211,8 @@ class SetSpring:
     def ports(self) -> tuple[str, ...]:
         """The inputs that set the far end: set position, and set velocity if there is one."""
         return tuple(p for p in (self.set_position, self.set_velocity) if p)
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Both ends, their rates and the mobility, "" for what is not declared."""
+        return self.set_position, self.position, self.set_velocity, self.velocity, self.mobility

@@ -128,7 +128,7 @@ def _with_springs(
         reason = None
         if c.needs == "spring":
             reason = springs.why_unlimited(c, energy.springs, connections, fmus)
-        elif c.needs == "coupling" and springs.coupling(c, energy.springs, connections) is None:
+        elif c.needs == "coupling" and energy.coupling(c, connections) is None:
             reason = (
                 f"{c.source}.{c.source_port} is no force of a spring-damper both ends of which are "
                 "connected and move with a known mobility (docs/holds.md); take 'half-lead'"

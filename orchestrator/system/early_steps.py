@@ -3,8 +3,8 @@
 The inputs of a plant are held over its step, so that its step is determined when it begins. `model`
 stands for what is known of a connection: from a source that gives gradients, `model` itself; from a
 slower plant, whose steps are then taken early, `ahead`; to such a plant, `mid` for the force of a
-spring-damper both ends of which move with a known mobility, `half-lead` for other efforts, and
-`latest` for anything else.
+coupling both ends of which move with a known mobility, `half-lead` for other efforts, and `latest`
+for anything else.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from collections.abc import Collection, Container, Iterable, Mapping
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system import springs
 from hapticlink.orchestrator.system.ports import carries_power, names
 from hapticlink.orchestrator.system.system import Connection, EnergyPorts, Fmu
 
@@ -76,4 +75,4 @@ def towards(
     """What `model` is of a connection to a slower clock."""
     if c.target not in early or not carries_power(c, energy.power):
         return "latest"
-    return "half-lead" if springs.coupling(c, energy.springs, connections) is None else "mid"
+    return "half-lead" if energy.coupling(c, connections) is None else "mid"

@@ -13,9 +13,6 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.ports import size
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
-MOST = 6
-"""Entries of a spring-damper up to which its force is taken for the middle of a step."""
-
 
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     """The spring whose set position or set velocity a connection feeds; None if there is none."""
@@ -90,25 +87,6 @@ def why_unlimited(
             held = f"held by {other.hold!r}" if other.hold else "not held"
             return f"{_end(other)} sets the same spring and is {held}: give both {c.hold!r}"
     return None
-
-
-def ends(of: SetSpring) -> tuple[str, ...]:
-    """The inputs with both ends of a spring-damper, their rates and the mobility."""
-    return of.set_position, of.position, of.set_velocity, of.velocity, of.mobility
-
-
-def coupling(
-    c: Connection, springs: Iterable[SetSpring], connections: Iterable[Connection]
-) -> SetSpring | None:
-    """The spring-damper whose force a connection has, if both its ends move with a mobility that is
-    known, and each of these is brought by one connection."""
-    force, n = f"{c.source}.{c.source_port}", len(c.inputs)
-    own = next((s for s in springs if s.force == force and all(ends(s))), None)
-    if own is None or n > MOST:
-        return None
-    brought = {f"{k.target}.{k.target_port}": len(k.inputs) for k in connections if not k.initial}
-    sizes = [brought.get(end) for end in ends(own)]
-    return own if sizes == [n, n, n, n, n * n] else None
 
 
 def check_springs(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:

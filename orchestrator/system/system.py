@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -117,6 +117,10 @@ class Coupling:
     """Plants whose outputs may be read again after inputs are set, without a doStep between."""
 
 
+MOST = 6
+"""Entries of a spring-damper up to which its force is taken for the middle of a step."""
+
+
 @dataclass(frozen=True)
 class EnergyPorts:
     """What is known of the energy that crosses connections."""
@@ -129,6 +133,18 @@ class EnergyPorts:
     checked."""
     driven: bool = False
     """Whether drives or forces of plugins put energy into the mechanism."""
+
+    def coupling(self, c: Connection, connections: Iterable[Connection]) -> SetSpring | None:
+        """The spring-damper whose force a connection has, if both its ends move with a mobility
+        that is known, each of these is brought by one connection, and there are no more entries
+        than MOST."""
+        force, n = f"{c.source}.{c.source_port}", len(c.inputs)
+        own = next((s for s in self.springs if s.force == force and all(s.ends)), None)
+        if own is None or n > MOST:
+            return None
+        to = {f"{k.target}.{k.target_port}": len(k.inputs) for k in connections if not k.initial}
+        sizes = [to.get(end) for end in own.ends]
+        return own if sizes == [n, n, n, n, n * n] else None
 
 
 @dataclass(frozen=True)
