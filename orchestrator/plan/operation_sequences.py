@@ -30,9 +30,10 @@ def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
 
 def starting(system: System, event: Event, continuous: list[Fmu]) -> list[Fmu]:
     """The plants that start a step; steps that would pass the end of the run are not started, but
-    for those whose samples are wanted before it."""
+    for those whose samples are wanted before it: by others that start one."""
     started = {f.clock for f in event.firings if not f.final}
-    return [u for u in continuous if u.clock in started or u.name in system.early]
+    wanted = system.early if started else ()
+    return [u for u in continuous if u.clock in started or u.name in wanted]
 
 
 def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:
