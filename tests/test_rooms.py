@@ -32,11 +32,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 5908,
+    "components": 5910,
     "fmus": 2816,
-    "orchestrator": 13020,
+    "orchestrator": 13186,
     "programs": 1021,
-    "analysis": 7089,
+    "analysis": 7125,
     "visualization": 3333,
     "api": 435,
     "commands": 1397,

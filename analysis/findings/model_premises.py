@@ -1,4 +1,4 @@
-"""Where the hold `model` of a mechanism at the graphics rate gains nothing."""
+"""Where the hold `model` of a mechanism at the graphics rate gains less than it can."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ firmer gains than soft ones seldom keep the limits (results/model)."""
 
 
 def describe_premises(results: Results) -> Iterator[str]:
-    """A line for each setting of a run with early steps in which its hold gains nothing."""
+    """A line for each setting of a run with early steps in which its hold gains less."""
     record = results.record
     if "ahead" not in record.holds.values():
         return
-    scene, nothing = record.scene, "hold = 'model' gains little here:"
+    scene, less = record.scene, "hold = 'model' gains less here:"
     if scene["sensing"] == "encoders":
         yield (
-            f"{nothing} with encoders the observer's estimate of the hand's wrench decides, which "
-            "no hold improves"
+            f"{less} with encoders the observer's estimate of the hand's wrench decides, which "
+            "no hold improves (results/model)"
         )
     if (scene["controller"] or {}).get("bias") == "none":
         yield (
-            f"{nothing} without Coriolis and centrifugal compensation the handle moves otherwise "
+            f"{less} without Coriolis and centrifugal compensation the handle moves otherwise "
             "than the mechanism, whatever is held: take controller.bias = 'full'"
         )
     if (share := stiffness_of_frame(results)) >= STIFF:
         yield (
-            f"{nothing} the hand's stiffness is sampled once a frame, and k lambda H^2 is "
+            f"{less} the hand's stiffness is sampled once a frame, and k lambda H^2 is "
             f"{short(share)}, where {STIFF:g} is much: take a higher graphics rate, or soft gains"
         )
 

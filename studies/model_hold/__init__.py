@@ -155,9 +155,8 @@ def page(found: Found, elsewhere: Mapping[str, Found]) -> Iterator[str]:
         f"With the best gains of each, `model` is worse than the best of {', '.join(SHIPPED)} by "
         f"more than 5 % in {len(worse)} of {len(every)} (draw, rate):"
     )
-    yield (
-        "\n".join(f"- {case} at {rate} Hz: {short(v)}" for v, case, rate in sorted(worse)) or "none"
-    )
+    told = (f"- {c} at {r} Hz: {short(v) if v else 'none within the limits'}" for v, c, r in worse)
+    yield "\n".join(sorted(told)) or "none"
     by_gains = []
     for gains in GAINS:
         pairs = _pairs(found, gains)
@@ -191,13 +190,17 @@ def page(found: Found, elsewhere: Mapping[str, Found]) -> Iterator[str]:
     )
     counts = ", ".join(f"`{m}` {found.within(m, kept)}" for m in METHODS)
     yield f"Of the {len(kept)} cells in which the oracle is within the limits: {counts}."
+    for hand in HANDS:
+        of = [cell for cell in kept if f", {hand}," in cell[0]]
+        shares = ", ".join(f"`{m}` {found.within(m, of)}" for m in METHODS)
+        yield f"Of the {len(of)} of these in hands `{hand}`: {shares}."
     yield "## Errors"
     yield "Median of the largest distance of handle and point (mm) where the limits are kept:"
     yield _table(("gains, Hz", ORACLE, *METHODS), _errors(found))
     yield "## With the best gains"
     yield (
         "Best shipped over best `model` by draw: least, quartiles, largest (inf: no shipped hold "
-        "keeps the limits)."
+        "keeps the limits, 0: `model` does not)."
     )
     by_rate = [(r, str(len(each)), _quartiles([v for v, _ in each])) for r, each in ratios.items()]
     yield _table(("Hz", "draws", "ratio"), [*by_rate, ("all", str(len(every)), _quartiles(every))])

@@ -11,6 +11,7 @@ from hapticlink.analysis.findings.summary import warnings
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import uses
+from hapticlink.orchestrator.system.changes import check_change, choices, settable
 from tests.orchestrator.systems import system_of
 
 AT_GRAPHICS = {
@@ -117,6 +118,20 @@ def test_scenes_without_it_have_no_early_steps():
     assert not system_of("closed-loop-ideal", "hold=model").early
 
 
+def test_what_is_planned_before_the_start_cannot_be_changed_in_a_run():
+    system = system_of("closed-loop-ideal", *(f"{k}={json.dumps(v)}" for k, v in MODEL.items()))
+    for name, hold in (
+        ("virtual_mechanism.x -> controller.x_S", "zoh"),
+        ("controller.F_drift -> virtual_mechanism.F_drift", "latest"),
+    ):
+        c = system.connection[name]
+        assert choices(system, c) == [c.hold]
+        with pytest.raises(InputFault, match="planned before the start"):
+            check_change(system, c, hold, None)
+    with pytest.raises(InputFault, match="that of the start"):
+        settable(system, "controller.K_pc")
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -136,7 +151,7 @@ def test_what_cannot_be_is_refused_with_the_reason(options, said):
     assert said in str(refused.value)
 
 
-def test_what_gains_nothing_is_told(tmp_path):
+def test_where_it_gains_less_is_told(tmp_path):
     arm = {"type": "arm", "stiffness": [300.0, 300.0, 0.0], "damping": [20.0, 20.0, 0.01]}
     start = {"target": [[0.0, 0.04452, 0.0148, -0.7878]]}
     cases = {
@@ -148,7 +163,7 @@ def test_what_gains_nothing_is_told(tmp_path):
         for hold, told in (("model", True), ("zoh", False)):
             own = MODEL | {"duration": 0.2, "hold": hold} | options
             r = hl.run("closed-loop-ideal", own, figures=False)
-            lines = [line for line in warnings(r) if "gains little" in line]
+            lines = [line for line in warnings(r) if "gains less" in line]
             assert (len(lines), any(said in line for line in lines)) == (told, told), (said, lines)
     r = run(tmp_path, **{"hand": arm | start, "graphics.rate": 30})
-    assert not any("gains little" in line for line in warnings(r))
+    assert not any("gains less" in line for line in warnings(r))
