@@ -41,7 +41,8 @@ class SpringPorts:
 
     entry by entry. set_position and set_velocity are inputs, position and velocity are inputs or
     outputs, stiffness and damping are parameters in the units of these, force is the output that
-    is F, which acts with - on the far end; "" stands for none.
+    is F, which acts with - on the far end; mobility is an input with that of both ends, where F is
+    all that moves them apart; "" stands for none.
     """
 
     set_position: str
@@ -51,6 +52,7 @@ class SpringPorts:
     set_velocity: str = ""
     velocity: str = ""
     force: str = ""
+    mobility: str = ""
 
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")

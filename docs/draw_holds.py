@@ -36,7 +36,9 @@ NOTES = {
     "passive": " (force of a spring)",
     "nepce": " (force of a spring)",
     "pspm": " (dotted: near end)",
+    "ahead": " (sample of a frame's end at its begin)",
     "mean": " (fast source, slow target)",
+    "half-lead": " (fast source, slow target)",
 }
 BLUE, RED = "#0077bb", "#cc3311"
 COLOURS = 64
@@ -71,7 +73,9 @@ class Signals:
         if kind.needs == "power":
             parts["displacement"] = position
         elif kind.needs == "gradient":
-            parts["coordinates"] = position
+            parts["beside"] = position
+        elif kind.needs == "step":
+            width, parts["relation"] = 2, "WITH_RATE"
         elif kind.needs == "spring":
             stiffness = np.full(1, STIFFNESS)
             spring = SpringParts(stiffness, np.zeros(1), position, np.zeros(1), TICK, sampled=True)
@@ -86,7 +90,7 @@ def waveform(name: str) -> tuple[Vector, Vector]:
     signals, kind, values = Signals(), HOLDS[name], list[float]()
     assert isinstance(kind, HoldRow)
     hold = signals.hold(name)
-    fast = kind.downsamples and name == "mean"
+    fast = kind.push == "mean"
     every = 1 if fast else PERIOD
     for tick in range(END):
         # The near end of the spring, the coordinate q of the signal sinh(q), or the target on the
@@ -94,7 +98,9 @@ def waveform(name: str) -> tuple[Vector, Vector]:
         reads = {"spring": near_end(tick), "gradient": np.arcsinh(signal(tick))}
         signals.values[0] = reads.get(kind.needs or "", -signal(tick) / STIFFNESS)
         if tick % every == 0:
-            hold.push(tick, sample(kind, tick), tick)
+            early = PERIOD if kind.needs == "step" else 0
+            for of in (tick, tick + early) if early and not tick else (tick + early,):
+                hold.push(of, sample(kind, of), tick)
         read = not fast or tick % PERIOD == 0
         values.append(float(hold.value(tick)[0]) if read else values[-1])
     return np.array(values), np.arange(0, END, PERIOD)
@@ -102,7 +108,7 @@ def waveform(name: str) -> tuple[Vector, Vector]:
 
 def sample(kind: HoldRow, tick: int) -> Vector:
     """The signal at `tick`, and beside it what the hold needs."""
-    if kind.needs == "derivative":
+    if kind.needs in ("derivative", "step"):
         return np.array([signal(tick), rate(tick)])
     if kind.needs == "gradient":
         q = np.arcsinh(signal(tick))
@@ -114,7 +120,7 @@ def sample(kind: HoldRow, tick: int) -> Vector:
 
 def scalars() -> Figure:
     """A panel for each hold."""
-    names = [name for name in HOLDS if name != "latest"]
+    names = [name for name in HOLDS if name not in ("latest", "mid")]  # which needs both ends
     rows = -(-len(names) // 3)
     figure = Figure(figsize=(9, 1.75 * rows), layout="constrained")
     panels = figure.subplots(rows, 3, sharex=True)
@@ -127,7 +133,7 @@ def scalars() -> Figure:
         if HOLDS[name].needs == "spring":
             axes.plot(ticks, [near_end(t) for t in ticks], color="0.6", lw=1, ls=":")
         axes.plot(ticks, values, color=BLUE, lw=1.4, drawstyle="steps-post")
-        if name != "mean":
+        if HOLDS[name].push != "mean":
             axes.plot(stamps, source[stamps], "o", color=RED, ms=3.5)
         axes.set_title(name + NOTES.get(name, ""), fontsize="medium")
         axes.tick_params(labelsize="x-small")

@@ -21,6 +21,7 @@ from hapticlink.orchestrator.results.run_record import (
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.early_steps import stands_for
 from hapticlink.orchestrator.system.ports import power_across_rates
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -100,7 +101,7 @@ def _find_idle_holds(scene: Scene, system: System) -> Iterator[str]:
     }
     asked = {c.hold for c in system.connections} | {r.hold for r in system.refused}
     for key, (hold, plain, way) in ways.items():
-        if hold == plain or hold in asked:
+        if hold == plain or asked & {hold, *stands_for(key, hold)}:
             continue
         apart = (longest(c.source) - longest(c.target) for c in system.connections if c.hold)
         own = any(d > 0 if key == "hold" else d < 0 for d in apart)

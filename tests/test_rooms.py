@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6141,
+    "components": 6143,
     "fmus": 2816,
-    "orchestrator": 13437,
+    "orchestrator": 13603,
     "programs": 1021,
-    "analysis": 7607,
+    "analysis": 7643,
     "visualization": 3415,
     "api": 467,
     "commands": 1457,

@@ -25,7 +25,7 @@ from hapticlink.analysis.search.acceptance import (
     judged_numbers,
 )
 from hapticlink.analysis.search.search import judge_best_first
-from hapticlink.analysis.search.settings import GAINS, HOLDS
+from hapticlink.analysis.search.settings import EARLY, GAINS, HOLDS
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.run_sweep import sweep
@@ -204,7 +204,9 @@ def all_methods(read: Scene) -> list[Method]:
     if read.graphics is None:
         raise InputFault("nothing to advise: without [graphics] there is one rate, and no hold")
     gains = (OWN, "soft", "medium") if read.controller.teleoperation else (OWN,)
-    return [Method(hold, of) for hold in HOLDS for of in gains]
+    at_graphics = read.mechanism_at == "graphics"
+    holds = [hold for hold in HOLDS if at_graphics or hold != EARLY]
+    return [Method(hold, of) for hold in holds for of in gains]
 
 
 def on_draws(

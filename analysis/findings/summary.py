@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings import friction_speed
+from hapticlink.analysis.findings import friction_speed, model_premises
 from hapticlink.analysis.findings.changes_of_point import describe_changes
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
@@ -239,6 +239,7 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     if record.unstable:
         yield f"warning: {record.unstable}: the loop is not passive"
     yield from _describe_refused_holds(record)
+    yield from model_premises.describe_premises(results)
 
 
 def _steps(record: RunRecord) -> Iterator[str]:

@@ -29,6 +29,8 @@ _SLOPE = (
     'holds."virtual_mechanism.x -> controller.x_S"=foh',
     'holds."virtual_mechanism.v -> controller.v_S"=slope',
 )
+EARLY = "model, model"
+"""Of a mechanism at the graphics rate alone, whose steps are then taken when they begin."""
 HOLDS: dict[str, tuple[str, ...]] = {
     "zoh": ("hold=zoh",),
     "foh": ("hold=foh",),
@@ -37,6 +39,7 @@ HOLDS: dict[str, tuple[str, ...]] = {
     "second-order": ("hold=second-order",),
     "delayed": ("hold=delayed",),
     "model": ("hold=model",),
+    EARLY: ("hold=model", "downsampling=model", "directions_from=mechanism"),
     "zoh, mean": ("hold=zoh", "downsampling=mean"),
     "passive": ("hold=passive",),
     "foh-derivative, passive": ("hold=foh-derivative", *_PASSIVE),

@@ -30,7 +30,7 @@ OF_SAMPLES = ("samples", "lead")
 def is_polynomial(hold: CompiledHold) -> bool:
     """Whether the value of a hold is a polynomial in time through its samples."""
     row = hold.row
-    return row.push in OF_SAMPLES and row.degree is not None and not hold.parts.coordinates
+    return row.push in OF_SAMPLES and row.degree is not None and not hold.parts.beside
 
 
 def degree_of(hold: CompiledHold) -> int:
@@ -41,7 +41,7 @@ def degree_of(hold: CompiledHold) -> int:
 
 def is_linear(hold: CompiledHold) -> bool:
     """Whether the value of a hold without a regime is linear in what it reads."""
-    return not hold.parts.matrix and not hold.parts.coordinates
+    return not hold.parts.matrix and not hold.parts.beside
 
 
 def is_ageless(hold: CompiledHold) -> bool:

@@ -142,6 +142,7 @@ def controller(
         outputs=outputs,
     )
     output, parts = _wrenches(spec, space, law, block)
+    mobility = "Lambda_inv" if spec.impedance and not clutch else ""
     initial: dict[str, ca.SX] = {}
     step: dict[str, ca.SX] = {}
     if guard:
@@ -160,7 +161,7 @@ def controller(
         step=step,
         output=output,
         documentation=__doc__ or "",
-        springs=[_DRIFT] if spec.teleoperation else [],
+        springs=[replace(_DRIFT, mobility=mobility)] if spec.teleoperation else [],
         parts=parts,
     )
 

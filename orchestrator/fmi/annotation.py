@@ -137,8 +137,11 @@ class _Ports:
 
     def spring(self, element: Element) -> SpringPorts:
         needed = "set_position position stiffness"
-        spring = SpringPorts(**_attributes(element, needed, "damping set_velocity velocity force"))
+        further = "damping set_velocity velocity force mobility"
+        spring = SpringPorts(**_attributes(element, needed, further))
         size = len(self._entries(spring.set_position, "input"))
+        if spring.mobility:
+            self._entries(spring.mobility, "input", size=size * size)
         gains = dict.fromkeys(("stiffness", "damping"), ("parameter",))
         for name, causalities in (SPRING_ENDS | gains).items():
             if port := getattr(spring, name):

@@ -39,7 +39,8 @@ class Hold(ABC):
     3. `push` takes a sample with the instant that it describes and the instant at which the target
        gets it (its arrival). A plant's outputs describe the end of its step, at which they are
        known; those of a frame block, and samples with a latency, describe an earlier one than that
-       of their arrival. Neither decreases.
+       of their arrival, those of a step that is taken when it begins a later one. Neither
+       decreases.
     4. `value` may be called several times at a tick, for different instants, and returns a vector
        of `HoldContext.size` finite numbers, which the caller does not change.
     5. The whole state of a hold is in its attributes: the lifted map of a scene reads and writes it
@@ -78,7 +79,7 @@ class Hold(ABC):
     @abstractmethod
     def push(self, described: int, sample: Vector, arrival: int) -> None:
         """Take a sample that describes the instant `described` (tick), and which the target knows
-        from `arrival` (tick) on, the same or later.
+        from `arrival` (tick) on.
 
         A second sample that describes the same instant replaces the first. `sample` is
         a view that is valid only during the call: copy what is kept.

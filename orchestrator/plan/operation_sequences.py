@@ -28,18 +28,37 @@ def firing(system: System, event: Event) -> tuple[list[Fmu], list[Fmu]]:
     return [u for u in due if u.sampled], [u for u in due if not u.sampled]
 
 
-def starting(event: Event, continuous: list[Fmu]) -> list[Fmu]:
-    """The plants that start a step; steps that would pass the end of the run are not started."""
+def starting(system: System, event: Event, continuous: list[Fmu]) -> list[Fmu]:
+    """The plants that start a step; steps that would pass the end of the run are not started, but
+    for those whose samples are wanted before it: by others that start one."""
     started = {f.clock for f in event.firings if not f.final}
-    return [u for u in continuous if u.clock in started]
+    wanted = system.early if started else ()
+    return [u for u in continuous if u.clock in started or u.name in wanted]
 
 
 def publish(system: System, fmu: Fmu, ahead: int = 0) -> Iterator[Operation]:
-    """Read the outputs of an FMU and push them into the holds of its connections."""
+    """Read the outputs of an FMU and push them into the holds of its connections, but for those
+    that had them when its step began."""
     yield Get(fmu.name, ahead)
     for connection in system.out_of(fmu.name):
-        if connection.hold:
+        if connection.hold and connection.needs != "step":
             yield Push(connection.name, ahead)
+
+
+def publish_early(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
+    """Read the outputs of an FMU whose step was just taken from this event on, and push them into
+    the holds that want them now; they describe the end of the step."""
+    ahead = dticks(event, fmu)
+    yield Get(fmu.name, ahead)
+    for connection in system.out_of(fmu.name):
+        if connection.needs == "step":
+            yield Push(connection.name, ahead)
+
+
+def early_first(system: System, plants: list[Fmu]) -> tuple[list[Fmu], list[Fmu]]:
+    """The plants of clocks at which steps are taken early, and the others."""
+    clocks = {system.fmu[name].clock for name in system.early}
+    return [u for u in plants if u.clock in clocks], [u for u in plants if u.clock not in clocks]
 
 
 def publish_ended(system: System, event: Event, continuous: list[Fmu]) -> Iterator[Operation]:

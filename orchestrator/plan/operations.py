@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import ClassVar, NamedTuple
 
 from hapticlink.orchestrator.scene.conditions import COMPARISONS
-from hapticlink.orchestrator.system import ports
+from hapticlink.orchestrator.system.read_beside import read_beside
 from hapticlink.orchestrator.system.system import System
 
 
@@ -141,8 +141,9 @@ class _Evaluation(OfHold):
 
     def signals(self, system: System) -> SignalUse:
         held = (("held", self.connection),)
-        by = ports.coordinates(system.connection[self.connection], system)
-        return SignalUse((*held, ("sources", by.name)) if by else held, held)
+        beside = read_beside(system.connection[self.connection], system)
+        read = (("held" if row.held else "sources", row.of.name) for row in beside)
+        return SignalUse((*held, *read), held)
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ def uses(
     system = plan.system
     traced = {c.name: c for c in system.connections if connections is None or c.name in connections}
     late = ((c.name, c.latency) for c in traced.values() if c.hold)
+    early = {c.name for c in traced.values() if c.needs == "step"}
     links = {name: SampleLink(latency, system.timeline.base) for name, latency in late if latency}
     newest: dict[Place, int] = defaultdict(int)
     blocks: dict[Event, list[tuple[Place, Stamp]]] = {}
@@ -56,7 +57,8 @@ def uses(
                     newest["hold", name] = arrived
             sample = tick + stamp if isinstance(stamp, int) else newest[stamp]
             if kind == "hold" and name in links:
-                links[name].send(max(tick, sample), sample)  # a frame is sent when it is over
+                # A frame is sent when it is over, what describes a later instant at once.
+                links[name].send(tick if name in early else max(tick, sample), sample)
             else:
                 newest[kind, name] = sample
             if kind == "input":
@@ -79,9 +81,10 @@ class Delay:
     mean: float
 
 
-def causal(ages: Mapping[str, Delay]) -> bool:
-    """Whether no FMU reads a sample that is stamped later than the start of its step."""
-    return all(age.min >= 0 for age in ages.values())
+def causal(ages: Mapping[str, Delay], system: System) -> bool:
+    """Whether no FMU reads a sample that is stamped later than the start of its step, but of a step
+    that was taken by then."""
+    return all(age.min >= 0 or system.connection[n].needs == "step" for n, age in ages.items())
 
 
 MAX_EVENTS = 100_000

@@ -208,7 +208,7 @@ def _details(
     return RunEnding(
         calls={name: i.calls for name, i in instances.items()},
         delays=ages,
-        causal=causal(ages),
+        causal=causal(ages, system),
         links=simulation.links(),
         premises=simulation.premises(),
         overdrawn=simulation.overdrawn(),

@@ -17,6 +17,7 @@ from hapticlink.orchestrator.run.energy.bonds import Reader, bond
 from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.scene_tables import Latency, SetSpring
 from hapticlink.orchestrator.system import ports
+from hapticlink.orchestrator.system.read_beside import read_beside
 from hapticlink.orchestrator.system.springs import spring
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -49,10 +50,11 @@ class HoldParts:
     or the energy that the far side of a spring has put in. turns: for each entry of a sample that
     is a wrapped angle, a full turn in its unit. matrix: "projector" or "semidefinite". context:
     what a plugin's hold is constructed from. frames: whether a sample describes the beginning of
-    its source's step. coordinates: reads those in which the gradient beside a sample is. base: a
-    tick (s). spring: the one that it sets, or on whose far side it is; row: 0 for its set position,
-    1 for its set velocity. far: the connection whose hold observes the far side of the spring that
-    this one sets.
+    its source's step. relation: what the first of `further` are to the signal, of `ahead`. beside:
+    reads what the law reads beside samples; gains: K and B of the force whose both ends these are.
+    parts: steps of the target in one of its period. base: a tick (s). spring: the one that it sets,
+    or on whose far side it is; row: 0 for its set position, 1 for its set velocity. far: the
+    connection whose hold observes the far side of the spring that this one sets.
     """
 
     name: str
@@ -67,7 +69,10 @@ class HoldParts:
     frames: bool = False
     displacement: Reader | None = None
     velocity: Reader | None = None
-    coordinates: Reader | None = None
+    relation: str = "ALONE"
+    beside: Reader | None = None
+    gains: tuple[Vector, Vector] | None = None
+    parts: int = 1
     spring: SetSpring | None = None
     row: int = 0
     far: str | None = None
@@ -108,7 +113,10 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
         frames=system.fmu[connection.source].frames,
         displacement=displacement,
         velocity=velocity,
-        coordinates=_coordinates(connection, signals),
+        relation=ports.relation(connection, system.fmu) if kind.needs == "step" else "ALONE",
+        beside=_beside(connection, signals),
+        gains=_gains(connection, system) if kind.needs == "coupling" else None,
+        parts=system.coupling.substeps.get(connection.target, 1),
         spring=of,
         row=of.ports.index(f"{connection.target}.{connection.target_port}") if of else 0,
     )
@@ -149,18 +157,26 @@ def _motion(connection: Connection, signals: SignalVector) -> tuple[Reader, Read
     return moved, Reader(signals, places.tolist(), work)
 
 
-def _coordinates(connection: Connection, signals: SignalVector) -> Reader | None:
-    """Reads what the input of the source, in which the gradient is, would get at the moment."""
-    fed = ports.coordinates(connection, signals.system)
-    if fed is None:
+def _beside(connection: Connection, signals: SignalVector) -> Reader | None:
+    """Reads what a hold reads beside its samples, as the inputs of other connections get it."""
+    read = read_beside(connection, signals.system)
+    if not read:
         return None
-    conversions = [s.conversion for s in fed.inputs]
-    return Reader(
-        signals,
-        signals.sources(fed),
-        np.array([c.factor for c in conversions]),
-        np.array([c.offset for c in conversions]),
-    )
+    places, factors, offsets = list[int](), list[float](), list[float]()
+    for row in read:
+        where = signals.hold(row.of.name) if row.held else None
+        places += signals.sources(row.of) if where is None else range(where.start, where.stop)
+        factors += [row.sign * s.conversion.factor for s in row.of.inputs]
+        offsets += [row.sign * s.conversion.offset for s in row.of.inputs]
+    return Reader(signals, places, np.array(factors), np.array(offsets))
+
+
+def _gains(connection: Connection, system: System) -> tuple[Vector, Vector]:
+    """K and B of the spring-damper whose force a connection has."""
+    of = system.energy.coupling(connection, system.connections)
+    assert of is not None
+    K = np.array(of.stiffness)
+    return K, np.array(of.damping) if of.damping else np.zeros_like(K)
 
 
 def describe_spring(of: SetSpring, signals: SignalVector) -> SpringParts:

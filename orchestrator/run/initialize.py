@@ -85,10 +85,11 @@ def initialize(
 
 def find_stop(system: System, fmu: Fmu, rates_change: bool) -> float:
     """The stop time (s) that an FMU is told: the end of the run for a plant, which takes no step
-    beyond it; for a sampled block the end of the step that it begins then at the latest, with the
-    longest period that its clock may be given where the rates of slower clocks can change."""
+    beyond it; for a sampled block, and a plant whose steps are taken early, the end of the step
+    that it begins then at the latest, with the longest period that its clock may be given where the
+    rates of slower clocks can change."""
     time = system.timeline
-    if not fmu.sampled:
+    if not fmu.sampled and fmu.name not in system.early:
         return time.seconds(time.end)
     if rates_change and fmu.clock != time.clocks[0].name:
         return time.seconds(time.end) + LONGEST

@@ -76,6 +76,8 @@ def _with_meters(operations: Iterable[Operation], simulation: Simulation) -> Ite
     meters, collected = simulation.meters, set[str]()
     for operation in operations:
         match operation:
+            case Get(fmu, ahead) if ahead and fmu in simulation.system.early:
+                yield operation  # meters take it when the step has ended
             case Get(fmu, ahead):
                 clock = simulation.beside.get(fmu)
                 if clock and clock not in collected:

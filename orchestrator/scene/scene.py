@@ -108,6 +108,9 @@ class Scene:
     downsampling: Annotated[str, HOLDS.names(lambda hold: hold.downsamples)] = "latest"
     """Hold on connections from a fast rate to a slow one: the latest sample, or the mean over the
     slow step."""
+    computing_time: Elapsed = 0.0
+    """Time after which the result of a step is there that is taken when it begins: [the mechanism
+    at the graphics rate](holds.md#the-mechanism-at-the-graphics-rate)."""
     holds: Mapping[str, HoldName] = field(default_factory=dict)
     """Hold of single connections, by source, target or "source -> target"."""
     delays: Mapping[str, Elapsed | Latency] = field(default_factory=dict)

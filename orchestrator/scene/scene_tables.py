@@ -210,8 +210,15 @@ class SetSpring:
     force: str = ""
     """The output that is F, which acts with - on the FMU that sets the far end: with it the energy
     that either side puts in is available to both."""
+    mobility: str = ""
+    """The input with the mobility of both ends, where F is all that moves them apart."""
 
     @property
     def ports(self) -> tuple[str, ...]:
         """The inputs that set the far end: set position, and set velocity if there is one."""
         return tuple(p for p in (self.set_position, self.set_velocity) if p)
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Both ends, their rates and the mobility, "" for what is not declared."""
+        return self.set_position, self.position, self.set_velocity, self.velocity, self.mobility

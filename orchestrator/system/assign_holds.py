@@ -6,6 +6,8 @@ connection from a slower clock has the scene's `hold`, one from a faster clock i
 and one between clocks that differ only in phase `zoh`, since every sample is read there. A
 connection within a rate has no hold unless it is named or has a latency. A default hold that needs
 power is assigned to every connection across clocks that carries power, in either direction.
+
+What `model` stands for is in early_steps.py.
 """
 
 from __future__ import annotations
@@ -19,6 +21,14 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Latency, PowerPort
 from hapticlink.orchestrator.system import springs
+from hapticlink.orchestrator.system.early_steps import (
+    find_early,
+    longer,
+    moves,
+    stands_for,
+    towards,
+    why_late,
+)
 from hapticlink.orchestrator.system.haptic_loop import energy_in_play
 from hapticlink.orchestrator.system.ports import (
     between_plants,
@@ -42,7 +52,7 @@ def assign(
     refused: list[Refused] = []
     assigned = tuple(_assign(connections, by_name, timeline, scene, energy, refused))
     assigned = tuple(_with_springs(assigned, by_name, scene.named_holds, energy, refused))
-    if scene.hold not in {c.hold for c in assigned}:
+    if not {c.hold for c in assigned} & {*stands_for("hold", scene.hold)}:
         # A default hold that fits no connection is an error. Between iterated plants it was the
         # interpolation that did not fit, which is replaced silently.
         refused = [
@@ -60,7 +70,8 @@ def _assign(
     energy: EnergyPorts,
     refused: list[Refused],
 ) -> Iterator[Connection]:
-    holds = scene.named_holds
+    connections = tuple(connections)
+    holds, early = scene.named_holds, find_early(scene, connections, fmus, timeline)
     between = scene.iteration.interpolation if scene.coupling == "iterated" else None
     for c in connections:
         if c.initial:
@@ -80,11 +91,25 @@ def _assign(
                 hold = scene.downsampling if longest < other else "zoh"
         elif late and not hold:
             hold = "zoh"
+        if hold in ("model", "ahead") and c.source in early:
+            known = hold == "model" and companion_outputs(c, fmus, hold)
+            hold = hold if known else "ahead"
+            if hold == "ahead" and not late and scene.computing_time:
+                latency, late = Latency(min=scene.computing_time), True
+        elif hold == "model" and longer(c, fmus, timeline) < 0:
+            hold = towards(c, early, energy, connections)
         named = (scene.kinds[k] for k in names(c) if k in scene.kinds)
         c = replace(c, latency=latency if late else None, kind=next(named, kind(c, fmus)))
         iterated = between if between_plants(c, fmus) else None
         hold = hold or iterated
         reason = hold and why_unsuitable(hold, c, fmus, energy.power, iterated is not None)
+        if hold and HOLDS[hold].needs == "step":
+            reason = reason or why_late(c, scene, fmus, timeline)
+        elif hold == "model" and not reason and (of := moves(c, fmus, connections)) in early:
+            reason = (
+                f"it goes on in coordinates of {of}, whose samples are of the end of a frame; with "
+                "mechanism_at = 'graphics' take directions_from = 'mechanism'"
+            )
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
             hold = "foh" if iterated and not _has_rows(c) else "zoh"
@@ -100,8 +125,14 @@ def _with_springs(
 ) -> Iterator[Connection]:
     """The connections, with `zoh` where the hold needs a spring and has none that fits."""
     for c in connections:
-        needs_one = c.needs == "spring"
-        reason = springs.why_unlimited(c, energy.springs, connections, fmus) if needs_one else None
+        reason = None
+        if c.needs == "spring":
+            reason = springs.why_unlimited(c, energy.springs, connections, fmus)
+        elif c.needs == "coupling" and energy.coupling(c, connections) is None:
+            reason = (
+                f"{c.source}.{c.source_port} is no force of a spring-damper both ends of which are "
+                "connected and move with a known mobility (docs/holds.md); take 'half-lead'"
+            )
         if c.hold and reason:
             key = next((k for k in names(c) if k in holds), None)
             refused.append(Refused(key, c, c.hold, reason))

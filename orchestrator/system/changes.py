@@ -32,7 +32,8 @@ def number_of_point(linkage: Linkage | None, name: object) -> int:
 
 def settable(system: System, name: str) -> tuple[Scalar, ...]:
     """The entries of an input that no connection feeds, or of a tunable parameter, `fmu.port`.
-    Raises InputFault for others, and for the gains of a spring whose energy `pspm` limits."""
+    Raises InputFault for others, and for the gains of a spring of which `pspm` or `mid` has
+    those of the start."""
     scalars = scalars_of(system.fmu, name, "input", "parameter")
     if fed := feeding(system, name):
         raise InputFault(f"{name} is fed by a connection, {fed[0].name}")
@@ -40,8 +41,8 @@ def settable(system: System, name: str) -> tuple[Scalar, ...]:
         raise InputFault(f"{name} is not tunable: change its start value, in the scene")
     if name in find_limited_gains(system):
         raise InputFault(
-            f"{name} is a gain of a spring whose energy `pspm` limits, which counts with that "
-            "of the start: change its start value, in the scene"
+            f"{name} is a gain of a spring whose energy `pspm` limits or whose force `mid` takes, "
+            "which count with that of the start: change its start value, in the scene"
         )
     return scalars
 
@@ -71,6 +72,8 @@ def check_change(
     on_force = spring and any(d.needs == "spring" for d in system.connections)
     if on_force or "spring" in (c.needs, new.needs):
         why = "holds of a spring share its energy: take `reset`"
+    if c.hold != new.hold and {"step", "coupling"} & {c.needs, new.needs}:
+        why = "when its samples are taken is planned before the start: take `reset`"
     if why:
         raise InputFault(f"hold of {c.name} = {new.hold}: {why}")
     return new

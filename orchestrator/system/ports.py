@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from hapticlink.components.ports import Kind
 from hapticlink.orchestrator.base.errors import InputFault, unknown
+from hapticlink.orchestrator.base.signal_names import MECHANISM
 from hapticlink.orchestrator.fmi.units import MATRICES, turn
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
@@ -98,27 +99,32 @@ def companion_outputs(
     connection's outputs: their time derivatives or integrals, or where their gradient is taken and
     the gradient, if it needs them; () where the source does not declare them."""
     name, source = hold or c.hold, fmus[c.source].description
+    needs = HOLDS[name].needs if name else None
+    if needs == "step":
+        beside = source.derivative(c.outputs) or source.integral(c.outputs) or ()
+        return (*beside, *(acceleration(c, fmus) if beside and c.latency else ()))
     related = {
         "derivative": source.derivative,
         "integral": source.integral,
         "gradient": source.gradient,
     }
-    find = related.get(HOLDS[name].needs or "") if name else None
+    find = related.get(needs or "")
     return (find(c.outputs) or ()) if find else ()
 
 
-def coordinates(c: Connection, system: System) -> Connection | None:
-    """The connection into the source with the coordinates in which it declares the gradient of this
-    connection's port; None where its hold needs no gradient. Raises InputFault where these are not
-    fed by one connection as a whole."""
-    if c.needs != "gradient":
-        return None
-    description = system.fmu[c.source].description
-    by = next(g.by for g in description.gradients.values() if g.of == c.source_port)
-    fed = [i for i in system.into(c.source) if i.inputs == description.port(by, "input")]
-    if len(fed) != 1:
-        raise InputFault(
-            f"hold of {c.name}: its gradient is in {c.source}.{by}, which is not fed by one "
-            "connection as a whole: take another hold"
-        )
-    return fed[0]
+def relation(c: Connection, fmus: Mapping[str, Fmu]) -> str:
+    """What the outputs of a source that come first beside those of a connection are to these, by
+    its name in loop.h."""
+    source = fmus[c.source].description
+    if source.derivative(c.outputs):
+        return "WITH_RATE"
+    return "WITH_POSE" if source.integral(c.outputs) else "ALONE"
+
+
+def acceleration(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...]:
+    """The mobility and the acceleration without efforts of the mechanism's point of which a
+    connection has the pose or the velocity; () of others."""
+    source, n = fmus[c.source].description, len(c.outputs)
+    known = source.block == MECHANISM and c.source_port in ("x", "v")
+    found = [source.port(name, "output") for name in ("Lambda_inv", "a_bias") if known]
+    return (*found[0], *found[1]) if [len(f) for f in found] == [n * n, n] else ()

@@ -29,7 +29,7 @@ def find_declared_springs(
     for fmu in fmus:
         for spring in fmu.description.springs:
             if not {(fmu.name, spring.stiffness), (fmu.name, spring.damping)} & fed:
-                given = {port: getattr(spring, port) for port in SPRING_ENDS}
+                given = {port: getattr(spring, port) for port in (*SPRING_ENDS, "mobility")}
                 yield SetSpring(
                     stiffness=_start_values(fmu, spring.stiffness),
                     damping=_start_values(fmu, spring.damping),
@@ -44,14 +44,16 @@ def _start_values(fmu: Fmu, parameter: str) -> tuple[float, ...]:
 
 
 def find_limited_gains(system: System) -> set[str]:
-    """The gains, `fmu.parameter`, of springs whose energy a hold limits: its tank has their values
-    at the start, so that they may not change while the scene runs."""
+    """The gains, `fmu.parameter`, of springs whose energy a hold limits, or whose force it takes
+    for the middle of a step: it has their values at the start, so that they may not change while
+    the scene runs."""
     held = {_end(c) for c in system.connections if c.needs == "spring"}
+    mids = {(c.source, c.source_port) for c in system.connections if c.needs == "coupling"}
     return {
         f"{fmu.name}.{gain}"
         for fmu in system.fmus
         for spring in fmu.description.springs
-        if f"{fmu.name}.{spring.set_position}" in held
+        if f"{fmu.name}.{spring.set_position}" in held or (fmu.name, spring.force) in mids
         for gain in (spring.stiffness, spring.damping)
         if gain
     }
@@ -104,6 +106,9 @@ def check_springs(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
             elif inputs and entries != inputs:
                 message = f"{port} has {entries} entries, {s.set_position} {inputs}"
                 yield ("spring", i, end), message
+        if s.mobility and size(s.mobility, fmus, "input") != inputs * inputs:
+            message = f"there is no input {s.mobility} with {inputs} times {inputs} entries"
+            yield ("spring", i, "mobility"), message
         for gain in ("stiffness", "damping"):
             values = getattr(s, gain)
             if inputs and len(values) != inputs and (values or gain == "stiffness"):

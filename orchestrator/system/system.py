@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -120,6 +120,10 @@ class Coupling:
     """Plants whose outputs may be read again after inputs are set, without a doStep between."""
 
 
+MOST = 6
+"""Entries of a spring-damper up to which its force is taken for the middle of a step."""
+
+
 @dataclass(frozen=True)
 class EnergyPorts:
     """What is known of the energy that crosses connections."""
@@ -132,6 +136,18 @@ class EnergyPorts:
     checked."""
     driven: bool = False
     """Whether drives or forces of plugins put energy into the mechanism."""
+
+    def coupling(self, c: Connection, connections: Iterable[Connection]) -> SetSpring | None:
+        """The spring-damper whose force a connection has, if both its ends move with a mobility
+        that is known, each of these is brought by one connection, and there are no more entries
+        than MOST."""
+        force, n = f"{c.source}.{c.source_port}", len(c.inputs)
+        own = next((s for s in self.springs if s.force == force and all(s.ends)), None)
+        if own is None or n > MOST:
+            return None
+        to = {f"{k.target}.{k.target_port}": len(k.inputs) for k in connections if not k.initial}
+        sizes = [to.get(end) for end in own.ends]
+        return own if sizes == [n, n, n, n, n * n] else None
 
 
 @dataclass(frozen=True)
@@ -200,7 +216,7 @@ class System:
     def is_alike(self, other: System) -> bool:
         """Whether `other` differs in start values of FMUs and the ticks of its clocks alone, and no
         hold depends on these."""
-        if any(c.needs in ("spring", "power") for c in self.connections):
+        if any(c.needs in ("spring", "power", "coupling") for c in self.connections):
             return self == other
         return self._of_objects == other._of_objects
 
@@ -217,6 +233,12 @@ class System:
         clocks = time if late else ([c.name for c in time.clocks], time.of)
         rest = replace(self, fmus=fmus, energy=replace(self.energy, springs=()), timeline=_NO_TIME)
         return rest, names, len(self.energy.springs), changed, clocks
+
+    @cached_property
+    def early(self) -> frozenset[str]:
+        """The FMUs whose steps are taken as soon as they begin, before those of others: their
+        samples describe the end of a step."""
+        return frozenset(c.source for c in self.connections if c.needs == "step")
 
     def into(self, name: str) -> tuple[Connection, ...]:
         return tuple(c for c in self.connections if c.target == name and not c.initial)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from hapticlink.analysis.search.settings import GAINS, HOLDS
+from hapticlink.analysis.search.settings import EARLY, GAINS, HOLDS
 
 TICKS = (51, 34, 26, 20, 17, 15, 13, 11, 10, 9, 8)
 RATES = {f"{512 / ticks:.0f}": f"512/{ticks}" for ticks in TICKS}
@@ -21,9 +21,9 @@ KEPT_APART, NEAREST = "22", "20"
 BIAS = ("none", "full")
 OF_MATRICES = ("zoh", "foh", "second-order", "delayed", "model")
 """Holds that are tried on Lambda^-1 and P_c."""
-OF_MOTION = tuple(hold for hold in HOLDS if hold != "model")
-"""Holds that are tried on what a mechanism at the graphics rate and its loop exchange, of which no
-FMU puts out gradients."""
+OF_MOTION = tuple(hold for hold in HOLDS if hold not in ("model", EARLY))
+"""Holds that are tried on what a mechanism at the graphics rate and its loop exchange; early steps
+have a study of their own."""
 
 REPORT = "stiff"
 INTEGRATORS = ("rk4", "semi-implicit-euler", "passive-midpoint")

@@ -62,6 +62,11 @@ CASES = {
     "a derivative": (
         "closed-loop-ideal", f'{HALF}; {SLOW}; holds={{"virtual_mechanism.x"="foh-derivative"}}',
     ),
+    "early steps": (
+        "closed-loop-ideal",
+        f"{HALF}; mechanism_at=graphics; directions_from=mechanism; controller.bias=full; "
+        "hold=model; downsampling=model; computing_time=0.01; graphics.rate={min=10,max=50,seed=2}",
+    ),
     "observer beside": ("closed-loop", f"{HALF}; device.observer.beside=true"),
     "kalman": ("closed-loop", f"{HALF}; device.observer.law=kalman; haptics.rate=600"),
     "mean": ("two-users", "duration=0.2; downsampling=mean"),

@@ -19,7 +19,14 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
     operations = before_plants(system, event)
     continuous = operation_sequences.firing(system, event)[1]
-    for fmu in operation_sequences.starting(event, continuous):
+    starting = operation_sequences.starting(system, event, continuous)
+    slow, others = operation_sequences.early_first(system, starting)
+    for fmu in slow:
+        operations += operation_sequences.feed(system, event, fmu)
+        operations += operation_sequences.step(system, event, fmu)
+    for fmu in (u for u in slow if u.name in system.early):
+        operations += operation_sequences.publish_early(system, event, fmu)
+    for fmu in others:
         operations += operation_sequences.feed(system, event, fmu)
         operations += operation_sequences.step(system, event, fmu)
     return tuple(operations)

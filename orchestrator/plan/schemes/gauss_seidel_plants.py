@@ -18,7 +18,9 @@ from hapticlink.orchestrator.system.system import Fmu, System
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     """The operations of `event`. Raises InputFault for a feed-through loop of sampled blocks."""
     operations = gauss_seidel.before_plants(system, event)
-    starting = operation_sequences.starting(event, operation_sequences.firing(system, event)[1])
+    starting = operation_sequences.starting(
+        system, event, operation_sequences.firing(system, event)[1]
+    )
     for unit in (u for group in dependency_order.plants(system, starting) for u in group):
         operations += operation_sequences.feed(system, event, unit)
         operations += operation_sequences.step(system, event, unit)

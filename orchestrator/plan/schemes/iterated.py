@@ -60,7 +60,9 @@ def order_fmus(system: System) -> list[list[Fmu]]:
 
 def groups(system: System, event: Event) -> list[list[Fmu]]:
     """The plants that start a step, in order; those of a loop are in one group."""
-    starting = operation_sequences.starting(event, operation_sequences.firing(system, event)[1])
+    starting = operation_sequences.starting(
+        system, event, operation_sequences.firing(system, event)[1]
+    )
     clock = {u.name: u.clock for u in starting}
     feeds = {
         u.name: {c.source for c in system.into(u.name) if clock.get(c.source) == u.clock}

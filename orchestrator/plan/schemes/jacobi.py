@@ -13,7 +13,7 @@ from hapticlink.orchestrator.system.system import System
 
 def block(system: System, event: Event) -> tuple[Operation, ...]:
     sampled, continuous = operation_sequences.firing(system, event)
-    started = operation_sequences.starting(event, continuous)
+    started = operation_sequences.starting(system, event, continuous)
     operations: list[Operation] = [*operation_sequences.publish_ended(system, event, continuous)]
     for unit in [*sampled, *started]:
         operations += operation_sequences.feed(system, event, unit)
@@ -28,4 +28,6 @@ def block(system: System, event: Event) -> tuple[Operation, ...]:
     for unit in started:
         if unit not in divided:
             operations += operation_sequences.step(system, event, unit)
+    for unit in (u for u in started if u.name in system.early):
+        operations += operation_sequences.publish_early(system, event, unit)
     return tuple(operations)

@@ -109,8 +109,12 @@ class CompiledHold:
         if parts.matrix:
             kinds = {"projector": structures.PROJECTOR, "semidefinite": structures.SEMIDEFINITE}
             c.fill(manifold=kinds[parts.matrix], rows=rows, rank=-1)
-        if parts.coordinates:
-            fill_reader(c.coordinates, parts.coordinates)
+        if parts.beside:
+            fill_reader(c.beside, parts.beside)
+        if parts.gains:
+            c.fill(stiffness=parts.gains[0], damping=parts.gains[1])
+        c.fill(relation=getattr(structures, parts.relation), parts=parts.parts)
+        c.fill(early=row.needs == "step")
         self._growing: list[tuple[structures.Structure, dict[str, int]]] = []
         self.link: Any = None
         self.account: Any = None

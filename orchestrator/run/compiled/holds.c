@@ -127,7 +127,7 @@ static int64_t described(Hold *h, int64_t published) {
 
 EXPORT int hapticlink_push(Hold *h, const double *y, int64_t published, int64_t arrival) {
     const int64_t stamp = described(h, published);
-    if (h->link && h->link->started) return send(h->link, y, h->width, stamp, published, arrival);
+    if (h->link && h->link->started) return send(h->link, y, h->width, stamp, h->early ? arrival : published, arrival);
     if (h->account && !account_has_room(h->account, 1)) return GROW;
     if (h->link) h->link->started = 1;
     return push(h, y, stamp, arrival);

@@ -183,7 +183,8 @@ typedef struct {
  * `memory`: (remembers, n), what else the kind remembers. `scratch`: since the stack is no place for arrays of any
  * size, 2 n for matrices and a sample that is unwrapped, as many and `width` for the caller, 2 n of these for the kind.
  * restart, take, give: of a hold in Python. published: when the source had its newest sample; describes: the instant
- * that this describes, which is its stamp in all that the hold does. */
+ * that this describes, which is its stamp in all that the hold does. `beside`: what the law reads beside the samples, n = 0
+ * without any: the coordinates of a gradient, the efforts that move the source, both ends of a spring-damper. */
 typedef struct {
     int64_t kind, n, width, depth, remembers;
     const int64_t *sources /* [width] */;
@@ -200,7 +201,11 @@ typedef struct {
     double *chosen /* [rows] */;
     void *restart, *take, *give;
     int64_t frames;                       /* whether a sample describes the instant at which the one before was published */
-    Reader coordinates;                   /* in which a gradient is, n = 0 without one */
+    int64_t early;                        /* whether a sample is of the end of a step and known at its begin */
+    int64_t relation;                     /* of what is behind the n entries of a sample of `ahead` */
+    int64_t parts;                        /* steps that the target takes within one of its period */
+    const double *stiffness /* [n] */, *damping /* [n] */; /* of a spring-damper, or NULL */
+    Reader beside;
     /* state: */
     int64_t published, describes;
     int64_t count, stamps[3], arrival, span, interval, begun, unwrapped, rank;
@@ -212,6 +217,7 @@ typedef struct {
 } Hold;
 
 enum { NO_MATRIX, PROJECTOR, SEMIDEFINITE };
+enum { ALONE, WITH_RATE, WITH_POSE };
 
 /* --- meters, tables --------------------------------------------------------------------------- */
 

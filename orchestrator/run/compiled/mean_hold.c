@@ -45,3 +45,15 @@ int value_mean(Hold *h, const Loop *l, int64_t tick, double ahead, double *value
     memcpy(value, held, h->n * sizeof *value);
     return 0;
 }
+
+/* y + (y - mean)/2 of the newest sample y and the mean of the last frame, for an effort that acts on the target over a frame.
+ *
+ * The mean is of H/2 before the frame begins, so that y + c (y - mean) is of c H/2 behind that. With c = 1, the middle of
+ * the frame, whatever of the effort depends on the target is fed back at full strength, a frame late; half of it is what
+ * stays stable. */
+int value_half_lead(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
+    const double *newest = h->memory;
+    value_mean(h, l, tick, ahead, value);
+    for (int64_t k = 0; k < h->n; k++) value[k] = newest[k] + (newest[k] - value[k]) / 2;
+    return 0;
+}

@@ -27,13 +27,13 @@ static double size(const Hold *h, const double *matrix) {
 }
 
 int value_model(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
-    const int64_t n = h->n, m = h->coordinates.n;
+    const int64_t n = h->n, m = h->beside.n;
     const double *y = h->samples + (h->count - 1) * h->width, *q = y + n, *G = q + m;
     (void)tick;
     (void)ahead;
     for (int64_t i = 0; i < n; i++) {
         value[i] = 0.0;
-        for (int64_t j = 0; j < m; j++) value[i] += G[i * m + j] * (reading(&h->coordinates, l->values, j) - q[j]);
+        for (int64_t j = 0; j < m; j++) value[i] += G[i * m + j] * (reading(&h->beside, l->values, j) - q[j]);
     }
     double s = 1.0;
     if (h->manifold) {

@@ -16,6 +16,7 @@ from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.polynomial_holds import advanced_powers, slopes_of_powers
 from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.orchestrator.run.compiled.state import StateBlock
+from tests.analysis.stability.own_hand import linearised
 from tests.orchestrator.holds.bench import Bench
 from tests.orchestrator.holds.test_laws import LAWS
 
@@ -87,8 +88,23 @@ def test_along_the_coordinates_of_a_gradient_a_hold_has_slopes(
     monkeypatch.setattr(
         ForwardSensitivity,
         "_is_smooth",  # others read and write all signals
-        lambda self, name: (
-            not self._simulation.holds[name].parts.coordinates and is_smooth(self, name)
-        ),
+        lambda self, name: not self._simulation.holds[name].parts.beside and is_smooth(self, name),
     )
     assert declared == pytest.approx(found(), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"downsampling": "latest"}, {"computing_time": 0.02}, {"coupling": "jacobi"}],
+    ids=str,
+)
+def test_early_steps_have_the_modes_of_the_whole_map(changes: dict[str, Any]) -> None:
+    """Slopes of single operations, against differences of the whole period along each number."""
+    options = SCENE | {"hold": "model", "downsampling": "model", "controller.bias": "full"}
+    options |= {"directions_from": "mechanism", "graphics.rate": 16, "haptics.rate": 512}
+    with resting("closed-loop-direct", options | changes) as place:
+        assert place.map.system.early
+        period = place.period({})
+        whole = linearised(place.map, period.point)
+        parts, both = (np.abs(np.linalg.eigvals(at.A)) for at in (period.in_map, whole))
+        assert np.sort(parts)[-6:] == pytest.approx(np.sort(both)[-6:], abs=1e-5)

@@ -44,7 +44,7 @@ class Bench:
         kind = HOLDS[name]
         width = 2 * size if kind.needs in ("derivative", "integral") else size
         if kind.needs == "gradient":
-            reader = parts.setdefault("coordinates", self.reader([0]))
+            reader = parts.setdefault("beside", self.reader([0]))
             width += len(reader.where) * (1 + size)
         context = HoldContext(size, self.seconds, parts.get("displacement"), parts.get("velocity"))
         every = HoldParts(name, kind, tuple(range(width)), context, self.base, **parts)

@@ -14,7 +14,7 @@ ENTRIES, COORDINATES = 9, 2
 def bench(matrix=None, factor=1.0):
     made = Bench(COORDINATES)
     reader = made.reader(range(COORDINATES), factor)
-    return made, made.hold("model", ENTRIES, matrix=matrix, coordinates=reader)
+    return made, made.hold("model", ENTRIES, matrix=matrix, beside=reader)
 
 
 @settings(max_examples=25, deadline=None)

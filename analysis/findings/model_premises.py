@@ -1,0 +1,54 @@
+"""Where the hold `model` of a mechanism at the graphics rate gains less than it can."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hapticlink.analysis.findings.tracking import table_of
+from hapticlink.orchestrator.base.signal_names import MECHANISM, MOBILITIES
+from hapticlink.orchestrator.results.numbers import short
+from hapticlink.orchestrator.results.read_results import Results
+
+STIFF = 1.5
+"""k lambda H^2 of a hand of stiffness k on the mobility lambda, with frames of H, from which on
+firmer gains than soft ones seldom keep the limits (results/model)."""
+
+
+def describe_premises(results: Results) -> Iterator[str]:
+    """A line for each setting of a run with early steps in which its hold gains less."""
+    record = results.record
+    if "ahead" not in record.holds.values():
+        return
+    scene, less = record.scene, "hold = 'model' gains less here:"
+    if scene["sensing"] == "encoders":
+        yield (
+            f"{less} with encoders the observer's estimate of the hand's wrench decides, which "
+            "no hold improves (results/model)"
+        )
+    if (scene["controller"] or {}).get("bias") == "none":
+        yield (
+            f"{less} without Coriolis and centrifugal compensation the handle moves otherwise "
+            "than the mechanism, whatever is held: take controller.bias = 'full'"
+        )
+    if (share := stiffness_of_frame(results)) >= STIFF:
+        yield (
+            f"{less} the hand's stiffness is sampled once a frame, and k lambda H^2 is "
+            f"{short(share)}, where {STIFF:g} is much: take a higher graphics rate, or soft gains"
+        )
+
+
+def stiffness_of_frame(results: Results) -> float:
+    """k lambda H^2 of the hand's stiffness k on the mechanism's mobility lambda, the largest
+    eigenvalue of k^(1/2) Lambda^-1 k^(1/2) of the median over the run, times the square of its
+    longest frame; 0 where they are not known."""
+    record = results.record
+    k = np.atleast_1d((record.scene["hand"] or {}).get("stiffness") or 0.0)
+    table = table_of(results, MOBILITIES[1])
+    if not k.any() or table is None or not len(table["time"]):
+        return 0.0
+    frame = record.clocks[record.fmus[MECHANISM].rate].longest
+    mobility = np.median(table[MOBILITIES[1]], axis=0).reshape(len(k), len(k))
+    root = np.sqrt(np.diag(k))
+    return float(np.linalg.eigvalsh(root @ mobility @ root)[-1]) * frame**2
