@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2816,
     "orchestrator": 13603,
     "programs": 1021,
-    "analysis": 7643,
+    "analysis": 7645,
     "visualization": 3415,
     "api": 467,
     "commands": 1457,

@@ -46,7 +46,7 @@ def is_linear(hold: CompiledHold) -> bool:
 
 def is_ageless(hold: CompiledHold) -> bool:
     """Whether the value of a hold follows from its sample and the coordinates of the moment."""
-    return bool(hold.parts.coordinates) and hold.row.degree == 0 and not hold.link
+    return hold.row.needs == "gradient" and hold.row.degree == 0 and not hold.link
 
 
 def sample_arrives(hold: CompiledHold, tick: int) -> bool:

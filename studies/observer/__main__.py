@@ -15,7 +15,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("results/observer"))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     asked = parser.parse_args()
-    plugins.load(("studies.observer.tried_observer",))
+    plugins.load(("studies.observer.plugin",))
     from hapticlink.analysis.sweep import table
     from hapticlink.analysis.sweep.run_sweep import sweep
     from studies.observer import cases, measure, page

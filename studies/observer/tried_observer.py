@@ -18,7 +18,6 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from hapticlink.components.blocks import BLOCKS
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.device import pantograph
 from hapticlink.components.device.variables import (
@@ -107,9 +106,6 @@ def tried_observer() -> Component:
         output={"x": x, "v": v, "F_hand_observed": F + impulse, "M": inertia, "c": c},
         documentation=__doc__ or "",
     )
-
-
-BLOCKS.register(NAME, tried_observer)
 
 
 def options(omega_n: float, *, order: int = 3, **settings: float) -> dict[str, Any]:

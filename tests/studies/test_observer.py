@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.base import plugins
+from hapticlink.components.blocks import BLOCKS
 from studies.observer import cases, measure, page, tried_observer
-
-MODULE = "studies.observer.tried_observer"
 
 
 def test_vibration_is_the_root_mean_square_of_what_is_fast() -> None:
@@ -36,8 +34,8 @@ def test_draws_kept_apart_are_none_that_was_tuned_on() -> None:
     assert (len(tuned), len(apart), len(list(cases.kept_apart()))) == (24, 32, 288)
 
 
-def test_the_observer_with_scipy_s_gains_sees_what_that_of_the_package_sees() -> None:
-    plugins.load((MODULE,))
+def test_the_observer_with_scipy_s_gains_sees_what_that_of_the_package_sees(monkeypatch) -> None:
+    monkeypatch.setitem(BLOCKS, tried_observer.NAME, tried_observer.tried_observer)
     given = {"controller.bias": "full", "duration": 0.3}
     own = {"device.observer": {"law": "kalman", "omega_n": 119.0, "beside": True}}
     ours = hl.run("closed-loop", given | own, figures=False)

@@ -190,6 +190,23 @@ def test_the_best_point_of_the_title_lost_no_run() -> None:
     assert title.endswith("at k = 2; 1 of 4 runs ended early or failed")
 
 
+def test_a_point_whose_runs_all_ended_is_marked() -> None:
+    """One of two runs is a median of one."""
+    rows = [
+        {"k": k, "repetition": str(i), "end": end, "tracking_max_mm": 1.0}
+        for k, ends in (
+            ("k1", ["duration"] * 2),
+            ("k2", ["diverged"] * 2),
+            ("k3", ["duration", "died"]),
+        )
+        for i, end in enumerate(ends)
+    ]
+    figure = sweep_figure.draw(rows, ["k"])
+    assert figure is not None
+    said = [text.get_text().strip() for text in figure.axes[0].texts]
+    assert said == ["none of 2 runs lasted"]
+
+
 def test_a_notebook_shows_the_points(swept: hl.Sweep) -> None:
     html = swept._repr_html_()
     assert html.count("<tr>") == 3
