@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2816,
     "orchestrator": 13256,
     "programs": 1021,
-    "analysis": 7187,
+    "analysis": 7197,
     "visualization": 3369,
     "api": 448,
     "commands": 1407,
