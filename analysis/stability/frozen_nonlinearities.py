@@ -8,7 +8,7 @@ Switches stay as they are at the equilibrium.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from hapticlink.analysis.stability.state_vector import StateEntry
@@ -20,6 +20,8 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 NEXT_TO_NOTHING = 1e-18
 """Of friction (N, N.m), which sets a stiffness by a quotient and so must not be 0."""
+TAKEN_OUT, AS_AT_REST = "taken out", "as at the equilibrium"
+"""What becomes of a nonlinearity, at the end of its line."""
 DISCRETE = {
     ("fmu", "n_constrained"),
     ("fmu", "deflection"),
@@ -36,13 +38,13 @@ def without(system: System) -> tuple[System, list[str]]:
         starts = []
         for scalar, value, what in _find_removed(system, fmu):
             starts.append((scalar, value))
-            lines.append(f"{fmu.name}.{scalar.name}: {what}, taken out")
+            lines.append(f"{fmu.name}.{scalar.name}: {what}, {TAKEN_OUT}")
         fmus.append(fmu.starting(tuple(starts)))
     drawing = any(c.hold and HOLDS[c.hold].needs == "spring" for c in system.connections)
     connections = []
     for c in system.connections:
         if has_friction(c):
-            lines.append(f"{c.name}: the friction of hold {c.hold}, taken out")
+            lines.append(f"{c.name}: the friction of hold {c.hold}, {TAKEN_OUT}")
             c = c if drawing else replace(c, hold="zoh")
         connections.append(c)
     return replace(system, fmus=tuple(fmus), connections=tuple(connections)), lines
@@ -95,7 +97,17 @@ def describe_switches(system: System) -> list[str]:
     for c in system.connections:
         if c.hold and HOLDS[c.hold].needs in ("power", "spring") and not has_friction(c):
             lines.append(f"{c.name}: the regime of hold {c.hold}")
-    return [f"{line}, as at the equilibrium" for line in lines]
+    return [f"{line}, {AS_AT_REST}" for line in lines]
+
+
+def name_by_end(lines: Sequence[str]) -> str:
+    """What lines on nonlinearities are about, each once, by what becomes of it."""
+    parts = []
+    for end in (TAKEN_OUT, AS_AT_REST):
+        ours = [line.removesuffix(f", {end}") for line in lines if line.endswith(f", {end}")]
+        if what := dict.fromkeys(line.partition(": ")[2] for line in ours):
+            parts.append(f"{end}: {', '.join(what)}")
+    return "; ".join(parts)
 
 
 def discrete(coordinate: StateEntry) -> bool:

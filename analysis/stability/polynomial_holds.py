@@ -71,8 +71,7 @@ def slopes_of_powers(hold: CompiledHold, block: StateBlock, tick: int, ahead: fl
         block.restore(state, numbers)
         return np.array([hold.value(tick, ahead + later) for later in at])
 
-    unmoved = values(z)
-    moved = np.array([values(z + step) - unmoved for step in np.diag(steps)])
+    moved = np.array([values(z + step) - values(z - step) for step in np.diag(steps)]) / 2
     block.restore(state, state.numbers)
     slopes = np.moveaxis(moved, 0, -1) / steps  # (instants, n, numbers)
     powers = np.linalg.inv(np.vander(np.arange(degree + 1.0), increasing=True))

@@ -9,6 +9,7 @@ from html import escape
 from typing import Any
 
 from hapticlink.analysis.search.search import DOUBLINGS
+from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import Case, worst_case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
@@ -198,6 +199,9 @@ class Stability:
             yield self.rounded
         for pose, why in self.without.items():
             yield f"pose at {pose} left out: {why}"
+        apart = frozen_nonlinearities.name_by_end(self.frozen)
+        if apart:
+            yield f"judged for small motions; {apart}"
 
     def _margins(self) -> Iterator[str]:
         margin = self.margin

@@ -12,8 +12,10 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.findings.report_premises import describe_experiment
 from hapticlink.analysis.findings.summary import describe_work
+from hapticlink.analysis.stability.frozen_nonlinearities import describe_switches
 from hapticlink.analysis.stability.hand_cases import Case
 from hapticlink.analysis.stability.margin_and_remedy import Margin
+from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.tune.tuning_result import Tuned
 from hapticlink.visualization.compare import page
@@ -48,6 +50,22 @@ def test_a_verdict_of_drift_names_the_hands_that_drift() -> None:
     assert shakes.finding.startswith("unstable: oscillation of 0.4 Hz grows at 0.5 1/s")
     calm = verdict(("0 s", "light touch", -0.1, "stable", "drift"), marginal)
     assert calm.finding.startswith("stable in 1 of 2 hands and marginal in the others, 1 pose")
+
+
+def test_a_verdict_says_for_what_it_is_and_what_it_left_out() -> None:
+    """The friction of the hold passive is taken out, and a switch stays as it is: a run of
+    0.3 mm beside a pose in which small motions decay can go on for ever."""
+    held = verdict(("0 s", "light touch", -1.0, "stable", "oscillation"))
+    assert not any(line.startswith("judged for") for line in held.lines())
+    options = {"hold": "passive", "sensing": "encoders"}
+    with linearisable("closed-loop-direct", options) as (_, system, removed):
+        frozen = (*removed, *describe_switches(system))
+    (line,) = (x for x in replace(held, frozen=frozen).lines() if x.startswith("judged for"))
+    assert line == (
+        "judged for small motions; taken out: quantisation of the encoders, the friction of hold "
+        "passive; as at the equilibrium: saturation of the motors, and the stops, number of "
+        "constrained directions"
+    )
 
 
 def test_a_margin_says_that_other_poses_may_have_less() -> None:

@@ -15,6 +15,8 @@ from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.polynomial_holds import advanced_powers, slopes_of_powers
 from hapticlink.analysis.stability.resting_scene import resting
+from hapticlink.orchestrator.base.arrays import Matrix
+from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.state import StateBlock
 from tests.analysis.stability.own_hand import linearised
 from tests.orchestrator.holds.bench import Bench
@@ -108,3 +110,31 @@ def test_early_steps_have_the_modes_of_the_whole_map(changes: dict[str, Any]) ->
         whole = linearised(place.map, period.point)
         parts, both = (np.abs(np.linalg.eigvals(at.A)) for at in (period.in_map, whole))
         assert np.sort(parts)[-6:] == pytest.approx(np.sort(both)[-6:], abs=1e-5)
+
+
+@pytest.mark.parametrize("matrix", ["semidefinite", "projector"])
+def test_behind_a_manifold_slopes_are_those_of_samples_that_keep_their_rank(matrix: str) -> None:
+    """An entry that moves alone leaves the rank, where a semidefinite matrix has a slope to one
+    side only; along u u' the slopes of all entries add up to that of the hold all the same."""
+    draw = np.random.default_rng(3)
+    u, others = draw.normal(size=3), draw.normal(size=(3, 3))
+
+    def pushed(far: float) -> CompiledHold:
+        hold = Bench(9, Fraction(3, 7680)).hold("second-order", 9, matrix=matrix)
+        for stamp, w in zip((0, 17, 33), others, strict=True):
+            v = u + far * w
+            size = v @ v if matrix == "projector" else 1.0
+            hold.push(stamp, np.outer(v, v).ravel() / size, stamp)
+        return hold
+
+    def numbers(hold: CompiledHold) -> Matrix:
+        state: Matrix = StateBlock(hold.c).save().numbers
+        return state
+
+    far, tick, ahead = 1e-5, 41, 0.5
+    there, back = pushed(far), pushed(-far)
+    at = pushed(0.0)
+    powers = slopes_of_powers(at, StateBlock(at.c), tick, ahead)[:9]
+    told = powers @ (numbers(there) - numbers(back))
+    moved = there.value(tick, ahead) - back.value(tick, ahead)
+    np.testing.assert_allclose(told, moved, atol=1e-3 * far)
