@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2816,
     "orchestrator": 13437,
     "programs": 1021,
-    "analysis": 7607,
+    "analysis": 7609,
     "visualization": 3415,
     "api": 467,
     "commands": 1457,
