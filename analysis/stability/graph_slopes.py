@@ -17,6 +17,7 @@ import zipfile
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import casadi as ca
@@ -144,6 +145,8 @@ class _Buffered:
 
 
 _Mapped = tuple[_Buffered, _Buffered]
+_IN_PLACE = Lock()
+"""Numbers of one evaluation at a time: threads that judge at once share graphs."""
 
 
 def _map_with_jacobian(arguments: list[ca.SX], result: ca.SX) -> _Mapped:
@@ -156,6 +159,7 @@ def _map_with_jacobian(arguments: list[ca.SX], result: ca.SX) -> _Mapped:
 def _at(mapped: _Mapped, own: Matrix, *others: Vector | float) -> tuple[Matrix, Matrix]:
     """The results at the rows of `own`, and the Jacobian at the first one."""
     values, slopes = mapped
-    for function in mapped:
-        function.set_others(others)
-    return np.array([values.at(each)[:, 0] for each in own]), slopes.at(own[0])
+    with _IN_PLACE:
+        for function in mapped:
+            function.set_others(others)
+        return np.array([values.at(each)[:, 0] for each in own]), slopes.at(own[0])

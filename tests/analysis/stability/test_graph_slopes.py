@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,10 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.stability import forward_sensitivity
 from hapticlink.analysis.stability.forward_sensitivity import ForwardSensitivity
-from hapticlink.analysis.stability.graph_slopes import GraphSlopes
+from hapticlink.analysis.stability.graph_slopes import GraphSlopes, graph_slopes
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.plan.operations import Get, Step
+from hapticlink.orchestrator.system.build_system import build_system
 from tests.analysis.stability.own_hand import own_hand
 from tests.analysis.stability.test_stability import HELD
 
@@ -117,3 +121,29 @@ def test_semi_implicit_euler_of_a_pendulum_has_the_eigenvalues_of_its_map() -> N
     assert mode.z.real == pytest.approx(z.real, abs=1e-14)
     assert abs(mode.z.imag) == pytest.approx(abs(z.imag), abs=1e-13)
     assert found.radius == pytest.approx(math.sqrt(1 - c * h), abs=1e-14)
+
+
+def test_threads_that_judge_at_once_have_slopes_of_their_own() -> None:
+    scene = open_scene.load("pendulum")
+    with build_system(scene) as system:
+        fmu = system.fmu["virtual_mechanism"]
+        graph = graph_slopes(fmu.description, fmu.name, scene)
+    assert graph
+    n, own = graph._n, np.random.default_rng(1)
+    points = [
+        (own.normal(size=sum(n)), own.normal(size=(2, sum(n[i] for i in (1, 3, 4)))))
+        for _ in range(2)
+    ]
+
+    def slopes(point: int) -> bytes:
+        return b"".join(part.tobytes() for part in graph.step(*points[point], 0.002))
+
+    alone, often = [slopes(0), slopes(1)], sys.getswitchinterval()
+    assert alone[0] != alone[1]
+    try:
+        sys.setswitchinterval(1e-6)
+        with ThreadPoolExecutor(2) as threads:
+            found = [*threads.map(lambda i: [slopes(i) for _ in range(1000)], (0, 1))]
+    finally:
+        sys.setswitchinterval(often)
+    assert found == [[one] * 1000 for one in alone]
