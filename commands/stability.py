@@ -170,8 +170,14 @@ def _of_limits(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> Iterator[
             kind, value = row.get(what), short(row.get(f"largest_{what}") or 0.0)
             name = what.replace("_", " limit ")
             if kind:
-                end = {"limit": f"up to {value}", "at least": f"at least up to {value}"}
-                said.append(f"{name} {end.get(kind, 'with none that was tried')}")
+                end = {
+                    "limit": f"up to {value}",
+                    "at least": f"at least up to {value}",
+                    "none": "with none that was tried",
+                    "refused": "unknown",
+                }
+                why = row.get(f"message_{what}")
+                said.append(f"{name} {end[kind]}{f' ({why})' if why else ''}")
         if "cycle_m" in row:
             cycle = f"{short(1e6 * row['cycle_m'])} um at {short(row['cycle_hz'])} Hz"
             said.append(

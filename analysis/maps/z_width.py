@@ -120,17 +120,18 @@ def _largest(what: str, unit: float, verdict: Callable[[float], str]) -> Row:
         return given == what
 
     found = largest_scale(tried, FINE)
-    row: Row = {f"largest_{what}": unit * found.value, what: _kind(found, refused)}
+    row: Row = {f"largest_{what}": unit * found.value, what: _kind(found, refused, bool(others))}
+    said = []
+    if others and not found.value:
+        said.append(f"all that was tried is {' or '.join(others)}")
     if refused:
-        return row | {f"message_{what}": next(iter(refused.values()))}
-    if not found.value:
-        return row | {f"message_{what}": f"all that was tried is {' or '.join(others)}"}
-    return row
+        said.append(f"without a verdict: {next(iter(refused.values()))}")
+    return row | ({f"message_{what}": "; ".join(said)} if said else {})
 
 
-def _kind(found: Largest, refused: dict[float, str]) -> str:
-    """How the search ended."""
+def _kind(found: Largest, refused: dict[float, str], others: bool) -> str:
+    """How a search ended that met refusals, and other verdicts than the one that it looks for."""
     if not found.value:
-        return REFUSED if refused else NONE
+        return NONE if others else REFUSED
     near = any(found.value < scale < found.value * (1 + 2 * FINE) for scale in refused)
     return LIMIT if found.limited and not near else AT_LEAST

@@ -11,6 +11,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.maps import z_width
 from hapticlink.analysis.stability import wall_limits
+from hapticlink.commands import stability
 from tests.analysis.stability.own_hand import DAMPED as WALL
 
 M, D, T, QUANTUM, FRICTION = 0.3, 5.0, 1 / 512, 1e-4, 0.05
@@ -47,20 +48,48 @@ def test_limits_are_those_of_the_closed_forms(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("limited", "value", "refused", "kind"),
+    ("limited", "value", "refused", "others", "kind"),
     [
-        (True, 2.0, {}, "limit"),
-        (False, 2.0, {}, "at least"),
-        (True, 2.0, {2.0001: "diverges"}, "at least"),
-        (True, 2.0, {4.0: "diverges"}, "limit"),
-        (True, 0.0, {}, "none"),
-        (True, 0.0, {1.0: "diverges"}, "refused"),
+        (True, 2.0, {}, True, "limit"),
+        (False, 2.0, {}, False, "at least"),
+        (True, 2.0, {2.0001: "diverges"}, False, "at least"),
+        (True, 2.0, {4.0: "diverges"}, True, "limit"),
+        (True, 0.0, {}, True, "none"),
+        (True, 0.0, {1.0: "diverges"}, False, "refused"),
+        (True, 0.0, {1.0: "diverges"}, True, "none"),
     ],
 )
 def test_what_is_told_of_a_search(
-    limited: bool, value: float, refused: dict[float, str], kind: str
+    limited: bool, value: float, refused: dict[float, str], others: bool, kind: str
 ) -> None:
-    assert z_width._kind(z_width.Largest(value, limited), refused) == kind
+    assert z_width._kind(z_width.Largest(value, limited), refused, others) == kind
+
+
+def test_values_without_a_verdict_are_told_beside_those_that_have_one() -> None:
+    """Nothing is stable, and the softest have no equilibrium."""
+
+    def verdict(scale: float) -> str:
+        if scale < 0.1:
+            raise hl.InputFault("no equilibrium")
+        return "unstable"
+
+    row = z_width._largest("stable", 1000.0, verdict)
+    assert (row["largest_stable"], row["stable"]) == (0.0, "none")
+    assert row["message_stable"] == (
+        "all that was tried is unstable; without a verdict: no equilibrium"
+    )
+    (line,) = stability._of_limits([row | {"a": 1}], ["a"])
+    assert line == f"a=1: stable with none that was tried ({row['message_stable']})"
+
+
+def test_a_search_without_any_verdict_finds_no_limit_of_none() -> None:
+    def verdict(scale: float) -> str:
+        raise hl.InputFault("no equilibrium")
+
+    row = z_width._largest("stable", 1000.0, verdict)
+    assert row["stable"] == "refused"
+    (line,) = stability._of_limits([row | {"a": 1}], ["a"])
+    assert line == "a=1: stable unknown (without a verdict: no equilibrium)"
 
 
 @pytest.mark.parametrize(
