@@ -34,10 +34,10 @@ CODE_LINES = {
     "fmus": 2816,
     "orchestrator": 13437,
     "programs": 1021,
-    "analysis": 7607,
+    "analysis": 7717,
     "visualization": 3415,
     "api": 467,
-    "commands": 1457,
+    "commands": 1465,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -34,9 +34,7 @@ class Runs:
 
     def _measured(self, method: Method, drawn: Sequence[str]) -> Measured:
         self.ran += [(method.name, draw) for draw in drawn]
-        gains = open_scene.load(SCENE, method.options).controller
-        assert gains and gains.teleoperation
-        K, B = gains.teleoperation.stiffness[0], gains.teleoperation.damping[0]
+        K, B = gains(method)
         errors = np.array([self.error(K, B, draw) for draw in drawn])
         return Measured(method, errors, np.zeros(len(drawn)), np.isfinite(errors))
 
@@ -49,9 +47,10 @@ def refined(error: Error) -> tuple[Refined, Runs]:
 
 
 def gains(method: Method) -> tuple[float, float]:
-    read = open_scene.load(SCENE, method.options).controller
-    assert read and read.teleoperation
-    return read.teleoperation.stiffness[0], read.teleoperation.damping[0]
+    controller = open_scene.load(SCENE, method.options).controller
+    coupling = controller and controller.teleoperation
+    assert coupling
+    return coupling.stiffness[0], coupling.damping[0]
 
 
 @pytest.mark.parametrize("best", [(170.0, 3.0), (9.0, 40.0), (25.0, 5.0)])
@@ -69,7 +68,7 @@ def test_the_best_gains_are_found_to_half_a_notch(best: tuple[float, float]) -> 
     ratio = told[0].error_mm[0] / told[1].error_mm[0]
     if best == SOFT:
         assert found.found is found.start
-        assert f"none of {found.tried} others" in found.line
+        assert f"gains: {found.tried} others were tried; none" in found.line
     else:
         assert f"the error is {ratio:.2f} times that of soft" in found.line
         assert ratio < 1.0
@@ -131,7 +130,7 @@ def test_gains_that_only_suit_the_draws_of_the_search_are_not_taken() -> None:
 def test_a_scene_gets_gains_beyond_the_sets_that_its_runs_confirm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A mechanism at the haptic rate is followed the better the more damping there is, of which the scene has little."""
+    """A mechanism at the haptic rate is followed better with more damping than this scene has."""
     monkeypatch.setattr(advise, "all_methods", lambda _: [Method("zoh", "own")])
     given = (
         "duration=0.3",

@@ -6,16 +6,26 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.maps import z_width
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.commands import stability
+from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
 from tests.analysis.stability.own_hand import DAMPED as WALL
 
 M, D, T, QUANTUM, FRICTION = 0.3, 5.0, 1 / 512, 1e-4, 0.05
 STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
+SPRING: dict[str, Any] = {
+    "hand": {
+        "type": "spring",
+        "stiffness": [300.0, 300.0, 1.0],
+        "damping": [5.0, 5.0, 0.01],
+        "target": [[0.0, 0.0445, 0.0148, -0.7878]],
+    }
+}
 FIRST = f"{STIFFNESS}=1000"
 
 
@@ -102,24 +112,49 @@ def test_a_first_value_that_is_none_is_refused(first: str, tmp_path: Path) -> No
 
 def test_a_coupling_is_scaled_as_a_whole(tmp_path: Path) -> None:
     """Half the graphics rate bears less."""
-    options: dict[str, Any] = {
-        "hand": {
-            "type": "spring",
-            "stiffness": [300.0, 300.0, 1.0],
-            "damping": [5.0, 5.0, 0.01],
-            "target": [[0.0, 0.0445, 0.0148, -0.7878]],
-        }
-    }
     rows = hl.z_width(
         "closed-loop-direct",
         "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
         ["graphics.rate=32,64"],
-        options,
+        SPRING,
         out=tmp_path,
         jobs=1,
     )
     slow, fast = (row["largest_stable"] for row in rows)
     assert 0 < slow < fast
+
+
+def test_limits_of_the_hold_passive_are_told_to_be_without_its_friction(tmp_path: Path) -> None:
+    """They are those of `zoh`, and a run beyond them stays bounded, which one with `zoh` does
+    not."""
+    options: dict[str, Any] = {**SPRING, "controller.teleoperation.damping": [5.0, 5.0, 0.005]}
+    rows = hl.z_width(
+        "closed-loop-direct",
+        "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
+        ["hold=zoh,passive", "graphics.rate=32"],
+        options,
+        out=tmp_path,
+        jobs=1,
+    )
+    assert rows[0]["largest_stable"] == rows[1]["largest_stable"]
+    assert "judged_without" not in rows[0]
+    assert "the friction of hold passive" in rows[1]["judged_without"]
+    *_, line = stability._of_limits(rows, ["hold"])
+    assert line.endswith("the friction of hold passive, taken out")
+    K = 1.5 * rows[0]["largest_stable"]
+    options |= {"controller.teleoperation.stiffness": [K, K, 1e-3 * K], "graphics.rate": 32}
+    moved = {**SPRING["hand"], "target": [[0.0, 0.0446, 0.0149, -0.7868]]}
+    ends = {
+        hold: np.abs(
+            hl.run(
+                "closed-loop-direct",
+                {**options, "hold": hold, "hand": moved, "duration": 10.0, "stop_when": ""},
+                figures=False,
+            )[HANDLE_VELOCITY][-512:]
+        ).max()
+        for hold in ("zoh", "passive")
+    }
+    assert ends["passive"] < 0.01 < ends["zoh"]
 
 
 def test_where_nothing_is_stable_the_verdicts_are_told(tmp_path: Path) -> None:
