@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 13437,
     "programs": 1021,
     "analysis": 7717,
-    "visualization": 3415,
+    "visualization": 3417,
     "api": 467,
     "commands": 1465,
 }
