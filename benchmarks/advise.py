@@ -20,12 +20,12 @@ from benchmarks.page import Progress, table
 from fuzz.verdicts import drawn
 from hapticlink.analysis.advise.advise_method import (
     Advice,
-    Method,
     advise,
     all_methods,
     on_draws,
 )
 from hapticlink.analysis.advise.draws import draws
+from hapticlink.analysis.advise.method import Method
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.results.numbers import short
@@ -79,7 +79,8 @@ def judged(seed: int, folder: Path, processes: int) -> Judged:
     advice = advise(name, options, folder / "advice", processes=processes)
     read = open_scene.load(name, options)
     apart = list(draws(read, DRAWS, SEED))
-    rows = on_draws(name, options, all_methods(read), apart, folder / "apart", processes=processes)
+    every = list(dict.fromkeys([*all_methods(read), advice.taken.method]))
+    rows = on_draws(name, options, every, apart, folder / "apart", processes=processes)
     limits = advice.limits
     kept = {method: sum(not limits.why_not(row) for row in found) for method, found in rows.items()}
     able = [method for method in rows if kept[method] == DRAWS]

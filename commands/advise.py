@@ -22,7 +22,7 @@ def advise(
     output: Output = PRINTED,
 ) -> int:
     """Find the hold and the gains that suit a scene: all are run on it, and the best few on
-    eight random variations of it.
+    eight random variations of it; the gains of the best one are then scaled, too.
 
     Prints what to write into the scene, its error and energy, and which others were as good
     within the spread. Writes advice.json and table.csv to OUT (default advice/SCENE); the same

@@ -178,6 +178,8 @@ def _of_limits(rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> Iterator[
                 f"where the search begins, limit cycles between two counts of up to {cycle}"
             )
         yield f"{point}: {'; '.join(said) or row.get('message', '')}"
+    removed = [line for row in rows for line in row.get("judged_without", "").split("; ") if line]
+    yield from dict.fromkeys(removed)
 
 
 def _of_map(points: Map, keys: Sequence[str]) -> Iterator[str]:

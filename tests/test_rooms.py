@@ -37,7 +37,7 @@ CODE_LINES = {
     "analysis": 7645,
     "visualization": 3415,
     "api": 467,
-    "commands": 1457,
+    "commands": 1465,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

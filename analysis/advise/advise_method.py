@@ -17,15 +17,11 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.advise.draws import draws
-from hapticlink.analysis.search.acceptance import (
-    PEAK,
-    WORK,
-    AcceptanceLimits,
-    energy_share,
-    judged_numbers,
-)
+from hapticlink.analysis.advise.method import Measured, Method, measured
+from hapticlink.analysis.advise.refine_gains import Draws, Refined, refine
+from hapticlink.analysis.search.acceptance import PEAK, WORK, AcceptanceLimits, judged_numbers
 from hapticlink.analysis.search.search import judge_best_first
-from hapticlink.analysis.search.settings import EARLY, GAINS, HOLDS
+from hapticlink.analysis.search.settings import EARLY, HOLDS
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.run_sweep import sweep
@@ -49,49 +45,6 @@ OTHER_OBSERVER = "device.observer.law=kalman"
 
 
 @dataclass(frozen=True)
-class Method:
-    """A hold and gains, by their names in HOLDS and GAINS."""
-
-    hold: str
-    gains: str
-
-    @property
-    def name(self) -> str:
-        return f"{self.hold}; gains: {self.gains}"
-
-    @property
-    def options(self) -> tuple[str, ...]:
-        """The options that it consists of."""
-        return (*HOLDS[self.hold], *GAINS.get(self.gains, ()))
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """A method on the draws, of which `within` keep the limits: largest distances of handle and
-    operational point (mm), and energies at the user's port as shares of what is allowed; and the
-    first limit that is broken."""
-
-    method: Method
-    error_mm: np.ndarray
-    energy: np.ndarray
-    within: int
-    broken: str = ""
-
-    @property
-    def admitted(self) -> bool:
-        return self.within == len(self.error_mm)
-
-    @property
-    def line(self) -> str:
-        low, middle, high = np.quantile(self.error_mm, [0.0, 0.5, 1.0])
-        return (
-            f"{self.method.name}: error {short(middle)} mm ({short(low)} to {short(high)}), energy "
-            f"at most {short(100 * float(self.energy.max()))} % of the limit, {self.within} of "
-            f"{len(self.error_mm)} draws within the limits"
-        )
-
-
-@dataclass(frozen=True)
 class Advice:
     """What is advised for a scene; `ties` are within the spread, `others` are the rest of what was
     run on all draws, `screened` are all methods on the scene itself, by `limits`."""
@@ -102,6 +55,8 @@ class Advice:
     others: tuple[Measured, ...]
     screened: Mapping[Method, Row]
     limits: AcceptanceLimits
+    gains: Refined | None = None
+    """How those of `taken` were found beside the sets, where there is a virtual coupling."""
     kalman: Measured | None = None
     """`taken` with OTHER_OBSERVER, where the scene has the default observer of encoders."""
 
@@ -119,6 +74,8 @@ class Advice:
             )
         yield f"take {self.taken.line}"
         yield from (f"  {as_command_line(option)}" for option in self.taken.method.options)
+        if self.gains:
+            yield self.gains.line
         if self.kalman:
             yield f"with {as_command_line(OTHER_OBSERVER)} too: {self.kalman.line}"
         for name, found in (("within the spread", self.ties), ("others", self.others)):
@@ -169,7 +126,8 @@ def advise(
     methods = all_methods(read)
     assert read.device is not None  # of a scene with methods
     limits = AcceptanceLimits.of(read.device)
-    around = list(draws(read, count, seed))
+    drawn = list(draws(read, 2 * count, seed))
+    around, apart = [(), *drawn[:count]], drawn[count:]
 
     def run(of: Sequence[Method], drawn: Sequence[Sequence[str]]) -> dict[Method, list[Row]]:
         return on_draws(scene, options, of, drawn, folder, processes=processes, tell=tell)
@@ -180,19 +138,20 @@ def advise(
         row = screened[method]
         return bool(limits.why_not(row)), float(row.get(METRIC, np.inf))
 
-    def on_all(these: Sequence[Method]) -> list[Measured]:
-        found = run(these, around).items()
-        return [_measured(method, [screened[method], *rows], limits) for method, rows in found]
+    def judge(these: Sequence[Method], on: Draws = around) -> list[Measured]:
+        return [measured(method, rows, limits) for method, rows in run(these, on).items()]
 
     ranked = _distinct(sorted(methods, key=rank), screened)
-    ran = judge_best_first(ranked, on_all, lambda one: one.admitted, ROUND)
+    ran = judge_best_first(ranked, judge, lambda one: one.admitted, ROUND)
     advice = _chosen(read.title, list(ran), screened, limits)
+    if read.controller and read.controller.teleoperation:
+        gains = refine(read, advice.taken, judge, around, apart)
+        advice = replace(advice, taken=gains.found, gains=gains)
     if read.sensing == "ideal" or replace(read.device.observer, beside=False) != Observer():
         return advice
     other, taken = (*options, OTHER_OBSERVER), advice.taken.method
-    draws_of_all = [(), *around]
-    found = on_draws(scene, other, [taken], draws_of_all, folder, processes=processes, tell=tell)
-    return replace(advice, kalman=_measured(taken, found[taken], limits))
+    found = on_draws(scene, other, [taken], around, folder, processes=processes, tell=tell)
+    return replace(advice, kalman=measured(taken, found[taken], limits))
 
 
 def all_methods(read: Scene) -> list[Method]:
@@ -253,18 +212,6 @@ def _distinct(ranked: Sequence[Method], rows: Mapping[Method, Row]) -> list[Meth
     if not found:
         raise InputFault(f"no hold runs on the scene: {next(iter(rows.values()))['message']}")
     return list(found.values())
-
-
-def _measured(method: Method, rows: Sequence[Row], limits: AcceptanceLimits) -> Measured:
-    errors = np.array([float(row.get(METRIC, np.inf)) for row in rows])
-    broken = [why for row in rows if (why := limits.why_not(row))]
-    return Measured(
-        method,
-        errors,
-        np.array([energy_share(row) for row in rows]),
-        len(rows) - len(broken),
-        next(iter(broken), ""),
-    )
 
 
 def _chosen(

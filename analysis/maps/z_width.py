@@ -5,6 +5,8 @@ Both are found by doubling or halving from a first value, and by bisection (sear
 search that ended before a limit is `at least`. A value that has no verdict counts as one that does
 not hold; where such a value is next to the limit, that is `at least`, too. Below the limit
 everything that was tried holds; an island of another verdict that was stepped over is not seen.
+What an analysis is made without is told (frozen_nonlinearities.py): the limits of the hold
+`passive` are those of `zoh`.
 
 For a wall whose loop has a closed form, counts of its encoder add the largest stiffness without
 limit cycles, 2 (f_c/quantum - B/T) (limit_cycles.py), and the longest cycle between two counts
@@ -95,6 +97,8 @@ def _judge(job: Job, _: Path, key: str, values: Any) -> Row:
         row |= _largest(STABLE, unit, lambda s: session.judge([option(s)]).verdict)
         passive = {True: PASSIVE, False: "not passive"}
         row |= _largest(PASSIVE, unit, lambda s: passive[bool(session.port([option(s)]).passive)])
+        if session.removed:
+            row["judged_without"] = "; ".join(session.removed)
     wall = wall_closed_form.counted_wall(job.scene)
     if wall and key == wall_closed_form.START.format(wall.name, "stiffness"):
         row |= {f"largest_{QUIET}": wall.counted.quiet, QUIET: LIMIT}
@@ -120,17 +124,18 @@ def _largest(what: str, unit: float, verdict: Callable[[float], str]) -> Row:
         return given == what
 
     found = largest_scale(tried, FINE)
-    row: Row = {f"largest_{what}": unit * found.value, what: _kind(found, refused)}
+    row: Row = {f"largest_{what}": unit * found.value, what: _kind(found, refused, bool(others))}
+    said = []
+    if others and not found.value:
+        said.append(f"all that was tried is {' or '.join(others)}")
     if refused:
-        return row | {f"message_{what}": next(iter(refused.values()))}
-    if not found.value:
-        return row | {f"message_{what}": f"all that was tried is {' or '.join(others)}"}
-    return row
+        said.append(f"without a verdict: {next(iter(refused.values()))}")
+    return row | ({f"message_{what}": "; ".join(said)} if said else {})
 
 
-def _kind(found: Largest, refused: dict[float, str]) -> str:
-    """How the search ended."""
+def _kind(found: Largest, refused: dict[float, str], others: bool) -> str:
+    """How a search ended that met refusals, and other verdicts than the one that it looks for."""
     if not found.value:
-        return REFUSED if refused else NONE
+        return NONE if others else REFUSED
     near = any(found.value < scale < found.value * (1 + 2 * FINE) for scale in refused)
     return LIMIT if found.limited and not near else AT_LEAST

@@ -1,5 +1,5 @@
-"""How settings are searched: the largest value that holds, laws raised one after the other, and
-candidates judged best first."""
+"""How settings are searched: the largest value that holds, laws raised one after the other, the
+least cost by steps of one coordinate, and candidates judged best first."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ COARSE, FINE = 0.05, 0.01
 Candidate = TypeVar("Candidate")
 Judged = TypeVar("Judged")
 Number = TypeVar("Number", int, float)
+Point = tuple[int, ...]
+Cost = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,35 @@ def _raised(
     if not found.limited:
         why = f"nothing up to {found.value:g} times those begun with (not searched further)"
     return at(found.value), why
+
+
+def descend(
+    start: Point,
+    cost: Callable[[Sequence[Point]], Sequence[Cost]],
+    steps: Sequence[int],
+    worth: float,
+) -> Iterator[Point]:
+    """Points of ever less cost, which goes down by more than `worth` in its last entry or at all in
+    one before. Each is the best of those to both sides of the last one along each coordinate, by
+    the first of the `steps` that has a better one; a step that has none is not taken up again. No
+    point is judged twice."""
+    known = dict(zip([start], cost([start]), strict=True))
+    at = start
+    for step in steps:
+        while True:
+            near = [
+                tuple(n + sign * step * (i == k) for k, n in enumerate(at))
+                for i in range(len(at))
+                for sign in (1, -1)
+            ]
+            new = [point for point in near if point not in known]
+            known.update(zip(new, cost(new), strict=True))
+            best = min(near, key=known.__getitem__)
+            *first, last = known[at]
+            if not known[best] < (*first, last - worth):
+                break
+            at = best
+            yield at
 
 
 def judge_best_first(

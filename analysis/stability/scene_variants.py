@@ -66,6 +66,8 @@ class SceneVariants:
         self._kind: Hashable = None
         self._starts: Starts = {}
         self.loads = 0
+        self.removed: list[str] = []
+        """What the last variant is judged without, a line on each."""
 
     def __enter__(self) -> SceneVariants:
         return self
@@ -95,7 +97,7 @@ class SceneVariants:
     def _rest(self, options: Options) -> None:
         """Puts the scene with `options` at its equilibrium."""
         read = open_scene.load(self._scene, options)
-        with linearisable(read) as (_, system, _):
+        with linearisable(read) as (_, system, self.removed):
             kind, starts = _kind(system), _starts(system)
         try:
             if kind != self._kind or not self._moved(starts):

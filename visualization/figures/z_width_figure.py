@@ -21,6 +21,9 @@ STYLES = {
     QUIET: (":", "without limit cycles of counts"),
 }
 
+WIDEST = 50
+"""Letters of a line of the legend that leave room for another beside it."""
+
 
 def draw(rows: Sequence[Row], key: str, axes: Sequence[Axis]) -> Figure:
     """The figure of rows over `axes`, of the largest values of a key. A triangle is the end of a
@@ -49,7 +52,7 @@ def draw(rows: Sequence[Row], key: str, axes: Sequence[Axis]) -> Figure:
         name = ", ".join(f"{k} = {v}" for k, v in zip(others, values, strict=True))
         if others:
             handles.append(Line2D([], [], color=colour, label=plain(name)))
-    drawn = [what for what in STYLES if any(row.get(what) for row in rows)]
+    drawn = [what for what in STYLES if any(row.get(f"largest_{what}") for row in rows)]
     handles += [Line2D([], [], color="k", ls=STYLES[w][0], label=STYLES[w][1]) for w in drawn]
     if any(row.get(what) == AT_LEAST for row in rows for what in STYLES):
         handles.append(
@@ -58,7 +61,8 @@ def draw(rows: Sequence[Row], key: str, axes: Sequence[Axis]) -> Figure:
     across, up = (axis(name.replace(".start.", ".")) for name in (x.key, key))
     panel.set(xlabel=across, ylabel=f"largest {up}", yscale="log")
     panel.grid(visible=True, which="both", lw=0.3)
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize="small")
+    columns = 1 if any(len(str(one.get_label())) > WIDEST for one in handles) else 2
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize="small")
     return figure
 
 

@@ -9,9 +9,11 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.advise import advise_method as advise
-from hapticlink.analysis.advise.advise_method import Measured, Method
+from hapticlink.analysis.advise import refine_gains
 from hapticlink.analysis.advise.draws import FACTOR, draws
+from hapticlink.analysis.advise.method import Measured, Method
 from hapticlink.analysis.search.acceptance import AcceptanceLimits
+from hapticlink.analysis.search.settings import HOLDS
 from hapticlink.orchestrator import open_scene
 from tests.analysis.search.test_acceptance import row
 
@@ -22,7 +24,7 @@ def test_the_smallest_error_within_the_limits_of_all_draws_is_advised() -> None:
     """`exact` leaves them once, `zoh` is twice as far off; `foh` and `even` win two draws each."""
 
     def of(hold: str, errors: list[float], within: int = 4) -> Measured:
-        return Measured(Method(hold, "own"), np.array(errors), np.zeros(4), within)
+        return Measured(Method(hold, "own"), np.array(errors), np.zeros(4), np.arange(4) < within)
 
     exact, zoh = of("exact", [0.1] * 4, 3), of("zoh", [2.0, 4.0, 6.0, 8.0])
     foh, even = of("foh", [1.0, 2.0, 3.0, 4.0]), of("even", [1.3, 1.9, 3.6, 3.9])
@@ -45,7 +47,7 @@ def test_a_hold_that_matters_little_is_no_advice(worst: float, fails: bool, matt
     if fails:
         rows[Method("exact", "own")] = row(1.0, end="diverged")
     rows[Method("foh", "soft")] = row(5.0)
-    taken = Measured(Method("zoh", "own"), np.ones(2), np.zeros(2), 2)
+    taken = Measured(Method("zoh", "own"), np.ones(2), np.zeros(2), np.ones(2, bool))
     lines = list(advise.Advice("", taken, (), (), rows, LIMITS).lines())
     assert ("all 2 keep the limits and leave 1 to 1.09 mm" in lines[0]) is not matters
 
@@ -76,8 +78,8 @@ def test_a_scene_without_a_hand_gets_no_advice(tmp_path: Path) -> None:
 def test_what_another_observer_makes_of_the_advice_is_what_its_run_says(
     own: tuple[str, ...], told: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(advise, "HOLDS", {"zoh": advise.HOLDS["zoh"]})
-    monkeypatch.setattr(advise, "GAINS", {})
+    monkeypatch.setattr(advise, "all_methods", lambda _: [Method("zoh", "own")])
+    monkeypatch.setattr(refine_gains, "STEPS", ())
     given = ("duration=0.3", "controller.bias=full", *own)
     found = advise.advise("closed-loop", given, tmp_path, count=1)
     lines = [line for line in found.lines() if advise.OTHER_OBSERVER in line]
@@ -92,8 +94,8 @@ def test_the_advice_of_a_scene_is_what_its_runs_say(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two holds and the scene's gains on half a second: the numbers are those of a run."""
-    monkeypatch.setattr(advise, "HOLDS", {name: advise.HOLDS[name] for name in ("zoh", "passive")})
-    monkeypatch.setattr(advise, "GAINS", {"soft": advise.GAINS["soft"]})
+    monkeypatch.setattr(advise, "HOLDS", {name: HOLDS[name] for name in ("zoh", "passive")})
+    monkeypatch.setattr(refine_gains, "STEPS", (4,))
     given = ("duration=0.5", "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]")
     monkeypatch.setattr(advise, "ROUND", 2)
     found = advise.advise("closed-loop-direct", given, tmp_path, count=1)

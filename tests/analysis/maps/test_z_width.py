@@ -6,15 +6,26 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.maps import z_width
 from hapticlink.analysis.stability import wall_limits
+from hapticlink.commands import stability
+from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
 from tests.analysis.stability.own_hand import DAMPED as WALL
 
 M, D, T, QUANTUM, FRICTION = 0.3, 5.0, 1 / 512, 1e-4, 0.05
 STIFFNESS, DAMPING = "fmu.wall.start.stiffness", "fmu.wall.start.damping"
+SPRING: dict[str, Any] = {
+    "hand": {
+        "type": "spring",
+        "stiffness": [300.0, 300.0, 1.0],
+        "damping": [5.0, 5.0, 0.01],
+        "target": [[0.0, 0.0445, 0.0148, -0.7878]],
+    }
+}
 FIRST = f"{STIFFNESS}=1000"
 
 
@@ -47,20 +58,48 @@ def test_limits_are_those_of_the_closed_forms(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("limited", "value", "refused", "kind"),
+    ("limited", "value", "refused", "others", "kind"),
     [
-        (True, 2.0, {}, "limit"),
-        (False, 2.0, {}, "at least"),
-        (True, 2.0, {2.0001: "diverges"}, "at least"),
-        (True, 2.0, {4.0: "diverges"}, "limit"),
-        (True, 0.0, {}, "none"),
-        (True, 0.0, {1.0: "diverges"}, "refused"),
+        (True, 2.0, {}, True, "limit"),
+        (False, 2.0, {}, False, "at least"),
+        (True, 2.0, {2.0001: "diverges"}, False, "at least"),
+        (True, 2.0, {4.0: "diverges"}, True, "limit"),
+        (True, 0.0, {}, True, "none"),
+        (True, 0.0, {1.0: "diverges"}, False, "refused"),
+        (True, 0.0, {1.0: "diverges"}, True, "none"),
     ],
 )
 def test_what_is_told_of_a_search(
-    limited: bool, value: float, refused: dict[float, str], kind: str
+    limited: bool, value: float, refused: dict[float, str], others: bool, kind: str
 ) -> None:
-    assert z_width._kind(z_width.Largest(value, limited), refused) == kind
+    assert z_width._kind(z_width.Largest(value, limited), refused, others) == kind
+
+
+def test_values_without_a_verdict_are_told_beside_those_that_have_one() -> None:
+    """Nothing is stable, and the softest have no equilibrium."""
+
+    def verdict(scale: float) -> str:
+        if scale < 0.1:
+            raise hl.InputFault("no equilibrium")
+        return "unstable"
+
+    row = z_width._largest("stable", 1000.0, verdict)
+    assert (row["largest_stable"], row["stable"]) == (0.0, "none")
+    assert row["message_stable"] == (
+        "all that was tried is unstable; without a verdict: no equilibrium"
+    )
+    (line,) = stability._of_limits([row | {"a": 1}], ["a"])
+    assert line == f"a=1: stable with none that was tried ({row['message_stable']})"
+
+
+def test_a_search_without_any_verdict_finds_no_limit_of_none() -> None:
+    def verdict(scale: float) -> str:
+        raise hl.InputFault("no equilibrium")
+
+    row = z_width._largest("stable", 1000.0, verdict)
+    assert row["stable"] == "refused"
+    (line,) = stability._of_limits([row | {"a": 1}], ["a"])
+    assert line == "a=1: stable unknown (without a verdict: no equilibrium)"
 
 
 @pytest.mark.parametrize(
@@ -73,24 +112,49 @@ def test_a_first_value_that_is_none_is_refused(first: str, tmp_path: Path) -> No
 
 def test_a_coupling_is_scaled_as_a_whole(tmp_path: Path) -> None:
     """Half the graphics rate bears less."""
-    options: dict[str, Any] = {
-        "hand": {
-            "type": "spring",
-            "stiffness": [300.0, 300.0, 1.0],
-            "damping": [5.0, 5.0, 0.01],
-            "target": [[0.0, 0.0445, 0.0148, -0.7878]],
-        }
-    }
     rows = hl.z_width(
         "closed-loop-direct",
         "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
         ["graphics.rate=32,64"],
-        options,
+        SPRING,
         out=tmp_path,
         jobs=1,
     )
     slow, fast = (row["largest_stable"] for row in rows)
     assert 0 < slow < fast
+
+
+def test_limits_of_the_hold_passive_are_told_to_be_without_its_friction(tmp_path: Path) -> None:
+    """They are those of `zoh`, and a run beyond them stays bounded, which one with `zoh` does
+    not."""
+    options: dict[str, Any] = {**SPRING, "controller.teleoperation.damping": [5.0, 5.0, 0.005]}
+    rows = hl.z_width(
+        "closed-loop-direct",
+        "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
+        ["hold=zoh,passive", "graphics.rate=32"],
+        options,
+        out=tmp_path,
+        jobs=1,
+    )
+    assert rows[0]["largest_stable"] == rows[1]["largest_stable"]
+    assert "judged_without" not in rows[0]
+    assert "the friction of hold passive" in rows[1]["judged_without"]
+    *_, line = stability._of_limits(rows, ["hold"])
+    assert line.endswith("the friction of hold passive, taken out")
+    K = 1.5 * rows[0]["largest_stable"]
+    options |= {"controller.teleoperation.stiffness": [K, K, 1e-3 * K], "graphics.rate": 32}
+    moved = {**SPRING["hand"], "target": [[0.0, 0.0446, 0.0149, -0.7868]]}
+    ends = {
+        hold: np.abs(
+            hl.run(
+                "closed-loop-direct",
+                {**options, "hold": hold, "hand": moved, "duration": 10.0, "stop_when": ""},
+                figures=False,
+            )[HANDLE_VELOCITY][-512:]
+        ).max()
+        for hold in ("zoh", "passive")
+    }
+    assert ends["passive"] < 0.01 < ends["zoh"]
 
 
 def test_where_nothing_is_stable_the_verdicts_are_told(tmp_path: Path) -> None:
