@@ -174,6 +174,7 @@ def forget(path: Path) -> None:
     """Removes a file that `get_or_build` gave, which nobody can use."""
     with suppress(OSError):
         path.unlink()
+        _digest(path).unlink(missing_ok=True)
         path.parent.rmdir()
 
 
@@ -242,6 +243,7 @@ def _store(built: Path, root: Path, entry: Path) -> Path:
     try:
         shutil.copyfile(built, unfinished)
         entry.mkdir(exist_ok=True)
+        _digest(entry / built.name).write_text(hashlib.sha256(unfinished.read_bytes()).hexdigest())
         os.replace(unfinished, entry / built.name)
     finally:
         unfinished.unlink(missing_ok=True)
@@ -257,11 +259,19 @@ def _clear(root: Path) -> None:
                 left.unlink()
 
 
+def _digest(path: Path) -> Path:
+    """Where the SHA-256 of a file of the cache is."""
+    return path.with_name(f".{path.name}.sha256")
+
+
 @lru_cache(64)
 def is_whole(path: Path, changed_ns: int, size: int) -> bool:
-    """Whether an archive has entries that can be read to their ends: asked once as long as the file
-    does not change."""
+    """Whether an archive has the bytes that were stored in the cache or, elsewhere, entries that
+    can be read to their ends, which takes longer: asked once as long as the file does not change.
+    """
     try:
+        if (stored := _digest(path)).exists():
+            return stored.read_text() == hashlib.sha256(path.read_bytes()).hexdigest()
         with zipfile.ZipFile(path) as archive:
             return archive.testzip() is None and bool(archive.namelist())
     except (OSError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):

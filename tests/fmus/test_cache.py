@@ -48,7 +48,7 @@ class Builder:
 
 
 def files(place: Path) -> list[str]:
-    return [p.name for p in place.rglob("*") if p.is_file() or p.name.startswith(".")]
+    return sorted(p.name for p in place.rglob("*") if p.is_file() or p.name.startswith("."))
 
 
 def test_built_once(place, room):
@@ -57,7 +57,7 @@ def test_built_once(place, room):
     assert builder.calls == 1
     assert first == second
     assert first.is_relative_to(place)
-    assert files(place) == ["gain.fmu"]
+    assert files(place) == [".gain.fmu.sha256", "gain.fmu"]
 
 
 def test_an_archive_without_a_model_is_built_once(place, room):
@@ -104,6 +104,19 @@ def test_a_damaged_file_is_built_again(place, room, damage):
     assert builder.calls == 2
 
 
+def test_any_other_byte_is_seen_in_a_file_of_the_cache(place, room):
+    """Also one that no checksum of an archive covers."""
+    builder = Builder()
+    path = get_or_build(MATERIAL, builder, room)
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"\0")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+    assert get_or_build(MATERIAL, builder, room).read_bytes() == whole
+    cache.forget(path)
+    assert not path.parent.exists()
+
+
 def test_a_failed_build_leaves_nothing(place, room):
     def fail(folder: Path) -> Path:
         (folder / "half.fmu").write_bytes(b"half")
@@ -121,7 +134,7 @@ def test_what_a_killed_copy_has_left_goes_with_the_next_build(place, room):
         (place / name).write_bytes(b"half")
     os.utime(place / ".half", (0, 0))
     get_or_build(MATERIAL, Builder(), room)
-    assert sorted(files(place)) == [".fresh", "gain.fmu"]
+    assert files(place) == [".fresh", ".gain.fmu.sha256", "gain.fmu"]
 
 
 def test_a_killed_build_leaves_nothing_in_the_cache(place, room):
@@ -164,7 +177,7 @@ def test_processes_of_two_machines_end_with_one_whole_file(place, room, monkeypa
     for thread in threads:
         thread.join()
     assert len(set(paths)) == 1
-    assert files(place) == ["gain.fmu"]
+    assert files(place) == [".gain.fmu.sha256", "gain.fmu"]
 
 
 class Elsewhere(set):
