@@ -31,13 +31,13 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 
 CODE_LINES = {
     "components": 6143,
-    "fmus": 2816,
+    "fmus": 2822,
     "orchestrator": 13603,
     "programs": 1021,
-    "analysis": 7645,
-    "visualization": 3415,
+    "analysis": 7767,
+    "visualization": 3417,
     "api": 467,
-    "commands": 1465,
+    "commands": 1459,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
