@@ -139,16 +139,65 @@ def test_what_is_planned_before_the_start_cannot_be_changed_in_a_run():
         (['holds."haptic_device.x"=ahead'], "haptic_device is not slower than"),
         (['holds."controller.F_drift"=ahead'], "controller is no plant"),
         (['holds."hand.F -> virtual_mechanism.F_hand"=mid'], "no force of a spring-damper"),
+        (
+            ['holds."controller.F_drift"=mid', 'delays."controller.F_drift"=0.01'],
+            "however late its samples are",
+        ),
+        (["hold=model", 'coupling="gauss-seidel-plants"'], "does not hold the inputs of virtual_m"),
+        (["hold=model", 'get_after_set=["virtual_mechanism"]'], "get_after_set changes outputs"),
+        (["computing_time=0.034", "graphics.rate=30"], "shortest step of virtual_mechanism is 0.0"),
+        (["computing_time=0.05", "graphics.rate={min=10,max=50,seed=3}"], "take at most that"),
     ],
 )
 def test_what_cannot_be_is_refused_with_the_reason(options, said):
     own = [f"{k}={json.dumps(v)}" for k, v in AT_GRAPHICS.items()]
-    named = (
-        [] if "ahead" in options[0] or "mid" in options[0] else ["holds.virtual_mechanism.x=ahead"]
-    )
+    own_hold = any(hold in options[0] for hold in ("ahead", "mid", "model"))
+    named = [] if own_hold else ["holds.virtual_mechanism.x=ahead"]
     with pytest.raises(InputFault) as refused:
         system_of("closed-loop-ideal", *own, *named, *options)
     assert said in str(refused.value)
+
+
+def test_a_force_that_is_late_is_not_foretold():
+    """`mid` has it by its ends of now, as if it were not late."""
+    latency = 'delays."controller.F_drift"=0.05'
+    options = [f"{k}={json.dumps(v)}" for k, v in MODEL.items()]
+    name = "controller.F_drift -> virtual_mechanism.F_drift"
+    for given, hold in (([], "mid"), ([latency], "half-lead")):
+        system = system_of("closed-loop-ideal", *options, *given)
+        assert system.connection[name].hold == hold
+    system = system_of("closed-loop-ideal", *options)
+    with pytest.raises(InputFault, match="however late its samples are"):
+        check_change(system, system.connection[name], None, 0.01)
+
+
+@pytest.mark.parametrize("port", ["x_S", "v_D", "Lambda_inv"])
+def test_ends_of_a_force_that_is_foretold_are_not_disturbed(port):
+    """`mid` would have them as they are, where the controller has them frozen."""
+    at = [{"time": 0.2, "until": 0.3, "freeze": [f"controller.{port}"]}]
+    with pytest.raises(InputFault, match="`mid` has the force controller.F_drift by"):
+        hl.run("closed-loop-ideal", MODEL | {"at": at}, figures=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"downsampling": "model"}, "it is for efforts on plants whose steps are taken when they"),
+        ({"computing_time": 0.01}, "computing_time acts on no connection: no step is taken when"),
+        (
+            {"hold": "model", "computing_time": 0.01, "delays": {"virtual_mechanism": 0.02}},
+            "all connections from such steps have latencies of their own",
+        ),
+        ({"hold": "model", "computing_time": 0.01}, None),
+    ],
+)
+def test_what_acts_on_nothing_is_told(options, said):
+    if "delays" in options:
+        ports = ("x", "v", "a_bias", "Lambda_inv", "P_c")
+        options["delays"] = {f"virtual_mechanism.{port}": 0.02 for port in ports}
+    r = hl.run("closed-loop-ideal", AT_GRAPHICS | {"duration": 0.1} | options, figures=False)
+    lines = r.run["without_effect"]
+    assert [said in line for line in lines] == ([True] if said else []), lines
 
 
 def test_where_it_gains_less_is_told(tmp_path):
