@@ -35,8 +35,9 @@ def run(tmp_path, **options):
     )
 
 
-def coupling(results, x, v):
-    return K * (x - results["haptic_device.x"]) + B * (v - results["haptic_device.v"])
+def coupling(results, x, v, user=""):
+    device = f"haptic_device{user}"
+    return K * (x - results[f"{device}.x"]) + B * (v - results[f"{device}.v"])
 
 
 @pytest.mark.parametrize("rate", [20, 30, VARYING])
@@ -56,28 +57,32 @@ def test_the_controller_gets_the_cubic_through_both_ends_of_each_frame(tmp_path,
     assert np.abs(expected).max() > 0.01
 
 
-def test_until_the_result_is_there_the_controller_goes_on_with_held_wrenches(tmp_path):
+@pytest.mark.parametrize(
+    ("scene", "user", "point"), [("closed-loop-ideal", "", ""), ("two-users", "_left", "left.")]
+)
+def test_until_the_result_is_there_the_controller_goes_on_with_held_wrenches(scene, user, point):
     """With half a frame of computing time: the first half by the acceleration that the mechanism
     has with what it holds, the second by the cubic."""
     frame = 1 / 16
     options = {"graphics.rate": 16, "computing_time": frame / 2, "downsampling": "latest"}
-    r = run(tmp_path, **options)
-    frames, ticks = r.time("virtual_mechanism.x"), r.time("controller.F_drift")
-    x, v = r["virtual_mechanism.x"], r["virtual_mechanism.v"]
+    r = hl.run(scene, MODEL | {"duration": 0.7} | options, figures=False)
+    force, mechanism = f"controller{user}.F_drift", f"virtual_mechanism.{point}"
+    frames, ticks = r.time(f"{mechanism}x"), r.time(force)
+    x, v = r[f"{mechanism}x"], r[f"{mechanism}v"]
     cubic = CubicHermiteSpline(frames, x, v)
     at = np.searchsorted(ticks, frames)
-    held = r["hand.F"][at] - r["controller.F_drift"][at]
-    mobility = r["virtual_mechanism.Lambda_inv"].reshape(-1, 3, 3)
-    a = np.einsum("tij,tj->ti", mobility, held) + r["virtual_mechanism.a_bias"]
+    held = r[f"hand{user}.F"][at] - r[force][at]
+    mobility = r[f"{mechanism}Lambda_inv"].reshape(-1, 3, 3)
+    a = np.einsum("tij,tj->ti", mobility, held) + r[f"{mechanism}a_bias"]
     since = np.clip(np.searchsorted(frames, ticks, "right") - 1, 0, len(frames) - 2)
     s = (ticks - frames[since])[:, None]
     early = (s > 0) & (s < frame / 2 - 1e-9)
     pose = np.where(early, x[since] + v[since] * s + a[since] * s**2 / 2, cubic(ticks))
     rate = np.where(early, v[since] + a[since] * s, cubic(ticks, 1))
     known = ticks <= frames[-1]
-    found = r["controller.F_drift"][known]
-    np.testing.assert_allclose(found, coupling(r, pose, rate)[known], atol=1e-9)
-    assert np.abs(found - coupling(r, cubic(ticks), cubic(ticks, 1))[known]).max() > 1e-4
+    found = r[force][known]
+    np.testing.assert_allclose(found, coupling(r, pose, rate, user)[known], atol=1e-9)
+    assert np.abs(found - coupling(r, cubic(ticks), cubic(ticks, 1), user)[known]).max() > 1e-4
 
 
 def test_it_tracks_better_than_holds_that_guess():
