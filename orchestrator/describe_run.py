@@ -21,8 +21,9 @@ from hapticlink.orchestrator.results.run_record import (
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene_tables import Latency
 from hapticlink.orchestrator.system.early_steps import stands_for
-from hapticlink.orchestrator.system.ports import power_across_rates
+from hapticlink.orchestrator.system.ports import names, power_across_rates
 from hapticlink.orchestrator.system.system import Connection, System
 
 PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
@@ -79,7 +80,11 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         events=[(c.begin, c.text) for c in system.changes if c.begin < end],
         not_recorded=not_recorded,
         units=_units(system),
-        without_effect=[*_find_idle_holds(scene, system), *_find_idle_events(scene, system)],
+        without_effect=[
+            *_find_idle_holds(scene, system),
+            *_find_idle_computing_time(scene, system),
+            *_find_idle_events(scene, system),
+        ],
     )
 
 
@@ -103,14 +108,28 @@ def _find_idle_holds(scene: Scene, system: System) -> Iterator[str]:
     for key, (hold, plain, way) in ways.items():
         if hold == plain or asked & {hold, *stands_for(key, hold)}:
             continue
-        apart = (longest(c.source) - longest(c.target) for c in system.connections if c.hold)
-        own = any(d > 0 if key == "hold" else d < 0 for d in apart)
-        why = (
-            f"all connections from {way} one have holds of their own in [holds]"
-            if own
-            else f"there is no connection from {way} one ([holds] names others)"
-        )
+        sign = 1 if key == "hold" else -1
+        apart = ((c, longest(c.source) - longest(c.target)) for c in system.connections if c.hold)
+        own = [any(k in scene.named_holds for k in names(c)) for c, d in apart if d * sign > 0]
+        if not own:
+            why = f"there is no connection from {way} one ([holds] names others)"
+        elif all(own):
+            why = f"all connections from {way} one have holds of their own in [holds]"
+        else:
+            why = (
+                "it is for efforts on plants whose steps are taken when they begin (hold = 'model')"
+            )
         yield f'{key} = "{hold}" acts on no connection: {why}'
+
+
+def _find_idle_computing_time(scene: Scene, system: System) -> Iterator[str]:
+    """The computing time of steps taken when they begin, where no connection waits for it."""
+    known = Latency(min=scene.computing_time)
+    steps = [c.latency for c in system.connections if c.needs == "step"]
+    if scene.computing_time and known not in steps:
+        own = "all connections from such steps have latencies of their own in [delays]"
+        none = "no step is taken when it begins (hold = 'model')"
+        yield f"computing_time acts on no connection: {own if steps else none}"
 
 
 def _find_idle_events(scene: Scene, system: System) -> Iterator[str]:

@@ -97,7 +97,7 @@ def _assign(
             if hold == "ahead" and not late and scene.computing_time:
                 latency, late = Latency(min=scene.computing_time), True
         elif hold == "model" and longer(c, fmus, timeline) < 0:
-            hold = towards(c, early, energy, connections)
+            hold = towards(c, early, late, energy, connections)
         named = (scene.kinds[k] for k in names(c) if k in scene.kinds)
         c = replace(c, latency=latency if late else None, kind=next(named, kind(c, fmus)))
         iterated = between if between_plants(c, fmus) else None
@@ -110,6 +110,8 @@ def _assign(
                 f"it goes on in coordinates of {of}, whose samples are of the end of a frame; with "
                 "mechanism_at = 'graphics' take directions_from = 'mechanism'"
             )
+        elif hold == "model" and reason and not (fmus[c.source].sampled or fmus[c.source].frames):
+            reason = f"{why_late(c, scene, fmus, timeline)}, and {reason}"
         if hold and reason:
             refused.append(Refused(key, c, hold, reason))
             hold = "foh" if iterated and not _has_rows(c) else "zoh"
@@ -133,6 +135,8 @@ def _with_springs(
                 f"{c.source}.{c.source_port} is no force of a spring-damper both ends of which are "
                 "connected and move with a known mobility (docs/holds.md); take 'half-lead'"
             )
+        elif c.needs == "coupling" and c.latency:
+            reason = springs.NEVER_LATE
         if c.hold and reason:
             key = next((k for k in names(c) if k in holds), None)
             refused.append(Refused(key, c, c.hold, reason))

@@ -10,9 +10,9 @@ from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.scene_tables import Latency
+from hapticlink.orchestrator.system import springs
 from hapticlink.orchestrator.system.assign_holds import why_unsuitable
 from hapticlink.orchestrator.system.ports import power_across_rates, scalars_of
-from hapticlink.orchestrator.system.springs import find_limited_gains
 from hapticlink.orchestrator.system.system import Connection, System
 
 OPERATIONAL_POINT = "linkage.operational_point"
@@ -39,7 +39,7 @@ def settable(system: System, name: str) -> tuple[Scalar, ...]:
         raise InputFault(f"{name} is fed by a connection, {fed[0].name}")
     if any(s.causality == "parameter" and s.variability != "tunable" for s in scalars):
         raise InputFault(f"{name} is not tunable: change its start value, in the scene")
-    if name in find_limited_gains(system):
+    if name in springs.find_limited_gains(system):
         raise InputFault(
             f"{name} is a gain of a spring whose energy `pspm` limits or whose force `mid` takes, "
             "which count with that of the start: change its start value, in the scene"
@@ -68,10 +68,12 @@ def check_change(
     why = why_unsuitable(new.hold or "", new, system.fmu, system.energy.power, False)
     if system.coupling.scheme == "iterated":
         why = "steps are repeated"
-    spring = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
-    on_force = spring and any(d.needs == "spring" for d in system.connections)
+    on_force = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
+    on_force = on_force and any(d.needs == "spring" for d in system.connections)
     if on_force or "spring" in (c.needs, new.needs):
         why = "holds of a spring share its energy: take `reset`"
+    if delay and new.needs == "coupling":
+        why = springs.NEVER_LATE
     if c.hold != new.hold and {"step", "coupling"} & {c.needs, new.needs}:
         why = "when its samples are taken is planned before the start: take `reset`"
     if why:

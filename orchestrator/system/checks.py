@@ -47,6 +47,7 @@ def check_system(scene: Scene, system: System) -> Iterator[Problem]:
     yield from springs.check_springs(scene, system.fmu)
     yield from _step_sizes(system)
     yield from _check_iterated(system)
+    yield from _check_computing_time(scene, system)
 
 
 NOWHERE = {
@@ -115,3 +116,15 @@ def _check_iterated(system: System) -> Iterator[Problem]:
             "'iterated' repeats the steps of connected plants of one rate until they agree, and "
             "there are none: take it out (docs/coupling.md)",
         )
+
+
+def _check_computing_time(scene: Scene, system: System) -> Iterator[Problem]:
+    """A finding where the result of a step would not be there when the next one begins."""
+    for name in sorted(system.early):
+        shortest = system.timeline.seconds(system.timeline.clock(system.fmu[name].clock).shortest)
+        if scene.computing_time > shortest:
+            yield (
+                ("computing_time",),
+                f"the shortest step of {name} is {shortest:.6g} s, and the next one cannot begin "
+                "before its result is there: take at most that, or a lower rate",
+            )

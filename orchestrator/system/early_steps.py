@@ -70,9 +70,13 @@ def moves(c: Connection, fmus: Mapping[str, Fmu], connections: Iterable[Connecti
 
 
 def towards(
-    c: Connection, early: Container[str], energy: EnergyPorts, connections: Collection[Connection]
+    c: Connection,
+    early: Container[str],
+    late: bool,
+    energy: EnergyPorts,
+    connections: Collection[Connection],
 ) -> str:
-    """What `model` is of a connection to a slower clock."""
+    """What `model` is of a connection to a slower clock, whose samples may be late."""
     if c.target not in early or not carries_power(c, energy.power):
         return "latest"
-    return "half-lead" if energy.coupling(c, connections) is None else "mid"
+    return "half-lead" if late or energy.coupling(c, connections) is None else "mid"

@@ -121,10 +121,19 @@ def relation(c: Connection, fmus: Mapping[str, Fmu]) -> str:
     return "WITH_POSE" if source.integral(c.outputs) else "ALONE"
 
 
+def user_of(c: Connection) -> str:
+    """What stands before the names of the outputs of the user of which a connection has one:
+    "left." of "left.x", nothing for the first."""
+    return c.source_port[: c.source_port.rfind(".") + 1]
+
+
 def acceleration(c: Connection, fmus: Mapping[str, Fmu]) -> tuple[Scalar, ...]:
     """The mobility and the acceleration without efforts of the mechanism's point of which a
     connection has the pose or the velocity; () of others."""
     source, n = fmus[c.source].description, len(c.outputs)
-    known = source.block == MECHANISM and c.source_port in ("x", "v")
-    found = [source.port(name, "output") for name in ("Lambda_inv", "a_bias") if known]
+    of_user, port = user_of(c), c.source_port
+    known = source.block == MECHANISM and port in (f"{of_user}x", f"{of_user}v")
+    found = [
+        source.port(f"{of_user}{name}", "output") for name in ("Lambda_inv", "a_bias") if known
+    ]
     return (*found[0], *found[1]) if [len(f) for f in found] == [n * n, n] else ()

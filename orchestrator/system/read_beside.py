@@ -56,5 +56,5 @@ def _efforts(c: Connection, system: System) -> Iterable[Beside]:
     power = system.fmu[c.source].description.power
     for i in system.into(c.source):
         acts = power.get(i.target_port)
-        if acts and acts.displacement == "x" and len(i.inputs) == len(c.outputs):
+        if acts and acts.displacement == f"{ports.user_of(c)}x" and len(i.inputs) == len(c.outputs):
             yield Beside(i, bool(i.hold), acts.sign)

@@ -13,6 +13,11 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.ports import size
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
+NEVER_LATE = (
+    "'mid' has the force by what is known of both ends now, however late its samples are: take "
+    "the latency out, or 'half-lead'"
+)
+
 
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     """The spring whose set position or set velocity a connection feeds; None if there is none."""

@@ -130,6 +130,11 @@ class _Events:
             raise ValueError(f"{fmu} is in get_after_set: its outputs are read before that is set")
         if any(c.needs == "spring" for c in fed):
             raise ValueError(f"{name} is held by `pspm`, which accounts for what it brings")
+        system = self._system
+        for c in system.connections:
+            of = system.energy.coupling(c, system.connections)
+            if c.needs == "coupling" and of and name in of.ends:
+                raise ValueError(f"`mid` has the force {of.force} by {name} as it is: take another")
 
 
 def _numbers(name: str, value: Value, scalars: tuple[Scalar, ...]) -> tuple[float, ...]:

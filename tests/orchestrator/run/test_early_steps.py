@@ -35,8 +35,9 @@ def run(tmp_path, **options):
     )
 
 
-def coupling(results, x, v):
-    return K * (x - results["haptic_device.x"]) + B * (v - results["haptic_device.v"])
+def coupling(results, x, v, user=""):
+    device = f"haptic_device{user}"
+    return K * (x - results[f"{device}.x"]) + B * (v - results[f"{device}.v"])
 
 
 @pytest.mark.parametrize("rate", [20, 30, VARYING])
@@ -56,28 +57,32 @@ def test_the_controller_gets_the_cubic_through_both_ends_of_each_frame(tmp_path,
     assert np.abs(expected).max() > 0.01
 
 
-def test_until_the_result_is_there_the_controller_goes_on_with_held_wrenches(tmp_path):
+@pytest.mark.parametrize(
+    ("scene", "user", "point"), [("closed-loop-ideal", "", ""), ("two-users", "_left", "left.")]
+)
+def test_until_the_result_is_there_the_controller_goes_on_with_held_wrenches(scene, user, point):
     """With half a frame of computing time: the first half by the acceleration that the mechanism
     has with what it holds, the second by the cubic."""
     frame = 1 / 16
     options = {"graphics.rate": 16, "computing_time": frame / 2, "downsampling": "latest"}
-    r = run(tmp_path, **options)
-    frames, ticks = r.time("virtual_mechanism.x"), r.time("controller.F_drift")
-    x, v = r["virtual_mechanism.x"], r["virtual_mechanism.v"]
+    r = hl.run(scene, MODEL | {"duration": 0.7} | options, figures=False)
+    force, mechanism = f"controller{user}.F_drift", f"virtual_mechanism.{point}"
+    frames, ticks = r.time(f"{mechanism}x"), r.time(force)
+    x, v = r[f"{mechanism}x"], r[f"{mechanism}v"]
     cubic = CubicHermiteSpline(frames, x, v)
     at = np.searchsorted(ticks, frames)
-    held = r["hand.F"][at] - r["controller.F_drift"][at]
-    mobility = r["virtual_mechanism.Lambda_inv"].reshape(-1, 3, 3)
-    a = np.einsum("tij,tj->ti", mobility, held) + r["virtual_mechanism.a_bias"]
+    held = r[f"hand{user}.F"][at] - r[force][at]
+    mobility = r[f"{mechanism}Lambda_inv"].reshape(-1, 3, 3)
+    a = np.einsum("tij,tj->ti", mobility, held) + r[f"{mechanism}a_bias"]
     since = np.clip(np.searchsorted(frames, ticks, "right") - 1, 0, len(frames) - 2)
     s = (ticks - frames[since])[:, None]
     early = (s > 0) & (s < frame / 2 - 1e-9)
     pose = np.where(early, x[since] + v[since] * s + a[since] * s**2 / 2, cubic(ticks))
     rate = np.where(early, v[since] + a[since] * s, cubic(ticks, 1))
     known = ticks <= frames[-1]
-    found = r["controller.F_drift"][known]
-    np.testing.assert_allclose(found, coupling(r, pose, rate)[known], atol=1e-9)
-    assert np.abs(found - coupling(r, cubic(ticks), cubic(ticks, 1))[known]).max() > 1e-4
+    found = r[force][known]
+    np.testing.assert_allclose(found, coupling(r, pose, rate, user)[known], atol=1e-9)
+    assert np.abs(found - coupling(r, cubic(ticks), cubic(ticks, 1), user)[known]).max() > 1e-4
 
 
 def test_it_tracks_better_than_holds_that_guess():
@@ -139,16 +144,65 @@ def test_what_is_planned_before_the_start_cannot_be_changed_in_a_run():
         (['holds."haptic_device.x"=ahead'], "haptic_device is not slower than"),
         (['holds."controller.F_drift"=ahead'], "controller is no plant"),
         (['holds."hand.F -> virtual_mechanism.F_hand"=mid'], "no force of a spring-damper"),
+        (
+            ['holds."controller.F_drift"=mid', 'delays."controller.F_drift"=0.01'],
+            "however late its samples are",
+        ),
+        (["hold=model", 'coupling="gauss-seidel-plants"'], "does not hold the inputs of virtual_m"),
+        (["hold=model", 'get_after_set=["virtual_mechanism"]'], "get_after_set changes outputs"),
+        (["computing_time=0.034", "graphics.rate=30"], "shortest step of virtual_mechanism is 0.0"),
+        (["computing_time=0.05", "graphics.rate={min=10,max=50,seed=3}"], "take at most that"),
     ],
 )
 def test_what_cannot_be_is_refused_with_the_reason(options, said):
     own = [f"{k}={json.dumps(v)}" for k, v in AT_GRAPHICS.items()]
-    named = (
-        [] if "ahead" in options[0] or "mid" in options[0] else ["holds.virtual_mechanism.x=ahead"]
-    )
+    own_hold = any(hold in options[0] for hold in ("ahead", "mid", "model"))
+    named = [] if own_hold else ["holds.virtual_mechanism.x=ahead"]
     with pytest.raises(InputFault) as refused:
         system_of("closed-loop-ideal", *own, *named, *options)
     assert said in str(refused.value)
+
+
+def test_a_force_that_is_late_is_not_foretold():
+    """`mid` has it by its ends of now, as if it were not late."""
+    latency = 'delays."controller.F_drift"=0.05'
+    options = [f"{k}={json.dumps(v)}" for k, v in MODEL.items()]
+    name = "controller.F_drift -> virtual_mechanism.F_drift"
+    for given, hold in (([], "mid"), ([latency], "half-lead")):
+        system = system_of("closed-loop-ideal", *options, *given)
+        assert system.connection[name].hold == hold
+    system = system_of("closed-loop-ideal", *options)
+    with pytest.raises(InputFault, match="however late its samples are"):
+        check_change(system, system.connection[name], None, 0.01)
+
+
+@pytest.mark.parametrize("port", ["x_S", "v_D", "Lambda_inv"])
+def test_ends_of_a_force_that_is_foretold_are_not_disturbed(port):
+    """`mid` would have them as they are, where the controller has them frozen."""
+    at = [{"time": 0.2, "until": 0.3, "freeze": [f"controller.{port}"]}]
+    with pytest.raises(InputFault, match="`mid` has the force"):
+        hl.run("closed-loop-ideal", MODEL | {"at": at}, figures=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"downsampling": "model"}, "it is for efforts on plants whose steps are taken when they"),
+        ({"computing_time": 0.01}, "computing_time acts on no connection: no step is taken when"),
+        (
+            {"hold": "model", "computing_time": 0.01, "delays": {"virtual_mechanism": 0.02}},
+            "all connections from such steps have latencies of their own",
+        ),
+        ({"hold": "model", "computing_time": 0.01}, None),
+    ],
+)
+def test_what_acts_on_nothing_is_told(options, said):
+    if "delays" in options:
+        ports = ("x", "v", "a_bias", "Lambda_inv", "P_c")
+        options["delays"] = {f"virtual_mechanism.{port}": 0.02 for port in ports}
+    r = hl.run("closed-loop-ideal", AT_GRAPHICS | {"duration": 0.1} | options, figures=False)
+    lines = r.run["without_effect"]
+    assert [said in line for line in lines] == ([True] if said else []), lines
 
 
 def test_where_it_gains_less_is_told(tmp_path):
