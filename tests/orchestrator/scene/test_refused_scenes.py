@@ -107,7 +107,7 @@ REFUSED = {
          "phases.virtual_environment: a phase needs a fixed rate"),
         ("delays.hand.F=-1.0", "-1.0 is out of range: give a number >= 0 and <= 100000 (s)"),
         ("delays.hand.F={loss=1.5}", "1.5 is out of range: give a number >= 0 and <= 1"),
-        ("downsampling=zoh", "there are latest, mean"),
+        ("downsampling=zoh", "there are model, latest, mean"),
         ("iteration.most=0", "iteration.most"),
         ("iteration.tolerance=-1.0", "iteration.tolerance"),
         ("step_control={ tolerance = 1.0 }", "with a higher rate or `substeps`"),
