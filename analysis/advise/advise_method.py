@@ -126,8 +126,8 @@ def advise(
     methods = all_methods(read)
     assert read.device is not None  # of a scene with methods
     limits = AcceptanceLimits.of(read.device)
-    drawn = list(draws(read, 2 * count, seed))
-    around, apart = [(), *drawn[:count]], drawn[count:]
+    drawn = list(draws(read, 3 * count, seed))
+    around, apart, last = [(), *drawn[:count]], drawn[count : 2 * count], drawn[2 * count :]
 
     def run(of: Sequence[Method], drawn: Sequence[Sequence[str]]) -> dict[Method, list[Row]]:
         return on_draws(scene, options, of, drawn, folder, processes=processes, tell=tell)
@@ -145,7 +145,7 @@ def advise(
     ran = judge_best_first(ranked, judge, lambda one: one.admitted, ROUND)
     advice = _chosen(read.title, list(ran), screened, limits)
     if read.controller and read.controller.teleoperation:
-        gains = refine(read, advice.taken, judge, around, apart)
+        gains = refine(read, advice.taken, judge, around, apart, last)
         advice = replace(advice, taken=gains.found, gains=gains)
     if read.sensing == "ideal" or replace(read.device.observer, beside=False) != Observer():
         return advice

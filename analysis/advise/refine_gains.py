@@ -7,7 +7,7 @@ draws: the upper quartile of log(error/error of the set).
 
 What keeps the limits narrowly in the draws of a search may break them in others. So from the set to
 the gains that were found those farthest are taken, by bisection, that cost less than the set on
-draws kept apart, too.
+draws kept apart, too. What they are worth is told of draws that took no part in this.
 """
 
 from __future__ import annotations
@@ -40,34 +40,38 @@ NEVER = (10**9, 0.0)
 
 @dataclass(frozen=True)
 class Refined:
-    """A method `found` around a `start`, both on the draws of the search and on those kept `apart`;
-    found is start where the search found none that holds there. tried: gains on the way."""
+    """A method `found` around a `start`, both on the draws of the search, and on those that took
+    `no_part` in the choice; found is start where the search found none that holds on the draws kept
+    apart. tried: gains on the way."""
 
     start: Measured
     found: Measured
-    apart: tuple[Measured, Measured]
+    no_part: tuple[Measured, Measured] | None
     tried: int
 
     @property
     def line(self) -> str:
         """What refining is worth."""
-        if self.found is self.start:
+        if self.no_part is None:
             return (
                 f"gains: {self.tried} others were tried; none was found to be better in three "
-                f"quarters of these draws and of {len(self.apart[0].error_mm)} others"
+                "quarters of these draws and of as many others"
             )
-        before, after = self.apart
+        before, after = self.no_part
         low, middle, high = np.exp(np.quantile(_off(after, before), [0.0, 0.5, 1.0]))
         return (
-            f"gains: {self.tried} were tried. On {len(after.error_mm)} other draws the error is "
-            f"{middle:.2f} times that of {self.start.method.gains} ({low:.2f} to {high:.2f}), "
-            f"{after.within} within the limits ({before.within})"
+            f"gains: {self.tried} were tried. On {len(after.error_mm)} draws that took no part in "
+            f"the choice the error is {middle:.2f} times that of {self.start.method.gains} "
+            f"({low:.2f} to {high:.2f}), {after.within} within the limits ({before.within})"
         )
 
 
-def refine(read: Scene, start: Measured, judge: Judge, around: Draws, apart: Draws) -> Refined:
+def refine(
+    read: Scene, start: Measured, judge: Judge, around: Draws, apart: Draws, last: Draws
+) -> Refined:
     """The gains around those of a method of a scene with teleoperation, by draws `around`, on which
-    `start` is, and others `apart`. What fails in the first draw runs in no other."""
+    `start` is, others `apart`, and the `last`, on which the choice is told. What fails in the first
+    draw runs in no other."""
     known: dict[Point, Measured] = {(0, 0): start}
     costs: dict[Point, tuple[int, float]] = {(0, 0): _cost(start, start)}
 
@@ -97,8 +101,11 @@ def refine(read: Scene, start: Measured, judge: Judge, around: Draws, apart: Dra
         return _cost(taken[n], before) < _cost(before, before)
 
     n = int(largest_count(holds, far, far).value) if far else 0
-    found = known[at(n)] if n else start
-    return Refined(start, found, (before, taken[n]), len(costs) - 1)
+    if not n:
+        return Refined(start, start, None, len(costs) - 1)
+    found = known[at(n)]
+    old, new = judge([start.method, found.method], last)
+    return Refined(start, found, (old, new), len(costs) - 1)
 
 
 def _cost(found: Measured, start: Measured) -> tuple[int, float]:

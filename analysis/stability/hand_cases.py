@@ -33,6 +33,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 SHARES = 3
 SLIGHT = 0.01
 """Growth rate (1/s) of a marginal case, which takes more than a minute to double."""
+TWICE = 2.0
 TIE = 1e-6
 """Difference of growth rates, relative to the larger and SLIGHT at least, up to which they are the
 same: which of them rounding makes the larger decides nothing."""
@@ -137,20 +138,32 @@ class InHands:
         self._users = [name for name in names if user_of_block(name, HAND) is not None]
         self._period = period.fused(self._users)
 
-    def worst(self, hands: Mapping[str, Hand | None], bounds: Bounds) -> float:
-        """The largest growth rate (1/s) in all hands, or the first one that is positive;
-        drifts and marginal ones do not count."""
+    def worst(
+        self,
+        hands: Mapping[str, Hand | None],
+        bounds: Bounds,
+        slow: Callable[[Hand | None], float],
+    ) -> float:
+        """The largest growth rate (1/s) in all hands, or the first one that is positive. Drifts do
+        not count, nor what is marginal and grows slightly, or less than TWICE as fast as is `slow`
+        in that hand."""
         largest = -np.inf
         for hand in hands.values():
             mode, period = self._leading(hand)
             growth = mode.growth
-            if self._verdict(mode) == "unstable":
+            unstable = self._verdict(mode) == "unstable"
+            if unstable or (growth > SLIGHT and growth > TWICE * slow(hand)):
                 hertz = period.traced(mode).omega / (2 * np.pi)
                 if kind(growth, hertz, bounds) != "drift":
                     return growth
             else:
                 largest = max(largest, min(growth, -SLIGHT))
         return largest
+
+    def slow(self, hand: Hand | None) -> float:
+        """The growth rate (1/s) in a hand in which it is marginal, else 0."""
+        mode, _ = self._leading(hand)
+        return mode.growth if self._verdict(mode) == "marginal" else 0.0
 
     def cases(self, pose: str, hands: Mapping[str, Hand | None], bounds: Bounds) -> list[Case]:
         """The case of each hand."""

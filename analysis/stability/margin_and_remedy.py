@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 from hapticlink.analysis.search.search import (
     Largest,
@@ -109,6 +110,7 @@ class _Search:
         self._read, self._pose, self._hands, self._bounds = read, pose, hands, bounds
         self._work, self._steps = work, steps
         self._known: dict[tuple[str, ...], float] = {}
+        self._own_place: RestingScene | None = None
         self._haptic = exact(self._read.haptics.rate)
 
     def place(
@@ -120,6 +122,7 @@ class _Search:
 
     def margin(self, place: RestingScene) -> Margin:
         found: dict[str, Largest] = {}
+        self._own_place = place
         self._steps.tell(f"margins at {self._pose.name}")
         if place.gains.laws:
             self._steps.begin("margin of stiffness")
@@ -180,7 +183,7 @@ class _Search:
         )
         try:
             scales = {} if scale == 1.0 else dict.fromkeys(place.gains.laws, scale)
-            return InHands(place, scales, late).worst(self._hands, self._bounds) < 0.0
+            return self._worst(InHands(place, scales, late)) < 0.0
         except (InputFault, FmuFault):
             return False
 
@@ -190,10 +193,19 @@ class _Search:
         if (change := tuple(change)) not in self._known:
             try:
                 with self.place(change) as (place, _):
-                    self._known[change] = InHands(place).worst(self._hands, self._bounds)
+                    self._known[change] = self._worst(InHands(place))
             except (InputFault, FmuFault):
                 self._known[change] = float("inf")
         return self._known[change]
+
+    def _worst(self, held: InHands) -> float:
+        return held.worst(self._hands, self._bounds, lambda hand: self._own.slow(hand))
+
+    @cached_property
+    def _own(self) -> InHands:
+        """With the scene's own gains."""
+        assert self._own_place is not None
+        return InHands(self._own_place)
 
     def softer(self, place: RestingScene, margin: Margin) -> tuple[str, ...]:
         """Gains below the limit; nothing where no gains are stable."""

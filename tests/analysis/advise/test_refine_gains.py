@@ -16,7 +16,7 @@ from hapticlink.analysis.advise.refine_gains import NOTCH, Draws, Refined, refin
 from hapticlink.orchestrator import open_scene
 
 SCENE = "closed-loop-direct"
-AROUND, APART = [("a=0",), ("a=1",), ("a=2",)], [("b=0",), ("b=1",)]
+AROUND, APART, LAST = [("a=0",), ("a=1",), ("a=2",)], [("b=0",), ("b=1",)], [("c=0",), ("c=1",)]
 SOFT = (25.0, 5.0)
 Error = Callable[[float, float, str], float]
 """Of stiffness, damping and draw; infinite where a limit is broken."""
@@ -43,7 +43,7 @@ def refined(error: Error) -> tuple[Refined, Runs]:
     runs = Runs(error)
     (start,) = runs.judge([Method("zoh", "soft")], AROUND)
     runs.ran.clear()
-    return refine(open_scene.load(SCENE), start, runs.judge, AROUND, APART), runs
+    return refine(open_scene.load(SCENE), start, runs.judge, AROUND, APART, LAST), runs
 
 
 def gains(method: Method) -> tuple[float, float]:
@@ -63,8 +63,8 @@ def test_the_best_gains_are_found_to_half_a_notch(best: tuple[float, float]) -> 
     found, runs = refined(error)
     for value, known in zip(gains(found.found.method), best, strict=True):
         assert abs(np.log(value / known)) < 0.51 * np.log(NOTCH)
-    assert len(set(runs.ran)) <= len(AROUND) * (found.tried + 1) + 2 * len(APART)
-    told = runs.judge([found.found.method, found.start.method], APART)
+    assert len(set(runs.ran)) <= len(AROUND) * (found.tried + 1) + 2 * len(APART) + 2 * len(LAST)
+    told = runs.judge([found.found.method, found.start.method], LAST)
     ratio = told[0].error_mm[0] / told[1].error_mm[0]
     if best == SOFT:
         assert found.found is found.start
@@ -85,7 +85,8 @@ def test_gains_that_break_a_limit_in_any_draw_are_not_taken() -> None:
     K, B = gains(found.found.method)
     assert 45.0 / NOTCH < K <= 45.0
     assert SOFT[1] == B
-    assert found.apart[1].within == len(APART)
+    assert found.no_part
+    assert found.no_part[1].within == len(LAST)
 
 
 def test_what_breaks_a_limit_in_the_scene_itself_runs_in_no_draw() -> None:
@@ -140,11 +141,14 @@ def test_a_scene_gets_gains_beyond_the_sets_that_its_runs_confirm(
     found = advise.advise("closed-loop-ideal", given, tmp_path, count=1)
     assert found.gains
     assert gains(found.taken.method)[1] > 2 * 4.0
-    (_, apart) = draws(open_scene.load("closed-loop-ideal", given), 2, 0)
+    (*_, last) = draws(open_scene.load("closed-loop-ideal", given), 3, 0)
     own, taken = (
-        hl.run("closed-loop-ideal", (*given, *apart, *options), figures=False)
+        hl.run("closed-loop-ideal", (*given, *last, *options), figures=False)
         for options in (("hold=zoh",), found.taken.method.options)
     )
     ratio = taken.measures().tracking[""].max_mm / own.measures().tracking[""].max_mm
     assert ratio < 0.7
-    assert f"On 1 other draws the error is {ratio:.2f} times that of own" in found.gains.line
+    assert (
+        f"On 1 draws that took no part in the choice the error is {ratio:.2f} times that of own"
+        in found.gains.line
+    )

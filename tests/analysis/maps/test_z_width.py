@@ -89,7 +89,7 @@ def test_values_without_a_verdict_are_told_beside_those_that_have_one() -> None:
         "all that was tried is unstable; without a verdict: no equilibrium"
     )
     (line,) = stability._of_limits([row | {"a": 1}], ["a"])
-    assert line == f"a=1: stable with none that was tried ({row['message_stable']})"
+    assert line == f"a=1: stable: {row['message_stable']}"
 
 
 def test_a_search_without_any_verdict_finds_no_limit_of_none() -> None:
@@ -99,7 +99,7 @@ def test_a_search_without_any_verdict_finds_no_limit_of_none() -> None:
     row = z_width._largest("stable", 1000.0, verdict)
     assert row["stable"] == "refused"
     (line,) = stability._of_limits([row | {"a": 1}], ["a"])
-    assert line == "a=1: stable unknown (without a verdict: no equilibrium)"
+    assert line == "a=1: stable: without a verdict: no equilibrium"
 
 
 @pytest.mark.parametrize(

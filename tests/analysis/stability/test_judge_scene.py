@@ -57,7 +57,7 @@ COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
     ("enclosure", {}, (17, 110, 1874)),
     ("two-users", {}, (16, 167, 2504)),
     ("closed-loop-direct", {}, (42, 343, 4058)),
-    ("closed-loop-direct", {"hold": "foh"}, (42, 476, 6996)),
+    ("closed-loop-direct", {"hold": "foh"}, (42, 474, 6985)),
 ]
 
 

@@ -1,0 +1,43 @@
+"""What a mode that is marginal, by a large uncertainty, counts for in a margin."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hapticlink.analysis.stability.hand_cases import SLIGHT, Bounds, InHands
+from hapticlink.analysis.stability.modes import Mode
+
+
+class OfGrowth(InHands):
+    """A scene whose leading mode has a growth rate (1/s) and an uncertainty; a period is 1 s."""
+
+    def __init__(self, growth: float, uncertainty: float) -> None:
+        none = np.zeros(0)
+        self._mode = Mode(complex(np.exp(growth)), uncertainty, growth, 10.0, none, none)
+        self._seconds = 1.0
+
+    def _leading(self, hand):  # type: ignore[no-untyped-def]
+        return self._mode, self
+
+    def traced(self, mode: Mode) -> Mode:
+        return mode
+
+
+@pytest.mark.parametrize(
+    ("changed", "own", "ends"),
+    [
+        ((0.06, 1e-3), (-0.06, 1e-3), True),  # unstable
+        ((0.06, 0.5), (-0.06, 1e-3), True),  # as likely as not, and it was stable
+        ((0.06, 0.5), (-0.04, 0.5), True),  # it was marginal, and decayed
+        ((0.06, 0.5), (0.05, 0.5), False),  # it was marginal, and grew as fast
+        ((0.06, 0.5), (0.02, 0.5), True),  # more than twice as fast as before
+        ((SLIGHT / 2, 0.5), (-0.06, 1e-3), False),
+        ((-0.06, 0.5), (-0.06, 1e-3), False),
+    ],
+)
+def test_what_grows_within_its_uncertainty_ends_a_margin(
+    changed: tuple[float, float], own: tuple[float, float], ends: bool
+) -> None:
+    worst = OfGrowth(*changed).worst({"a": None}, Bounds(), OfGrowth(*own).slow)
+    assert (worst > 0.0) == ends
