@@ -82,7 +82,7 @@ def expression(text: str, variables: Mapping[str, ca.SX]) -> ca.SX:
         return ca.SX(read(ast.parse(text.strip(), mode="eval").body))
     except (SyntaxError, RecursionError, MemoryError) as error:
         why = getattr(error, "msg", "") or "too deep"
-        raise ValueError(f"{text!r}: {why}; write a formula such as 0.5*sin(2*pi*3*t)") from None
+        raise ValueError(f"{why}; write a formula such as 0.5*sin(2*pi*3*t)") from None
 
 
 def _written(node: Any) -> str:

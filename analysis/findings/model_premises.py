@@ -23,11 +23,11 @@ def describe_premises(results: Results) -> Iterator[str]:
         return
     scene, less = record.scene, "hold = 'model' gains less here:"
     if scene["sensing"] == "encoders":
-        observer = scene["device"]["observer"]
+        observer = (scene["device"] or {}).get("observer", {})
         better = "; device.observer.law = 'kalman' follows it faster (results/observer)"
         yield (
             f"{less} with encoders the observer's estimate of the hand's wrench decides"
-            f"{better if observer['law'] == 'nicosia' else ''}"
+            f"{better if observer.get('law') == 'nicosia' else ''}"
         )
     if (scene["controller"] or {}).get("bias") == "none":
         yield (

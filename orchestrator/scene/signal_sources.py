@@ -97,7 +97,7 @@ def _has_units(source: Mapping[str, Any]) -> bool:
 def read_log(settings: dict[str, Any]) -> None:
     """Puts the rows of a recorded log into the settings of a signal, with the units of its values.
     Raises as `read_recorded_table` does."""
-    given = settings["table"]
+    given = settings.pop("table")  # so that what cannot be read is told once
     settings["table"] = read_recorded_table(given)
     if units := given.get("units"):
         settings["units"] = [si_unit(unit) for unit in units[1:]]

@@ -94,6 +94,13 @@ def test_a_log_has_units_and_lies_beside_the_scene(tmp_path):
     assert run.run["units"]["fed_u.y"] == "N"
 
 
+def test_a_log_that_cannot_be_read_is_told_once(tmp_path):
+    (tmp_path / "log.csv").write_text("t,u\n0,1\n1,nan\n")
+    file = scene(tmp_path, REAL, {"u": "{ table = { path = 'log.csv' } }"})
+    with pytest.raises(SceneFault, match=r"1 fault\n.*line 3, column 2: 'nan' is no finite number"):
+        hl.run(file)
+
+
 def test_it_is_swept_as_all_keys(tmp_path):
     file = scene(tmp_path, REAL, {"u": "{ formula = 't' }"}, 'values["y"] = values["u"]')
     run = hl.run(file, {"connection.0.from.formula": "2*t"})
