@@ -27,7 +27,7 @@ import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
-from benchmarks.page import Progress, table
+from benchmarks.page import Progress, load_average, system, table
 from benchmarks.rows import Rows
 from hapticlink.analysis.sweep import run_sweep
 from hapticlink.analysis.sweep.job import job
@@ -81,6 +81,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     rows = Rows(folder / "points.csv", COLUMNS, 2)
     rounds, count = (1, 10) if quick else (ROUNDS, POINTS)
     process.raise_gc_threshold()
+    load = load_average()
     with ExitStack() as stack:
         room = stack.enter_context(temporary_folders.temporary_folder())
         stack.enter_context(one_blas_thread())
@@ -118,7 +119,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
                     point, inside = (median(found) for found in zip(*each, strict=True))
                     rows.add(key, form, point, inside if form != "FMPy" else "")
     rows.add("imports", "a worker", _imports(), "")
-    return _page([*rows.rows.values()], command)
+    return _page([*rows.rows.values()], command, load)
 
 
 class _LoopTime:
@@ -149,7 +150,8 @@ class _LoopTime:
 def _fmpy(room: Path, stack: ExitStack) -> Callable[[list[Point]], tuple[float, float]]:
     """Points by FMPy, in one instance of the scene as one FMU."""
     path = build_program(open_scene.load(SCENE), SCENE, out=room)
-    about, unpacked = fmpy.read_model_description(path), fmpy.extract(path)
+    about = fmpy.read_model_description(path)
+    unpacked = fmpy.extract(path, unzipdir=str(room / "unpacked"))
     instance = fmpy.instantiate_fmu(unpacked, about, "CoSimulation")
     assert isinstance(instance, FMU2Slave)
     stack.callback(instance.freeInstance)
@@ -196,7 +198,7 @@ def _imports() -> float:
     return 1e3 * (sum(times()[2:4]) - begin)
 
 
-def _page(rows: list[dict[str, str]], command: str) -> str:
+def _page(rows: list[dict[str, str]], command: str, load: float) -> str:
     point = {(row["key"], row["form"]): float(row["point_ms"]) for row in rows}
     loop = {row["key"]: float(row["loop_ms"]) for row in rows if row["form"] == "sweep"}
     ratios = [point[key, "sweep"] / loop[key] for key in KEYS]
@@ -206,7 +208,7 @@ def _page(rows: list[dict[str, str]], command: str) -> str:
 
 A point of {SCENE} takes {min(ratios):.2f} to {max(ratios):.2f} times what its event loop takes, and FMPy takes {min(peer):.2f} to {max(peer):.2f} times as long for one; the imports of a worker take as long as {point["imports", "a worker"] / point["hand", "sweep"]:.0f} points.
 
-Made by `{command}`. {method} Measured on a machine with much other work, which shares caches and cores: ratios hold, absolute times do not. All rows: [points.csv](points.csv).
+Made by `{command}`. {method} On {system()}, with a load average of {load:.1f} before: ratios hold elsewhere, times do not. All rows: [points.csv](points.csv).
 
 """  # noqa: E501
     lines = (

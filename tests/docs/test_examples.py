@@ -73,6 +73,7 @@ NOT_RUN = {
     "--set 'controller.teleoperation.stiffness=[500.0, 500.0, 0.5]'":
         "as the one above it on its page",
     "hapticlink bench advise": "thousands of runs; tests/analysis/advise/test_advise.py",
+    "hapticlink bench sweep": "minutes; tests/reference/test_bench_sweep.py",
     "hapticlink bench waiting": "minutes; tests/reference/test_waiting.py",
     "hapticlink bench foreign": "downloads packages; tests/reference/test_foreign.py",
     "hapticlink bench network": "takes a minute, and measures the machine",
