@@ -208,7 +208,7 @@ def _page(rows: list[dict[str, str]], command: str, load: float) -> str:
 
 A point of {SCENE} takes {min(ratios):.2f} to {max(ratios):.2f} times what its event loop takes, and FMPy takes {min(peer):.2f} to {max(peer):.2f} times as long for one; the imports of a worker take as long as {point["imports", "a worker"] / point["hand", "sweep"]:.0f} points.
 
-Made by `{command}`. {method} On {system()}, with a load average of {load:.1f} before: ratios hold elsewhere, times do not. All rows: [points.csv](points.csv).
+Made by `{command}`. {method} On {system()}, with a load average of {load:.1f} before. All rows: [points.csv](points.csv).
 
 """  # noqa: E501
     lines = (
