@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import casadi as ca
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.fmu_functions import RARELY, on_request, one_pass
+from hapticlink.fmus.fmu_functions import RARELY, functions_of_fmu, on_request
 from hapticlink.fmus.native.split_functions import split_functions
 
 
@@ -20,7 +20,7 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
 
     The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """
-    parts = one_pass(component)
+    parts = functions_of_fmu(component)
     text, pieces = functions(parts.functions)
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
