@@ -24,6 +24,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 
@@ -73,7 +74,7 @@ def functions_of_fmu(component: Component) -> OnePass:
     are those of the former, which are shorter."""
     parts = one_pass(component)
     with _without_simplification():
-        own = {
+        own: dict[str, Any] = {
             role: with_own_sines(f) for role, f in vars(parts).items() if isinstance(f, ca.Function)
         }
         return replace(parts, **own)

@@ -13,14 +13,14 @@ within 1 ulp for |x| < 8e8; beyond, the products are rounded.
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 
 QUARTER_TURNS = 0.6366197723675814
 """2/pi."""
 PARTS = (1.570796251296997, 7.549789415861596e-08, 5.390302529957765e-15, 3.2820035428735005e-22)
 """pi/2: three parts of 24 bits and the rest."""
-TO_INTEGER = 6755399441055744.0
-"""1.5 2^52: added to a number below 2^51 and subtracted again, it rounds that to an integer."""
 SINE = (
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -40,7 +40,8 @@ COSINE = (
 
 
 def sine_cosine(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Both of a scalar, to be composed without CasADi's simplifications."""
+    """Both of a scalar, to be composed without CasADi's simplifications, which take rounding for
+    nothing: the results are then off by some 1e-16."""
     k = _nearest(x * QUARTER_TURNS)
     first = (x - k * PARTS[0]) - k * PARTS[1]  # exact
     third = k * PARTS[2]
@@ -65,8 +66,8 @@ def sine_cosine(x: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _nearest(x: ca.SX) -> ca.SX:
-    """The nearest integer, the even one of two."""
-    return (x + TO_INTEGER) - TO_INTEGER
+    """The nearest integer, as a function without slope."""
+    return ca.floor(x + 0.5)
 
 
 def _polynomial(coefficients: tuple[float, ...], z: ca.SX) -> ca.SX:
@@ -87,7 +88,7 @@ def with_own_sines(function: ca.Function) -> ca.Function:
     arguments = function.sx_in()
     given = [a.nonzeros() for a in arguments]
     results = [[ca.SX(0)] * function.nnz_out(i) for i in range(function.n_out())]
-    work = [ca.SX(0)] * function.sz_w()
+    work: list[Any] = [ca.SX(0)] * function.sz_w()
     known: dict[int, tuple[ca.SX, ca.SX]] = {}  # which keeps the arguments, and so their hashes
     for k, code in enumerate(codes):
         into, of = function.instruction_output(k), function.instruction_input(k)
@@ -114,7 +115,7 @@ def with_own_sines(function: ca.Function) -> ca.Function:
     return ca.Function(function.name(), arguments, made, *names, {"cse": True})
 
 
-def _called(function: ca.Function, k: int, given: list[ca.SX]) -> list[ca.SX]:
+def _called(function: ca.Function, k: int, given: list[Any]) -> list[Any]:
     """What instruction k, a call, gives for the numbers that it takes."""
     called, arguments = function.instructions_sx()[k].which_function(), []
     for i in range(called.n_in()):
@@ -124,5 +125,5 @@ def _called(function: ca.Function, k: int, given: list[ca.SX]) -> list[ca.SX]:
     return [entry for result in called.call(arguments, False, True) for entry in result.nonzeros()]
 
 
-def _filled(sparsity: ca.Sparsity, entries: list[ca.SX]) -> ca.SX:
+def _filled(sparsity: ca.Sparsity, entries: list[Any]) -> ca.SX:
     return ca.SX(sparsity, ca.vertcat(ca.SX(0, 1), *entries))

@@ -77,15 +77,29 @@ class Events:
         c, machine = self._c, self._machine
         loop, here = ctypes.addressof(machine.loop), ctypes.addressof(c)
         while code := machine.code(c.at, machine.library.events, loop, here):
-            if code == structures.KIND:
-                self._new_kind()
-            elif code == structures.STARTS:
-                self._next_window(c.at.what)
-            elif code == structures.PAUSE:
+            if code == structures.PAUSE:
                 turn(c.tick)
             else:
-                machine.serve(code, c.at, c.tick)
+                self.serve(code)
         turn(c.tick)
+
+    def serve(self, code: int) -> None:
+        """Do what the loop returned for, so that it can go on."""
+        if code == structures.KIND:
+            self._new_kind()
+        elif code == structures.STARTS:
+            self._next_window(self._c.at.what)
+        else:
+            self._machine.serve(code, self._c.at, self._c.tick)
+
+    @property
+    def c(self) -> structures.Events:
+        """The structure that the loop works on."""
+        return self._c
+
+    def has_kinds_of(self, other: Events) -> bool:
+        """Whether kinds of events, and their operations, have the same numbers."""
+        return [*self._kinds.items()] == [*other._kinds.items()]
 
     def previous(self, clock: str) -> int:
         """The communication point (ticks) at which the newest sample of a clock is."""
@@ -171,6 +185,21 @@ class CompiledLoop:
         self._machine.begin_again()
         self._take(plan)
         self.events.prepare(self.events.coming())
+
+    def goes_with(self, other: CompiledLoop) -> bool:
+        """Whether both have the same operations, under the same numbers."""
+        mine, its = self._machine, other._machine
+        return mine.has_operations_of(its) and self.events.has_kinds_of(other.events)
+
+    @property
+    def structure(self) -> structures.Loop:
+        """What the compiled loop works on."""
+        return self._machine.loop
+
+    @property
+    def fmus(self) -> list[str]:
+        """The FMUs that operations refer to, by number."""
+        return self._machine.names("fmu")
 
     def begin_again(self) -> None:
         """Stand at the first event, with the kinds of events that are known."""

@@ -85,6 +85,10 @@ class Machine:
         of_objects = {f"n_{kind}s": len(indices) for kind, indices in self._indices.items()}
         return {**of_objects, "n_ops": len(self._instructions), "n_points": len(self._points)}
 
+    def has_operations_of(self, other: Machine) -> bool:
+        """Whether the operations are those of another simulation, and the numbers of objects."""
+        return self._indices == other._indices and self._instructions == other._instructions
+
     # --- records --------------------------------------------------------------------------
 
     def block(self, sequence: Sequence[Instruction]) -> tuple[int, int]:
