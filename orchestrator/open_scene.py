@@ -1,13 +1,16 @@
-"""Opens a scene by its name or path: a shipped one, a TOML file, or an SSP."""
+"""Opens a scene by its name or path: a shipped one, a TOML file, an SSP, or that of a run's state,
+which then goes on from it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path as FilePath
+from typing import Any
 
 from hapticlink.orchestrator.base import plugins
-from hapticlink.orchestrator.base.errors import Finding, SceneFault
+from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
+from hapticlink.orchestrator.results.state_file import SUFFIX, read_state
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find_scene import find_scene
@@ -43,6 +46,9 @@ def source_of(scene: str | FilePath | Scene) -> Source:
 
 
 def _find(scene: str) -> Source:
+    if scene.endswith(SUFFIX):
+        tables = read_state(FilePath(scene))["scene"]
+        return Source(tables["title"], tables | {"resume": scene}, {})
     if scene.endswith(".ssp"):
         # Imported here, since its XML parsers are slow to load.
         from hapticlink.orchestrator.ssp import read as ssp
@@ -55,10 +61,24 @@ def _find(scene: str) -> Source:
 def _of(scene: Scene) -> Source:
     if scene.source:
         return scene.source
-    tables = adapter().dump_python(scene.plain(), mode="json", by_alias=True, exclude_none=True)
+    tables = write_tables(scene)
     if isinstance(scene, WrittenScene):
         return replace(scene.origin, tables=tables)
     return Source(scene.title, tables, {})
+
+
+def require_start(scene: Scene, what: str) -> None:
+    """Raises InputFault for a scene that goes on from a state, where `what` does not."""
+    if scene.resume:
+        raise InputFault(f"resume = {scene.resume!r}: {what} begins at the start: leave it out")
+
+
+def write_tables(scene: Scene) -> dict[str, Any]:
+    """The tables of a scene as it is, which are read as those of a file."""
+    tables: dict[str, Any] = adapter().dump_python(
+        scene.plain(), mode="json", by_alias=True, exclude_none=True
+    )
+    return tables
 
 
 def _check_ssp(source: Source) -> None:

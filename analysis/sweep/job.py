@@ -85,7 +85,7 @@ def key(scene: Scene) -> str:
     computed_with = [*_list_code(), plugins.list_plugins()]
     whole: dict[str, Any] = {"scene": scene.plain(), "made_with": computed_with}
     try:
-        paths = [Path(f.path) for f in scene.fmu if f.path]
+        paths = [Path(path) for path in (scene.resume, *(f.path for f in scene.fmu)) if path]
         files = [sha256(path.read_bytes()).hexdigest() for path in paths]
     except OSError as error:
         raise InputFault(f"{error.filename}: cannot be read: {error.strerror}") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from time import perf_counter
@@ -24,11 +24,13 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run import kept_runs
-from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
+from hapticlink.orchestrator.run import kept_runs, run_state
+from hapticlink.orchestrator.run.compiled.loop import NO_HALTS, CompiledLoop, Halt
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
 from hapticlink.orchestrator.run.kept_runs import KeptRun, StartMemory
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
+from hapticlink.orchestrator.run.run_state import RunState
+from hapticlink.orchestrator.run.save_times import Saving
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
 
@@ -107,10 +109,13 @@ def run(
     results: RunResults,
     progress: Progress | None = None,
     real_time: RealTimeRun | None = None,
+    state: RunState | None = None,
+    saving: Saving | None = None,
 ) -> Outcome:
     """Execute the plan to its end or to the first fault; rows up to then are in `results`.
 
     progress is called with the simulated time (s) from time to time. real_time: see RealTimeRun.
+    state: from which the run goes on. saving: when states are saved, and what saves them.
     """
     outcome = Outcome()
     simulation: Simulation | None = None
@@ -124,7 +129,8 @@ def run(
             np.errstate(invalid="ignore", over="ignore"),
         ):
             interrupt.raise_if_interrupted()
-            kept = None if real_time or results.log_path else kept_runs.take(plan.system)
+            apart = real_time or results.log_path or state or saving
+            kept = None if apart else kept_runs.take(plan.system)
             opened = stack.enter_context(kept.opened if kept else ExitStack())
             if kept:
                 simulation, loop = kept.simulation, kept.loop
@@ -136,17 +142,21 @@ def run(
                 if real_time:
                     stack.enter_context(real_time.of(plan, simulation))
                 loop = CompiledLoop(plan, simulation)
-                keeps = kept_runs.may_be_kept(simulation, results)
+                keeps = not apart and kept_runs.may_be_kept(simulation, results)
                 memory = StartMemory(simulation) if keeps else None
+                simulation.rows_before = state.content["rows"] if state else {}
                 simulation.start()
                 coming = loop.events.coming()
                 loop.events.prepare(real_time.kinds(coming) if real_time else coming)
+                if state:
+                    run_state.restore(state, simulation, loop)
                 if memory:
                     memory.take_pointers()
                     kept = KeptRun(plan, simulation, loop, memory, opened)
             if real_time:
                 stack.enter_context(real_time.pace.undisturbed())
-            _run_events(plan, loop, results, outcome, progress, real_time)
+            halts = saving.halts(simulation, loop) if saving else NO_HALTS
+            _run_events(plan, loop, results, outcome, progress, real_time, halts)
             if kept and kept.end():
                 ended = replace(kept, opened=opened.pop_all())
     except (Exception, KeyboardInterrupt) as error:
@@ -172,6 +182,7 @@ def _run_events(
     outcome: Outcome,
     progress: Progress | None,
     real_time: RealTimeRun | None,
+    halts: Iterator[Halt],
 ) -> None:
     """Run all events, write the tables, however the events end, and measure the time of both."""
     begin = shown = perf_counter()
@@ -190,7 +201,7 @@ def _run_events(
         with (
             host_state.restore_interpreter()
         ):  # tables are written with all the depth that there is
-            loop.run(turn)
+            loop.run(turn, halts)
     finally:
         outcome.wall_time = perf_counter() - begin
         results.finish()
