@@ -77,7 +77,7 @@ def run(
     is, and Ctrl-C ends the runs of the main thread.
     """
     drawn = figure_files.formats(format) if figures else ()
-    read = open_scene.load(scene, options)
+    read = open_scene.load(scene, options, resumes=True)
     if arrivals is not None and (real_time or remote):
         raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")
     paced = RealTimeRun() if real_time else None

@@ -194,7 +194,7 @@ def _find_state(
     if not scene.resume:
         return None
     if real_time:
-        open_scene.require_start(scene, "a run in real time")
+        open_scene.require_start(scene)
     state = run_state.read(Path(scene.resume))
     require_fit(state, system, open_scene.write_tables(scene))
     if state.path.parent == folder:
@@ -258,7 +258,7 @@ def simulate(
     lock of the folder. save: when states are saved.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
-    read = open_scene.load(scene, options)
+    read = open_scene.load(scene, options, resumes=True)
     with ExitStack() as stack:
         if not (in_memory or locked):
             stack.enter_context(folder_lock.lock_folder(folder))

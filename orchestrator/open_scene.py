@@ -20,22 +20,26 @@ from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
 
 
-def load(scene: str | FilePath | Scene | Source, options: Options = ()) -> Scene:
+def load(
+    scene: str | FilePath | Scene | Source, options: Options = (), resumes: bool = False
+) -> Scene:
     """Find a scene, change it by `options` and check it.
 
     scene: the name of a shipped one, the path of a TOML file or SSP, a Scene, or a Source. A Scene
     that was read from a file is read again with its own options and the given ones; one that was
     created or changed in Python is checked. Raises SceneFault with every finding, InputFault for a
-    scene that is not found and for an option that cannot be applied.
+    scene that is not found, for an option that cannot be applied, and for a scene that goes on from
+    a state, unless it is for what `resumes`.
     """
     further = overrides.write_options(options)
     if isinstance(scene, Scene) and scene.source and not further:
-        return scene
+        return scene if resumes else require_start(scene)
     source = scene if isinstance(scene, Source) else source_of(scene)
     source = replace(source, options=(*source.options, *further))
     if source.name.endswith(".ssp"):
         _check_ssp(source)
-    return from_source(source)
+    read = from_source(source)
+    return read if resumes else require_start(read)
 
 
 def source_of(scene: str | FilePath | Scene) -> Source:
@@ -67,10 +71,14 @@ def _of(scene: Scene) -> Source:
     return Source(scene.title, tables, {})
 
 
-def require_start(scene: Scene, what: str) -> None:
-    """Raises InputFault for a scene that goes on from a state, where `what` does not."""
+def require_start(scene: Scene) -> Scene:
+    """The scene. Raises InputFault for one that goes on from a state."""
     if scene.resume:
-        raise InputFault(f"resume = {scene.resume!r}: {what} begins at the start: leave it out")
+        raise InputFault(
+            f"resume = {scene.resume!r}: runs and sweeps alone go on from a state, and not in real "
+            "time: leave it out"
+        )
+    return scene
 
 
 def write_tables(scene: Scene) -> dict[str, Any]:

@@ -14,8 +14,6 @@ from hapticlink.programs.foreign import Foreign, read_foreign
 def of_scene(scene: Scene) -> None:
     """Raises InputFault for what only Python does."""
     reasons = []
-    if scene.resume:
-        reasons.append("resume: it begins at its start")
     if scene.at:
         reasons.append("[[at]]: what happens at given times is done by Python")
     reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]

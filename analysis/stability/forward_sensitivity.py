@@ -67,8 +67,8 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     flat,
 )
-from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.run.run_state import state_blocks
+from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 
 STEP = 1e-6

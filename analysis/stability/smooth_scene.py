@@ -42,7 +42,6 @@ def linearisable(
     Within the context signals are deferred, and numbers that overflow raise no warnings."""
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         read = open_scene.load(scene, options)
-        open_scene.require_start(read, "a linearisation")
         with build_system(read) as whole:
             if joints is not None and read.linkage is not None:
                 whole = at_rest(whole, read.linkage, joints)

@@ -263,6 +263,13 @@ def _put(there: Any, saved: Any) -> Any:
     return saved
 
 
+def require_plain_holds(simulation: Simulation) -> None:
+    """Raises InputFault for a plugin's hold with attributes that cannot be saved."""
+    for hold in simulation.holds.values():
+        if hold.own:
+            _capture_hold(hold)
+
+
 # --- go on ------------------------------------------------------------------------------------
 
 

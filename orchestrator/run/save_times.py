@@ -78,6 +78,8 @@ class Saving:
     saved: dict[str, float] = field(default_factory=dict)
 
     def halts(self, simulation: Simulation, loop: CompiledLoop) -> Iterator[Halt]:
+        run_state.require_plain_holds(simulation)
+
         def save(name: str) -> None:
             time = run_state.save(self.folder / name, self.scene, simulation, loop)
             self.saved[name] = time

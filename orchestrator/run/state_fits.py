@@ -14,8 +14,7 @@ from hapticlink.orchestrator.run.run_state import (
     order_of_calls,
     with_other_holds,
 )
-from hapticlink.orchestrator.system.changes import check_change
-from hapticlink.orchestrator.system.springs import find_limited_gains
+from hapticlink.orchestrator.system.changes import check_change, why_at_start_alone
 from hapticlink.orchestrator.system.system import System
 
 SHOWN = 8
@@ -102,19 +101,13 @@ def _why_other_holds(state: RunState, system: System) -> Iterator[str]:
 
 
 def _why_other_starts(state: RunState, system: System) -> Iterator[str]:
-    limited = find_limited_gains(system)
     acted = {name for each in state.content["changes"] for name in each["inputs"]}
     for change in new_starts(state, system):
-        scalar, name = change.inputs[0], change.text
-        fed = any(scalar in c.inputs for c in system.into(change.fmu))
-        if scalar.causality == "parameter" and scalar.variability != "tunable":
-            yield f"{name} is a fixed parameter, which a start alone sets: leave it as it was"
-        elif scalar.causality not in ("input", "parameter") or fed:
-            yield f"{name} is a start value, which acts at the start alone: leave it as it was"
-        elif f"{change.fmu}.{scalar.port}" in limited:
-            yield f"{name} is a gain of a spring whose hold counts its energy: leave it as it was"
-        elif name in acted:
-            yield f"{name} is set by [[at]], too: leave its start value as it was"
+        why = why_at_start_alone(system, change.fmu, change.inputs[0])
+        if not why and change.text in acted:
+            why = "is set by [[at]], too"
+        if why:
+            yield f"{change.text} {why}: leave it as it was"
 
 
 def _differences(before: Any, now: Any, path: Sequence[str] = ()) -> Iterator[str]:
