@@ -48,6 +48,7 @@ def run(
     format: str = "png",
     progress: Callable[[float], None] | None = None,
     real_time: bool = False,
+    speed: float = 1.0,
     arrivals: str | Path | None = None,
     remote: Mapping[str, str] | None = None,
     key: str | Path | None = None,
@@ -62,12 +63,13 @@ def run(
     the first row on. `progress` is called with the simulated time (s) from time to time, `answer`
     with the results as soon as they are there, before figures are drawn.
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
-    (docs/real-time.md). `arrivals` is the folder of a run in real time, whose samples arrive here
-    when they arrived there. `remote` has the addresses HOST:PORT of FMUs, or of all FMUs at a rate,
-    that `hapticlink serve` serves on other computers, and `key` is the file of the key of both
-    (docs/two-computers.md). `save`: when the state of the run is saved to `out`, at times (s), at
-    its "end", or every so many seconds, "every=0.5" (docs/resume.md); a scene goes on from one as
-    its key `resume` says, and a state is a scene itself.
+    (docs/real-time.md), at `speed` times that of the clock, less than 1 for slow motion. `arrivals`
+    is the folder of a run in real time, whose samples arrive here when they arrived there. `remote`
+    has the addresses HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on
+    other computers, and `key` is the file of the key of both (docs/two-computers.md). `save`: when
+    the state of the run is saved to `out`, at times (s), at its "end", or every so many seconds,
+    "every=0.5" (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is
+    a scene itself.
 
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
@@ -80,7 +82,9 @@ def run(
     read = open_scene.load(scene, options, resumes=True)
     if arrivals is not None and (real_time or remote):
         raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")
-    paced = RealTimeRun() if real_time else None
+    if speed != 1.0 and not real_time:
+        raise InputFault("speed: a run is as fast as it can be: add real_time (--real-time)")
+    paced = RealTimeRun(speed=speed) if real_time else None
     if arrivals is not None:
         paced = RecordedArrivals(Path(arrivals), read)
     servers = Servers(remote or {}, Path(key) if key else key_file.DEFAULT)

@@ -41,6 +41,12 @@ RealTime = Annotated[
         help="Pace the haptic loop by the wall clock, with FMUs of other rates beside it.",
     ),
 ]
+Speed = Annotated[
+    float,
+    Parameter(
+        help="Simulated seconds in one of the wall clock, in real time: less than 1 is slow motion."
+    ),
+]
 
 Remote = Annotated[
     list[str] | None,
@@ -79,6 +85,7 @@ def run(
     format: Format = "png",
     explain: Explain = False,
     real_time: RealTime = False,
+    speed: Speed = 1.0,
     remote: Remote = None,
     key: Key = None,
     arrivals: Arrivals = None,
@@ -143,6 +150,7 @@ def run(
                 progress=shown.enter_context(bar),
                 answer=answer,
                 real_time=real_time,
+                speed=speed,
                 arrivals=arrivals,
                 remote=dict(map(_place, remote or ())),
                 key=key,

@@ -341,7 +341,9 @@ def deadlines(report: Mapping[str, Any]) -> str:
     missed = f"{report['deadlines_missed'] or 'none'} of {report['ticks']} deadlines missed"
     largest = (1e3 * report[name]["max"] for name in ("step_time", "lateness"))
     step, late = map(short, largest)
-    return f"{rate} Hz in real time: {missed}; largest step time {step} ms, lateness {late} ms"
+    speed = report["speed"]
+    how = "in real time" if speed == 1.0 else f"at {short(speed)} times real time"
+    return f"{rate} Hz {how}: {missed}; largest step time {step} ms, lateness {late} ms"
 
 
 def _network(fmu: str, exchange: Mapping[str, Any]) -> Iterator[str]:

@@ -298,6 +298,7 @@ typedef struct {
     int64_t (*clock)(void);
     void (*wait)(int64_t until);
     int64_t origin, most;                 /* when tick 0 is due; lateness that moves it */
+    double speed;                         /* simulated time in a unit of that of the clock */
     int64_t skips;                        /* whether ticks that are past are skipped */
     int64_t reached, due, deadline, begun; /* the last tick that was waited for; of the event */
     int64_t ticks, missed, skipped, moved;
