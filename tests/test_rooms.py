@@ -31,13 +31,13 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 
 CODE_LINES = {
     "components": 6143,
-    "fmus": 2986,
-    "orchestrator": 13827,
+    "fmus": 2987,
+    "orchestrator": 14548,
     "programs": 1021,
-    "analysis": 7823,
+    "analysis": 7830,
     "visualization": 3417,
-    "api": 467,
-    "commands": 1459,
+    "api": 477,
+    "commands": 1493,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

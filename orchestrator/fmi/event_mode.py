@@ -18,7 +18,7 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
@@ -70,6 +70,8 @@ class InProcessWithEvents(InProcess3):
         self._clocks = self.description.clocks
         self._readings: dict[frozenset[int] | None, tuple[list[int], Vector, list[Transfer]]] = {}
         self._saved_pending: dict[int, Pending] = {}
+        self.taken_over: Mapping[str, Any] | None = None
+        """What the inputs' setter of an earlier run had set, until one of this run is called."""
 
     @property
     def has_events(self) -> bool:
@@ -324,6 +326,16 @@ class InProcessWithEvents(InProcess3):
         self.pending = deepcopy(self._saved_pending[slot])
         self.restored += 1
 
+    def saved_events(self) -> dict[str, Any]:
+        """What of its events is not in the FMU's own state."""
+        return vars(deepcopy(self.pending)) | {"inputs": self.inputs and self.inputs.saved()}
+
+    def restore_events(self, saved: Mapping[str, Any]) -> None:
+        """As `saved_events` had it, for the state that was deserialised. The setter of inputs that
+        is called first takes on what the one before had set."""
+        own = {name: saved[name] for name in vars(self.pending)}
+        self.pending, self.taken_over = Pending(**own), saved["inputs"]
+
 
 class EventSetter:
     """Sets continuous inputs in step mode, and the others, which are discrete inputs and tunable
@@ -352,6 +364,8 @@ class EventSetter:
         if instance.ended:
             return
         instance.inputs = self
+        if before := instance.taken_over:
+            self._before, instance.taken_over = (instance.restored, before["discrete"]), None
         if self._clocked:
             self._signals = signals.copy()  # as they are now, when a clock is active
         self._continuous(signals)
@@ -366,6 +380,10 @@ class EventSetter:
             self._before = now
             settings = (lambda: discrete(signals)) if changed else (lambda: None)
             instance.place.ended = instance.event(instance.time, active, settings)
+
+    def saved(self) -> dict[str, Any]:
+        """The discrete inputs that it has set."""
+        return {"discrete": self._before[1]}
 
     def set_clocked(self, active: frozenset[int]) -> None:
         """Set the inputs of clocks that are active."""

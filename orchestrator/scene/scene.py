@@ -103,6 +103,9 @@ class Scene:
     """The report's experiment that the scene stands for; the summary lists the differences."""
     duration: Duration
     """Simulated time."""
+    resume: str = ""
+    """State of a run, from which this one goes on, relative to the scene's file: [save, resume,
+    branch](resume.md)."""
     hold: HoldName = "zoh"
     """Hold on connections from a slow rate to a fast one: [holds](holds.md)."""
     downsampling: Annotated[str, HOLDS.names(lambda hold: hold.downsamples)] = "latest"

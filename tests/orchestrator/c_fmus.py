@@ -93,7 +93,9 @@ EVENTS = """
 
 def event_fmu3(folder: Path, varies: bool = True, token: str = "") -> Path:
     """The FMU of event_fmu3.c, which has event mode; `varies`: it takes steps of any size."""
-    flags = {"hasEventMode": "true", "canGetAndSetFMUState": "true"}
+    flags = {
+        "hasEventMode": "true", "canGetAndSetFMUState": "true", "canSerializeFMUState": "true",
+    }  # fmt: skip
     flags["canHandleVariableCommunicationStepSize"] = str(varies).lower()
     description = description3("events", EVENTS, (1, 3, 4, 6, 8), token, **flags)
     return packed(folder / "events.fmu", "event_fmu3.c", description)
