@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6143,
     "fmus": 2822,
-    "orchestrator": 13652,
-    "programs": 1021,
+    "orchestrator": 13999,
+    "programs": 1023,
     "analysis": 7790,
     "visualization": 3417,
     "api": 467,
-    "commands": 1459,
+    "commands": 1460,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
