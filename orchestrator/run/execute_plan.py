@@ -311,6 +311,7 @@ def _details(
         premises=simulation.premises(),
         overdrawn=simulation.overdrawn(),
         isolated=simulation.isolated,
+        solvers={u.name: u.description.solver for u in system.fmus if u.description.solver},
         held_outputs={name: i.held for name, i in instances.items() if i.held},
         in_python=loop.in_python,
         real_time=real_time.report() if real_time else None,
