@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from hapticlink.analysis.findings import summary
 from hapticlink.api.result import Run
@@ -22,7 +23,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders
 from hapticlink.orchestrator.results.read_results import load as read_tables
 from hapticlink.orchestrator.results.read_results import read_into_memory, without_rows
-from hapticlink.orchestrator.run.real_time import RealTimeRun
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
@@ -37,6 +38,20 @@ class RunInterrupted(Interrupted):
         self.run = run
 
 
+def with_board(port: str) -> dict[str, Any]:
+    """The options that put the board at a port in the place of a scene's device: it has encoders,
+    and the observer is beside it."""
+    return {"device.driver.port": port, "device.observer.beside": True, "sensing": "encoders"}
+
+
+def _ending(stop: Callable[[], bool]) -> Callable[..., None]:
+    def turn(*_: object) -> None:
+        if stop():
+            raise Ended("stopped")
+
+    return turn
+
+
 @interrupt.defer_signals()
 def run(
     scene: str | Path | Scene,
@@ -48,6 +63,8 @@ def run(
     progress: Callable[[float], None] | None = None,
     real_time: bool = False,
     arrivals: str | Path | None = None,
+    device: str | None = None,
+    stop: Callable[[], bool] | None = None,
     remote: Mapping[str, str] | None = None,
     key: str | Path | None = None,
     answer: Callable[[Run], object] | None = None,
@@ -61,9 +78,11 @@ def run(
     with the results as soon as they are there, before figures are drawn.
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
     (docs/real-time.md). `arrivals` is the folder of a run in real time, whose samples arrive here
-    when they arrived there. `remote` has the addresses HOST:PORT of FMUs, or of all FMUs at a rate,
-    that `hapticlink serve` serves on other computers, and `key` is the file of the key of both
-    (docs/two-computers.md).
+    when they arrived there. `device` is the port of the board in the place of the simulated
+    device (docs/your-device.md); `stop` is asked about every 20 ms whether the run in real time is
+    to end. `remote` has the addresses HOST:PORT of FMUs, or of all FMUs at a
+    rate, that `hapticlink serve` serves on other computers, and `key` is the file of the key of
+    both (docs/two-computers.md).
 
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
@@ -74,9 +93,11 @@ def run(
     """
     drawn = figure_files.formats(format) if figures else ()
     read = open_scene.load(scene, options)
+    if device is not None:
+        read = open_scene.load(read, with_board(device))
     if arrivals is not None and (real_time or remote):
         raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")
-    paced = RealTimeRun() if real_time else None
+    paced = RealTimeRun(stop and _ending(stop)) if real_time else None
     if arrivals is not None:
         paced = RecordedArrivals(Path(arrivals), read)
     servers = Servers(remote or {}, Path(key) if key else key_file.DEFAULT)

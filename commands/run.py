@@ -20,8 +20,10 @@ from hapticlink.commands.options import (
     title,
 )
 from hapticlink.commands.progress import progress
+from hapticlink.commands.stop_key import stop_key
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.orchestrator.scene.blocks import driver_of
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 SetFile = Annotated[
@@ -42,6 +44,13 @@ RealTime = Annotated[
     ),
 ]
 
+Device = Annotated[
+    str | None,
+    Parameter(
+        help="Port of the board in the place of the simulated device (/dev/ttyACM0, COM3), or "
+        "simulated-board."
+    ),
+]
 Remote = Annotated[
     list[str] | None,
     repeatable(
@@ -66,6 +75,7 @@ def run(
     format: Format = "png",
     explain: Explain = False,
     real_time: RealTime = False,
+    device: Device = None,
     remote: Remote = None,
     key: Key = None,
     arrivals: Arrivals = None,
@@ -83,6 +93,7 @@ def run(
         hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
         hapticlink run closed-loop --format pdf,svg
         hapticlink run my-scene.toml --no-figures --json > result.json
+        hapticlink run closed-loop --real-time --device simulated-board
     """
     import hapticlink as hl
 
@@ -101,6 +112,9 @@ def run(
     try:
         read = hl.scene(scene, changes.options)
         with ExitStack() as shown:
+            stop = shown.enter_context(stop_key()) if real_time and not output.quiet else None
+            if stop and (device or driver_of(read, "")):
+                say("a key ends the run: motors are without torque then", file=sys.stderr)
             bar = progress(read.title, read.duration, hidden=output.quiet)
 
             def answer(result: hl.Run) -> None:
@@ -121,6 +135,8 @@ def run(
                 answer=answer,
                 real_time=real_time,
                 arrivals=arrivals,
+                device=device,
+                stop=stop,
                 remote=dict(map(_place, remote or ())),
                 key=key,
             )

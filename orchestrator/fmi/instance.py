@@ -197,6 +197,14 @@ class Instance(ABC):
         for setting in ready:
             setting(time)
 
+    # --- hardware -------------------------------------------------------------------------
+
+    def begin(self) -> None:  # noqa: B027
+        """Everything else is ready to run."""
+
+    def rest(self) -> None:  # noqa: B027
+        """The run has ended, however: hardware is left without torque before anything else."""
+
     # --- what each kind does in its way, every call of which may raise FmuFault -----------
 
     @abstractmethod

@@ -144,9 +144,11 @@ def run(
                 if memory:
                     memory.take_pointers()
                     kept = KeptRun(plan, simulation, loop, memory, opened)
+            for instance in simulation.instances.values():
+                instance.begin()
             if real_time:
                 stack.enter_context(real_time.pace.undisturbed())
-            _run_events(plan, loop, results, outcome, progress, real_time)
+            _run_events(plan, simulation, loop, results, outcome, progress, real_time)
             if kept and kept.end():
                 ended = replace(kept, opened=opened.pop_all())
     except (Exception, KeyboardInterrupt) as error:
@@ -167,6 +169,7 @@ def run(
 
 def _run_events(
     plan: Plan,
+    simulation: Simulation,
     loop: CompiledLoop,
     results: RunResults,
     outcome: Outcome,
@@ -192,6 +195,8 @@ def _run_events(
         ):  # tables are written with all the depth that there is
             loop.run(turn)
     finally:
+        for instance in simulation.instances.values():
+            instance.rest()
         outcome.wall_time = perf_counter() - begin
         results.finish()
         outcome.table_time = perf_counter() - begin - outcome.wall_time
