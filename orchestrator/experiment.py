@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator import open_scene, simulated_plant
 from hapticlink.orchestrator.base import interrupt, shelf
 from hapticlink.orchestrator.base.errors import (
     Fault,
@@ -283,6 +283,8 @@ def simulate(
             stack.enter_context(folder_lock.lock_folder(folder))
         try:
             every = stack.enter_context(build_system(read))
+            if real_time:
+                every = stack.enter_context(simulated_plant.attach(read, every))
         except Interrupted:
             raise Interrupted(when="before the run") from None
         if in_memory and remote is NOWHERE and not real_time:

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6143,
+    "components": 6166,
     "fmus": 2987,
-    "orchestrator": 14548,
-    "programs": 1021,
+    "orchestrator": 15589,
+    "programs": 1023,
     "analysis": 7830,
     "visualization": 3417,
-    "api": 477,
-    "commands": 1493,
+    "api": 488,
+    "commands": 1520,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -214,6 +214,14 @@ class Instance(ABC):
         self._waiting.clear()
         self.place.waiting = math.inf
 
+    # --- hardware -------------------------------------------------------------------------
+
+    def begin(self) -> None:  # noqa: B027
+        """Everything else is ready to run."""
+
+    def rest(self) -> None:  # noqa: B027
+        """The run has ended, however: hardware is left without torque before anything else."""
+
     # --- what each kind does in its way, every call of which may raise FmuFault -----------
 
     @abstractmethod

@@ -162,6 +162,8 @@ class _Run:
         if memory:
             memory.take_pointers()
             self._kept = KeptRun(plan, simulation, loop, memory, opened)
+        for instance in simulation.instances.values():
+            instance.begin()
         return loop
 
     def run_events(self, progress: Progress | None) -> None:
@@ -170,7 +172,16 @@ class _Run:
         assert loop
         assert self._simulation
         halts = self._saving.halts(self._simulation, loop) if self._saving else NO_HALTS
-        _run_events(self._plan, loop, self._results, self.outcome, progress, self._real_time, halts)
+        _run_events(
+            self._plan,
+            self._simulation,
+            loop,
+            self._results,
+            self.outcome,
+            progress,
+            self._real_time,
+            halts,
+        )
 
     def take_time(self, wall_time: float) -> None:
         """Note the time (s) of the loop where others ran beside it, and end the tables."""
@@ -264,6 +275,7 @@ def run_side_by_side(each: Sequence[tuple[Plan, RunResults]], steps: Steps) -> l
 
 def _run_events(
     plan: Plan,
+    simulation: Simulation,
     loop: CompiledLoop,
     results: RunResults,
     outcome: Outcome,
@@ -290,6 +302,8 @@ def _run_events(
         ):  # tables are written with all the depth that there is
             loop.run(turn, halts)
     finally:
+        for instance in simulation.instances.values():
+            instance.rest()
         outcome.wall_time = perf_counter() - begin
         results.finish()
         outcome.table_time = perf_counter() - begin - outcome.wall_time
