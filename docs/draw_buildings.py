@@ -34,6 +34,7 @@ BUILDINGS = {
         "base",
         "host",
         "fmi",
+        "boards",
         "holds",
         "scene",
         "system",

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator import open_scene, simulated_plant
 from hapticlink.orchestrator.base import interrupt, shelf
 from hapticlink.orchestrator.base.errors import (
     Fault,
@@ -33,16 +33,26 @@ from hapticlink.orchestrator.results.read_results import (
     load,
 )
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
+from hapticlink.orchestrator.results.run_record import (
+    Resumed,
+    RunEnding,
+    RunRecord,
+    RunSetup,
+    content,
+)
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.results.write_files import remove_rows
+from hapticlink.orchestrator.run import run_state
 from hapticlink.orchestrator.run.compiled import lanes, library
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, require_concurrent
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run, run_side_by_side
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
 from hapticlink.orchestrator.run.open_fmus import find_isolated, refuse_hardware
 from hapticlink.orchestrator.run.real_time import RealTimeRun
+from hapticlink.orchestrator.run.run_state import RunState, require_savable
+from hapticlink.orchestrator.run.save_times import NO_TIMES, SaveTimes, Saving
 from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.state_fits import require_fit
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_again, build_system
@@ -210,6 +220,44 @@ def _fits_in_memory(system: System, columns: Mapping[str, Sequence[str]]) -> boo
     return 8 * written <= IN_MEMORY
 
 
+def _find_state(
+    scene: Scene, system: System, folder: Path, real_time: RealTimeRun | None
+) -> RunState | None:
+    """The state from which a scene goes on, if it names one. Raises InputFault where it does not
+    fit, and where the run would replace the results that the state belongs to."""
+    if not scene.resume:
+        return None
+    if real_time:
+        open_scene.require_start(scene)
+    state = run_state.read(Path(scene.resume))
+    require_fit(state, system, open_scene.write_tables(scene))
+    if state.path.parent == folder:
+        raise InputFault(
+            f"{folder} has the state and the results before it, which this run would replace: give "
+            "another folder (--out)"
+        )
+    return state
+
+
+def _find_saving(
+    scene: Scene,
+    system: System,
+    folder: Path,
+    real_time: RealTimeRun | None,
+    save: SaveTimes,
+    state: RunState | None,
+) -> Saving | None:
+    """What saves the states of a run, if that is asked for. Raises InputFault for a time that is
+    not within it, and with the FMUs that cannot save their state."""
+    if not save.files:
+        return None
+    if real_time:
+        raise InputFault("--save: no state of a run in real time is saved: leave one out")
+    require_savable(system)
+    ticks = save.ticks(system.timeline, state.time if state else 0.0)
+    return Saving(ticks, folder, open_scene.write_tables(scene))
+
+
 def _watch(folder: Path) -> AbstractContextManager[None]:
     """Context in which a crash of this process is recorded in a folder."""
     guard: Callable[[int], object] = lambda on: None  # noqa: E731
@@ -230,6 +278,7 @@ def simulate(
     in_memory: bool = False,
     remote: Servers = NOWHERE,
     locked: bool = False,
+    save: SaveTimes = NO_TIMES,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -240,15 +289,17 @@ def simulate(
     writes them, with `keep_rows` beside the CSVs, until `remove_rows`. `in_memory`: nothing is
     written, unless the tables are too long (`IN_MEMORY`) or an FMU of others, which may crash the
     process, runs in it. remote: the FMUs that run on other computers. locked: the caller holds the
-    lock of the folder.
+    lock of the folder. save: when states are saved.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
-    read = open_scene.load(scene, options)
+    read = open_scene.load(scene, options, resumes=True)
     with ExitStack() as stack:
         if not (in_memory or locked):
             stack.enter_context(folder_lock.lock_folder(folder))
         try:
             every = stack.enter_context(build_system(read))
+            if real_time:
+                every = stack.enter_context(simulated_plant.attach(read, every))
         except Interrupted:
             raise Interrupted(when="before the run") from None
         if in_memory and remote is NOWHERE and not real_time:
@@ -256,13 +307,21 @@ def simulate(
         else:
             ready = _prepare(read, every, real_time, remote)
         system, plan, tables, before = ready.system, ready.plan, ready.tables, ready.before
+        state = _find_state(read, system, folder, real_time)
+        saving = _find_saving(read, system, folder, real_time, save, state)
+        before = replace(
+            before,
+            files=[*before.files, *save.files],
+            resumed=Resumed(str(state.path), state.time) if state else None,
+        )
+        ready = replace(ready, before=before)
         build_time = perf_counter() - begin
         alone = find_isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         if in_memory and not foreign and _fits_in_memory(system, tables):
             memory = RunResults()
             with host_state.restore_interpreter():
-                outcome = run(plan, memory, progress, real_time)
+                outcome = run(plan, memory, progress, real_time, state)
             return ready.experiment(read, outcome, folder, build_time, memory)
         if in_memory:
             stack.enter_context(folder_lock.lock_folder(folder))
@@ -273,7 +332,7 @@ def simulate(
                 host_state.restore_directory(*foreign),
                 host_state.restore_interpreter(),
             ):
-                outcome = run(plan, results, progress, real_time)
+                outcome = run(plan, results, progress, real_time, state, saving)
             outcome.details = replace(outcome.details, logged=results.count_logged())
             try:
                 results.end(outcome.ending(build_time), tables)
@@ -309,7 +368,7 @@ def simulate_together(
                 every = build_again(scene) if any(ready) else None
                 every = every or stack.enter_context(build_system(scene))
                 made = _prepare_once(scene, every)
-                if not scene.fmu and _fits_in_memory(made.system, made.tables):
+                if not (scene.fmu or scene.resume) and _fits_in_memory(made.system, made.tables):
                     ready[-1] = made
         build_time = (perf_counter() - begin) / len(scenes)
         ended: list[Experiment | None] = []

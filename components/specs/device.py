@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from hapticlink.components.port_space import PLANE, PortSpace
+from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.quantities import (
     Length,
     LinearDamping,
@@ -97,6 +98,8 @@ class Device:
     """Integration steps per communication step; the size of the FMU's equations grows with them."""
     observer: Observer = field(default_factory=Observer)
     """The observer, used with sensing = "encoders"."""
+    driver: Driver | None = None
+    """The board that takes the device's place in a run in real time, once it has a port."""
 
     @property
     def space(self) -> PortSpace:

@@ -25,12 +25,14 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_results import RunResults
-from hapticlink.orchestrator.run import kept_runs
+from hapticlink.orchestrator.run import kept_runs, run_state
 from hapticlink.orchestrator.run.compiled import lanes
-from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
+from hapticlink.orchestrator.run.compiled.loop import NO_HALTS, CompiledLoop, Halt
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
 from hapticlink.orchestrator.run.kept_runs import KeptRun, StartMemory
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
+from hapticlink.orchestrator.run.run_state import RunState
+from hapticlink.orchestrator.run.save_times import Saving
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
 
@@ -109,9 +111,15 @@ class _Run:
     """A run by its phases; `outcome` says how it ended so far."""
 
     def __init__(
-        self, plan: Plan, results: RunResults, real_time: RealTimeRun | None = None
+        self,
+        plan: Plan,
+        results: RunResults,
+        real_time: RealTimeRun | None = None,
+        state: RunState | None = None,
+        saving: Saving | None = None,
     ) -> None:
         self._plan, self._results, self._real_time = plan, results, real_time
+        self._state, self._saving = state, saving
         self.outcome = Outcome()
         self._simulation: Simulation | None = None
         self.loop: CompiledLoop | None = None
@@ -129,7 +137,9 @@ class _Run:
     def begin(self, stack: ExitStack) -> CompiledLoop:
         """Stand before the first event; `stack` ends what is not kept."""
         plan, results, real_time = self._plan, self._results, self._real_time
-        kept = None if real_time or results.log_path else kept_runs.take(plan.system)
+        state = self._state
+        apart = real_time or results.log_path or state or self._saving
+        kept = None if apart else kept_runs.take(plan.system)
         self._opened = opened = stack.enter_context(kept.opened if kept else ExitStack())
         if kept:
             self._simulation, self.loop = kept.simulation, kept.loop
@@ -141,20 +151,37 @@ class _Run:
         if real_time:
             stack.enter_context(real_time.of(plan, simulation))
         self.loop = loop = CompiledLoop(plan, simulation)
-        keeps = kept_runs.may_be_kept(simulation, results)
+        keeps = not apart and kept_runs.may_be_kept(simulation, results)
         memory = StartMemory(simulation) if keeps else None
+        simulation.rows_before = state.content["rows"] if state else {}
         simulation.start()
         coming = loop.events.coming()
         loop.events.prepare(real_time.kinds(coming) if real_time else coming)
+        if state:
+            run_state.restore(state, simulation, loop)
         if memory:
             memory.take_pointers()
             self._kept = KeptRun(plan, simulation, loop, memory, opened)
+        for instance in simulation.instances.values():
+            instance.begin()
         return loop
 
     def run_events(self, progress: Progress | None) -> None:
         """Run all events."""
-        assert self.loop
-        _run_events(self._plan, self.loop, self._results, self.outcome, progress, self._real_time)
+        loop = self.loop
+        assert loop
+        assert self._simulation
+        halts = self._saving.halts(self._simulation, loop) if self._saving else NO_HALTS
+        _run_events(
+            self._plan,
+            self._simulation,
+            loop,
+            self._results,
+            self.outcome,
+            progress,
+            self._real_time,
+            halts,
+        )
 
     def take_time(self, wall_time: float) -> None:
         """Note the time (s) of the loop where others ran beside it, and end the tables."""
@@ -186,12 +213,15 @@ def run(
     results: RunResults,
     progress: Progress | None = None,
     real_time: RealTimeRun | None = None,
+    state: RunState | None = None,
+    saving: Saving | None = None,
 ) -> Outcome:
     """Execute the plan to its end or to the first fault; rows up to then are in `results`.
 
     progress is called with the simulated time (s) from time to time. real_time: see RealTimeRun.
+    state: from which the run goes on. saving: when states are saved, and what saves them.
     """
-    this = _Run(plan, results, real_time)
+    this = _Run(plan, results, real_time, state, saving)
     # Non-finite values are detected by 0 x NaN, for which numpy would warn.
     with (
         this.noted(),
@@ -245,11 +275,13 @@ def run_side_by_side(each: Sequence[tuple[Plan, RunResults]], steps: Steps) -> l
 
 def _run_events(
     plan: Plan,
+    simulation: Simulation,
     loop: CompiledLoop,
     results: RunResults,
     outcome: Outcome,
     progress: Progress | None,
     real_time: RealTimeRun | None,
+    halts: Iterator[Halt],
 ) -> None:
     """Run all events, write the tables, however the events end, and measure the time of both."""
     begin = shown = perf_counter()
@@ -268,8 +300,10 @@ def _run_events(
         with (
             host_state.restore_interpreter()
         ):  # tables are written with all the depth that there is
-            loop.run(turn)
+            loop.run(turn, halts)
     finally:
+        for instance in simulation.instances.values():
+            instance.rest()
         outcome.wall_time = perf_counter() - begin
         results.finish()
         outcome.table_time = perf_counter() - begin - outcome.wall_time
@@ -291,6 +325,7 @@ def _details(
         premises=simulation.premises(),
         overdrawn=simulation.overdrawn(),
         isolated=simulation.isolated,
+        solvers={u.name: u.description.solver for u in system.fmus if u.description.solver},
         held_outputs={name: i.held for name, i in instances.items() if i.held},
         in_python=loop.in_python,
         real_time=real_time.report() if real_time else None,

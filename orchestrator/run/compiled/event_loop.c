@@ -109,6 +109,7 @@ int next_event(Loop *l, Events *e) {
         }
         const int64_t tick = next_tick(e);
         if (tick == INT64_MAX) return DONE;
+        if (e->halt && tick >= e->halt) return HALT;
         if (e->pace) {
             const int code = pace_wait(l, e, tick);
             const int late = code ? code : late_event(l, e);

@@ -298,6 +298,7 @@ typedef struct {
     int64_t (*clock)(void);
     void (*wait)(int64_t until);
     int64_t origin, most;                 /* when tick 0 is due; lateness that moves it */
+    double speed;                         /* simulated time in a unit of that of the clock */
     int64_t skips;                        /* whether ticks that are past are skipped */
     int64_t reached, due, deadline, begun; /* the last tick that was waited for; of the event */
     int64_t ticks, missed, skipped, moved;
@@ -331,6 +332,7 @@ typedef struct {
 typedef struct {
     Clock *clocks /* [n_clocks] */;
     int64_t n_clocks, end;
+    int64_t halt;                         /* the loop returns before the first event at this tick or later; 0: never */
     int64_t *keys /* [n_kinds * (1 + n_clocks)] */; /* of the kinds */
     int64_t *key /* [1 + n_clocks] */;    /* of the current event */
     Block *kinds /* [n_kinds] */;
@@ -374,6 +376,7 @@ enum {
     GROW,        /* a hold, a meter or a check has no room left */
     SETTLE,      /* settings wait for a step of the FMU */
     REFUSED,     /* a hold in Python has raised an exception */
+    HALT,        /* the next event is not before tick `halt` */
 };
 
 static inline double tick_time(const Loop *l, int64_t tick) { /* s */

@@ -69,8 +69,8 @@ class Machine:
 
     def change_hold(self, name: str, hold: CompiledHold, stamp: int) -> None:
         """Replace the hold of a connection; it begins with the newest sample, of tick `stamp`."""
+        index, loop = self._hold(name), ctypes.addressof(self.loop)
         self._simulation.holds[name] = hold
-        index, loop = self._index("hold", name, lambda index: hold), ctypes.addressof(self.loop)
         while code := self.library.change_hold(loop, index, hold.address, stamp):
             hold.serve(code)
 
