@@ -13,7 +13,13 @@ from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
 from hapticlink.orchestrator.base.plain_data import plain
-from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
+from hapticlink.orchestrator.scene import (
+    checks,
+    families,
+    hold_tables,
+    overrides,
+    registry_tables,
+)
 from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
 from hapticlink.orchestrator.scene.rates import find_traces, read_frame_times
 from hapticlink.orchestrator.scene.recorded_tables import (
@@ -84,7 +90,8 @@ def from_source(source: Source) -> Scene:
             if isinstance(fmu.get(key), dict):
                 fmu[key] = dict(flat(fmu[key]))
     parts, errors, unread = registry_tables.read_registry_tables(data)
-    wrong += unread
+    of_holds, unread_holds = hold_tables.read_hold_tables(data)
+    errors, wrong = errors + of_holds, wrong + unread + unread_holds
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
         scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))

@@ -152,6 +152,8 @@ NAMED = ("holds", "delays", "kinds")
 """Tables whose keys are names of connections, which contain dots."""
 
 LATENCY = {f.name for f in fields(Latency)}
+LEAVES: dict[str, Set[str]] = {"delays": LATENCY, "holds": {"type"}}
+"""Of these tables, the keys by which a table of theirs is a value."""
 
 
 def flat(
@@ -171,7 +173,7 @@ def flatten(data: dict[str, Any]) -> None:
     """Replaces nested tables of `NAMED` in a scene's `data` by entries with dotted names."""
     for table in NAMED:
         if isinstance(data.get(table), dict):
-            data[table] = dict(flat(data[table], LATENCY if table == "delays" else frozenset()))
+            data[table] = dict(flat(data[table], LEAVES.get(table, frozenset())))
 
 
 def flatten_path(names: tuple[Any, ...]) -> tuple[Any, ...]:
