@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import Description
@@ -43,6 +44,8 @@ class Fmu:
     recorded_only: frozenset[str] = frozenset()
     served: ServedAt | None = None
     """Where it runs, if that is on another computer."""
+    stand_in: Callable[..., Any] | None = None
+    """What makes the `Instance` that runs in its place, by the arguments of one."""
 
     @property
     def sampled(self) -> bool:
