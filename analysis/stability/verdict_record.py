@@ -16,6 +16,7 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.analysis.stability.remedy_trial import Remedy
+from hapticlink.analysis.stability.stand_in import StandIn, record_stand_ins
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene.overrides import as_command_line
@@ -42,6 +43,8 @@ class Stability:
     """Lines of text on what is removed or stays as at rest."""
     rounded: str = ""
     """At which rate it was judged instead of its own, and why."""
+    stand_ins: tuple[StandIn, ...] = ()
+    """What stands for FMUs whose state cannot be read."""
     run_fault: str = ""
     """How the scene's run, from which the poses are taken, failed; "" if it reached its end."""
 
@@ -95,6 +98,7 @@ class Stability:
             "cases": [case.record() for case in self.cases],
             "frozen": list(self.frozen),
             "rounded": self.rounded,
+            **record_stand_ins(self.stand_ins),
             "run_fault": self.run_fault or None,
         }
 
@@ -199,6 +203,7 @@ class Stability:
             yield self.rounded
         for pose, why in self.without.items():
             yield f"pose at {pose} left out: {why}"
+        yield from map(str, self.stand_ins)
         apart = frozen_nonlinearities.name_by_end(self.frozen)
         if apart:
             yield f"judged for small motions; {apart}"
