@@ -14,7 +14,9 @@ from hapticlink.analysis.findings.report_premises import describe_experiment
 from hapticlink.analysis.findings.summary import describe_work
 from hapticlink.analysis.stability.frozen_nonlinearities import describe_switches
 from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
+from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.tune.tuning_result import Tuned
@@ -31,8 +33,8 @@ def verdict(*cases: tuple[str, str, float, str, str]) -> Stability:
         for pose, hand, growth, said, kind in cases
     )
     return Stability(
-        "", Mock(), (), dict.fromkeys(HANDS), of, {}, max(of, key=lambda c: (c.rank, c.growth)),
-        Margin(2.0, None, None), (), (),
+        "", Bounds(), (), dict.fromkeys([case.hand for case in of]), of, {},
+        max(of, key=lambda c: (c.rank, c.growth)), Margin(2.0, None, None), (), (),
     )  # fmt: skip
 
 
@@ -46,10 +48,23 @@ def test_a_verdict_of_drift_names_the_hands_that_drift() -> None:
         "drifts slowly in 1 of 3 hands, and marginal in 1, 1 pose: drift of 0.4 Hz "
         "grows at 0.08 1/s in light touch at 0 s"
     )
+    assert found.record()["worst"]["hand"] == "light touch"
     shakes = verdict(drifts, marginal, ("0 s", "stiff arm", 0.5, "unstable", "oscillation"))
     assert shakes.finding.startswith("unstable: oscillation of 0.4 Hz grows at 0.5 1/s")
     calm = verdict(("0 s", "light touch", -0.1, "stable", "drift"), marginal)
     assert calm.finding.startswith("stable in 1 of 2 hands and marginal in the others, 1 pose")
+
+
+def test_a_free_handle_in_which_nothing_grows_may_come_to_rest() -> None:
+    """Under a constant wrench, where its linkage is stretched."""
+
+    def said(growth: float, word: str) -> str:
+        held = ("0 s", "light touch", -1.0, "stable", "oscillation")
+        return verdict(held, ("0 s", FREE, growth, word, "drift")).finding
+
+    assert said(-0.5, "stable").startswith("not held: in free air small motions do not grow; ")
+    assert "small motions neither grow nor decay; " in said(0.0, "marginal")
+    assert "in free air it drifts at 0.1 1/s" in said(0.1, "unstable")
 
 
 def test_a_verdict_says_for_what_it_is_and_what_it_left_out() -> None:
