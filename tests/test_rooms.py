@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 13668,
     "programs": 1021,
     "analysis": 7826,
-    "visualization": 3430,
+    "visualization": 3433,
     "api": 467,
     "commands": 1459,
 }
