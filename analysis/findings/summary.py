@@ -425,7 +425,7 @@ def _percent(how: str, share: float) -> str:
     """A share, which says nothing any more beyond LARGEST_PERCENT."""
     percent = 100 * share
     far = percent > LARGEST_PERCENT
-    return f"more than {LARGEST_PERCENT} %" if far else f"{how} {percent:.2g} %"
+    return f"more than {LARGEST_PERCENT} %" if far else f"{how} {float(f'{percent:.2g}'):g} %"
 
 
 def describe_replacements(replacements: Mapping[str, Replacement]) -> Iterator[str]:

@@ -126,11 +126,12 @@ class Stability:
             slow = [case for case in self.cases if case.drifts and not case.free]
             some = f"{len({case.hand for case in slow})} of {hands}" if len(held) > 1 else hands
             near = f", and marginal in {len(edge)}" if edge else ""
-            return f"drifts slowly in {some}{near}, {in_poses}: {_name_case(worst_case(slow))}"
+            return f"drifts slowly in {some}{near}, {in_poses}: {_name_case(worst)}"
         if self.verdict == "not held":
             loose = worst_case(c for c in self.cases if c.free)
             if loose.verdict != "unstable":
-                return f"not held: in free air it does not grow, nor come to rest; {calm}"
+                slight = "neither grow nor decay" if loose.verdict == "marginal" else "do not grow"
+                return f"not held: in free air small motions {slight}; {calm}"
             does = "drifts" if loose.drifts else f"shows a growing {loose.kind}"
             ends = "small motions decay with no damping that was tried"
             if self.damping is not None and math.isfinite(self.damping):

@@ -34,8 +34,14 @@ from hapticlink.orchestrator.scene.refused_keys_and_values import (
 )
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
-from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals, written_path
-from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem, flat, flatten
+from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals
+from hapticlink.orchestrator.scene.toml_keys import (
+    Problem,
+    collect_problem,
+    flat,
+    flatten,
+    written_path,
+)
 
 
 def read_scene(
@@ -101,4 +107,6 @@ def from_source(source: Source) -> Scene:
         refuse([*wrong, *find_further_problems(wrong, data)[: COUNTED - len(wrong)]])
     refuse(checks.check_scene(scene))
     scene = registry_tables.put_registry_tables(scene, parts)
-    return WrittenScene(**vars(scene), read_from=source, origin=origin, written=scene)
+    return WrittenScene(
+        **vars(scene), read_from=source, origin=origin, written=scene, signals=moved
+    )
