@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2822,
     "orchestrator": 13652,
     "programs": 1021,
-    "analysis": 7790,
+    "analysis": 7824,
     "visualization": 3417,
     "api": 467,
     "commands": 1459,
