@@ -34,10 +34,10 @@ CODE_LINES = {
     "fmus": 2822,
     "orchestrator": 14337,
     "programs": 1021,
-    "analysis": 7790,
-    "visualization": 3417,
-    "api": 478,
-    "commands": 1485,
+    "analysis": 8035,
+    "visualization": 3462,
+    "api": 581,
+    "commands": 1529,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
