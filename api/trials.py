@@ -95,9 +95,9 @@ def trial(
 ) -> Trials:
     """Let somebody feel each combination of `vary` against the scene itself, and `ask` which was
     the varied one. `feel` lets a scene be felt, by default by a run in real time on the board
-    `device` that is written to a folder. Each is felt `repeats` times in an order drawn with `seed`,
-    or `staircase` decides which comes next (docs/trials.md). All is in `out`, with a figure of this
-    `format`: answers.csv grows with each answer, so that an interrupted trial loses none.
+    `device` that is written to a folder. Each is felt `repeats` times in an order drawn with
+    `seed`, or `staircase` decides which comes next (docs/trials.md). All is in `out`, with a figure
+    of this `format`: answers.csv grows with each answer, so that an interrupted trial loses none.
 
     Raises InputFault for settings that do not fit the scene, and without a board.
     """

@@ -248,3 +248,23 @@ def test_a_killed_process_leaves_a_message(killed: bool) -> None:
     os.close(writing)
     assert os.read(reading, 10) == (b"zero" if killed else b"")
     os.close(reading)
+
+
+def test_a_pause_leaves_no_torque(port):
+    """A paused run sends none, and goes on from there."""
+    paused: list[int] = []
+
+    def turn(live: hl.RealTime) -> None:
+        port_messages = port.firmware.messages
+        if not paused and port_messages > 10:
+            away(port)
+            live.pause()
+            paused.append(port_messages)
+        elif live.paused:
+            assert not any(port.torques[-1])
+            live.resume()
+
+    live = hl.RealTime("closed-loop", SCENE | {"device.driver.silence": 0.05})
+    run = live.run(turn, tables=False)
+    assert paused
+    assert run.fault is None, run.fault
