@@ -10,6 +10,7 @@ from pathlib import Path
 
 from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.boards.replayed_board import BoardRecording
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.start_values import Starts
@@ -46,6 +47,8 @@ class Fmu:
     """Where it runs, if that is on another computer."""
     driver: Driver | None = None
     """The board in its place."""
+    replayed: BoardRecording | None = field(default=None, compare=False)
+    """What is read in the board's place."""
 
     @property
     def sampled(self) -> bool:
