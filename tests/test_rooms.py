@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6166,
     "fmus": 2822,
-    "orchestrator": 14337,
+    "orchestrator": 14401,
     "programs": 1021,
-    "analysis": 8035,
-    "visualization": 3462,
+    "analysis": 8044,
+    "visualization": 3470,
     "api": 581,
-    "commands": 1529,
+    "commands": 1532,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

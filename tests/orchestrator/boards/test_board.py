@@ -305,3 +305,17 @@ def test_a_log_without_what_the_board_measured(port, tmp_path):
     simulate("closed-loop", tmp_path / "before", options, real_time=WallClock().run())
     with pytest.raises(hl.InputFault, match=r"haptic_device.q was not recorded"):
         hl.run("closed-loop", options, arrivals=tmp_path / "before")
+
+
+def test_what_is_said_of_a_board(port, tmp_path):
+    """Its handle is the measured one; no energy is told of a hand whose work is not known."""
+    moving(port)
+    run = hl.run("closed-loop", SCENE, out=tmp_path / "run", figures=False, real_time=True)
+    said = str(run)
+    assert "the handle is told where the observer sees it" in said
+    assert "not passive" not in said
+    point, seen = run["virtual_mechanism.x"], run["observer.x"]
+    apart = 1e3 * np.hypot(*(point - seen)[:, :2].T)
+    assert np.array_equal(run.tracking().distance_mm, apart)
+    simulated = hl.run("closed-loop", {"duration": 0.05, "device.observer.beside": True})
+    assert "where the observer sees it" not in str(simulated)
