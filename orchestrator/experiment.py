@@ -299,6 +299,7 @@ def simulate(
         try:
             every = stack.enter_context(build_system(read))
             if real_time:
+                every = real_time.with_recordings(every)
                 every = stack.enter_context(simulated_plant.attach(read, every))
         except Interrupted:
             raise Interrupted(when="before the run") from None

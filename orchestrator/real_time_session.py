@@ -246,6 +246,9 @@ class LiveRun:
             return
         self._until = None
         self._called(self)
+        if self.paused:
+            for instance in simulation.instances.values():
+                instance.rest()
         while self.paused and self._until is None:
             pace.wait(pace.now() + self._every)
             interrupt.raise_if_interrupted(self.time)

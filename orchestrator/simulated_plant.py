@@ -134,7 +134,8 @@ def attach(
     """The system, whose device that asks for a simulated board gets the terminal of one that is a
     process within the context. log, watchdog: of the process. Raises InputFault where there can be
     none."""
-    asking = [u for u in system.fmus if u.driver and u.driver.port == SIMULATED_BOARD]
+    boards = [u for u in system.fmus if u.driver and not u.replayed]
+    asking = [u for u in boards if u.driver and u.driver.port == SIMULATED_BOARD]
     if not asking:
         yield system
         return

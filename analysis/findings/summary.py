@@ -15,7 +15,7 @@ from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.noticed import describe_noticed
 from hapticlink.analysis.findings.report_premises import describe_experiment
-from hapticlink.analysis.findings.tracking import UserSignals, of_block, of_port
+from hapticlink.analysis.findings.tracking import UserSignals, find_handle, of_block, of_port
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
@@ -225,6 +225,11 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from record.without_effect
     yield from describe_replacements(record.replaced)
     yield from _lacking(results)
+    if find_handle(results) != HANDLE_POSE:
+        yield (
+            "the handle is told where the observer sees it, a tick late: where a board's is, and "
+            "the work of the hand on it, nobody knows"
+        )
     yield from describe_unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
         yield (

@@ -248,7 +248,8 @@ class Board(Instance):
             (SENT_AT, self._sent_at - self._began),
             (READ_AT, now - self._began),
         ):
-            self.outputs[self._places[name]] = value
+            if places := self._places[name]:  # it is recorded, or read
+                self.outputs[places] = value
 
     def _stopped(self, what: str) -> FmuFault:
         """The fault, with zero torque."""
