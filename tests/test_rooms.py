@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6143,
+    "components": 6921,
     "fmus": 2822,
-    "orchestrator": 13652,
+    "orchestrator": 13825,
     "programs": 1021,
-    "analysis": 7790,
-    "visualization": 3417,
+    "analysis": 7911,
+    "visualization": 3434,
     "api": 467,
     "commands": 1459,
 }

@@ -94,7 +94,7 @@ def test_signals_that_are_not_recorded_are_named_and_nothing_stands_in_for_them(
 
 
 def test_the_picture_of_a_frame_marks_what_the_episodes_of_its_run_have(tmp_path: Path) -> None:
-    options = {"graphics.rate": 10, "controller.topology": False, "device.torque_limit": 0.02}
+    options = {"graphics.rate": 10, "controller.topology": False, "device.motor.torque_limit": 0.02}
     hl.run("closed-loop-ideal", options, out=tmp_path, figures=False)
     run = Recorded(str(tmp_path))
     marked = [(t, f["states"]) for t, f in zip(run.times, run.frames(), strict=True)]
