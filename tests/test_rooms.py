@@ -30,7 +30,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6921,
+    "components": 6956,
     "fmus": 2822,
     "orchestrator": 13825,
     "programs": 1021,

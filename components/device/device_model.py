@@ -195,33 +195,30 @@ class DeviceModel(ABC):
         return of_encoders if set(weights) == {1.0} else ca.diag(ca.DM(weights)) @ of_encoders
 
     def range_margins(self, z: ca.SX, p: Parameters) -> ca.SX:
-        """Of each joint with a range the distances to its two ends: of one that turns, the way of
-        the handle about it at the start."""
+        """Of each joint with a range the ways (m) of the handle to its two ends, to first order."""
         found = [ca.SX(0, 1)]
-        for joint, way in self._ranged:
+        for joint in self._ranged:
             low, high = joint.range or (0.0, 0.0)
-            q = self.joint_coordinates(z, p, [joint])
+            q, way = self.joint_coordinates(z, p, [joint]), self._way(z, p, joint)
             found += [way * (high - q), way * (q - low)]
         return ca.vertcat(*found)
 
     def range_rates(self, z: ca.SX, p: Parameters) -> ca.SX:
-        """The Jacobian of `range_margins` by y."""
+        """The Jacobian of `range_margins` by y, with the way of a unit held."""
         found = [ca.SX(0, self.directions.size)]
-        for joint, way in self._ranged:
-            row = way * self.joint_rates(z, p, [joint])
+        for joint in self._ranged:
+            row = self._way(z, p, joint) * self.joint_rates(z, p, [joint])
             found += [-row, row]
         return ca.vertcat(*found)
 
-    @cached_property
-    def _ranged(self) -> list[tuple[DeviceJoint, float]]:
-        """The joints with a range, and the way (m) of the handle for a unit of each."""
-        model, found = self._model, []
-        for joint in (j for j in self.device.placed if j.range):
-            at = model.frames[joint.parent].point(model.p.get(f"{joint.name}.at_parent"))
-            far = ca.norm_2(model.x_h[:2] - at) if joint.type == "revolute" else ca.SX(1)
-            reach = ca.Function("reach", [model.q, model.p.vector], [far])
-            found.append((joint, float(reach(self.start, self._values))))
-        return found
+    def _way(self, z: ca.SX, p: Parameters, joint: DeviceJoint) -> ca.SX:
+        """The least way (m) of the handle for a unit of a joint's coordinate."""
+        lengths = min(self.directions.size, 2)
+        return 1 / ca.norm_2(self.joint_rates(z, p, [joint])[:, :lengths])
+
+    @property
+    def _ranged(self) -> list[DeviceJoint]:
+        return [joint for joint in self.device.placed if joint.range]
 
     # The start
 

@@ -12,6 +12,10 @@ it. The derivative of the closure, projected on u_2 and u_1, with n across u, gi
 
     alpha_1' = u_2 . (c' - a') / (l_1 u_2 . n_1),   alpha_2' = -u_1 . (c' - a') / (l_2 u_2 . n_1)
 
+and once more, the accelerations at ydd = 0 by l_1 u_1 alpha_1'^2 + l_2 u_2 alpha_2'^2 + c'' - a''
+in place of c' - a'. Unit vectors follow from the cosines without the angles, which encoders alone
+need.
+
 Where no triangle exists, r is taken at the limit: beyond reach the angles stay, so that all is
 finite there, and the stops lead back."""
 
@@ -31,9 +35,11 @@ from hapticlink.components.linkage.poses import poses
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device, DeviceJoint
 
-NEAREST = 1e-3
-"""Of the full reach of two links: how near to its limits, where rates grow without bound, their
-triangle is solved."""
+PAST_STOPS = 0.5
+"""Of the way from the stops of two links to the limit of their reach, where rates grow without
+bound: how near to it their triangle is solved."""
+IN_LINE = 1e-3
+"""Distance of an elbow from the line of its anchors, by that of these, up to which it is on it."""
 
 
 def across(r: ca.SX) -> ca.SX:
@@ -41,23 +47,30 @@ def across(r: ca.SX) -> ca.SX:
 
 
 class Point(NamedTuple):
-    """A point of the world (m, 2) and its Jacobian by y, (2, k)."""
+    """A point of the world (m, 2), its Jacobian by y, (2, k), and its acceleration at vdot = 0
+    (m/s2, 2)."""
 
     at: ca.SX
     J: ca.SX
+    bias: ca.SX
 
 
 @dataclass(frozen=True)
 class PlacedBody:
-    """A body: its frame, with the Jacobians by y of a point of it, and of its angle, (1, k)."""
+    """A body: its frame, with a point of it, the Jacobian of its angle, (1, k), its rate (rad/s)
+    and its acceleration at vdot = 0 (rad/s2)."""
 
     frame: Frame
     pin: Point
     turn: ca.SX
+    rate: ca.SX
+    bias: ca.SX
 
     def point(self, local: ca.SX | None) -> Point:
         at = self.frame.point(local)
-        return Point(at, self.pin.J + across(at - self.pin.at) @ self.turn)
+        r = at - self.pin.at
+        bias = self.pin.bias + across(r) * self.bias - r * self.rate**2
+        return Point(at, self.pin.J + across(r) @ self.turn, bias)
 
 
 class Solved(NamedTuple):
@@ -115,15 +128,13 @@ class PoseCoordinates(DeviceModel):
         return ca.vertcat(*(bodies[j.child].turn - bodies[j.parent].turn for j in joints))
 
     def motion(self, z: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-        symbols = ca.SX.sym("y", z.numel())
-        J, m = self._all_jacobians(symbols, p)
-        bias = ca.jtimes(J @ v, symbols, v)
-        M, c = ca.substitute([J.T @ ca.diag(m) @ J, J.T @ (m * bias)], [symbols], [z])
-        return M, c
+        J, bias, m = self._all_jacobians(z, p, v)
+        weighted = J.T @ ca.diag(m)
+        return ca.triu2symm(ca.triu(weighted @ J)), weighted @ bias
 
     def dynamics(self, z: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
         symbols = ca.SX.sym("y", z.numel())
-        J, m = self._all_jacobians(symbols, p)
+        J, _, m = self._all_jacobians(symbols, p)
         J_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(J)), symbols, v), J.shape)
         weighted = J.T @ ca.diag(m)
         M, C = ca.substitute([weighted @ J, weighted @ J_dot], [symbols], [z])
@@ -146,17 +157,20 @@ class PoseCoordinates(DeviceModel):
         spans = [dyad.J for dyad in self._placed(z, p)[1]]
         return ca.vertcat(*(-J for J in spans), *spans, self.range_rates(z, p))
 
-    def _placed(self, y: ca.SX, p: Parameters) -> tuple[dict[str, PlacedBody], list[Solved]]:
-        """All bodies and dyads at a place."""
-        k, handle = y.numel(), self.device.handle
-        still = PlacedBody(
-            Frame.turned(ca.SX(2, 1), ca.SX(0)), Point(ca.SX(2, 1), ca.SX(2, k)), ca.SX(1, k)
-        )
-        bodies, solved = {"ground": still}, list[Solved]()
-        point = Point(y[:2], ca.SX.eye(k)[:2, :])
+    def _placed(
+        self, y: ca.SX, p: Parameters, v: ca.SX | None = None
+    ) -> tuple[dict[str, PlacedBody], list[Solved]]:
+        """All bodies and dyads at a place, with their motion at v, 0 by default."""
+        k, handle, none = y.numel(), self.device.handle, ca.SX(2, 1)
+        v = ca.SX(k, 1) if v is None else v
+        still = Point(none, ca.SX(2, k), none), ca.SX(1, k), ca.SX(0), ca.SX(0)
+        bodies = {"ground": PlacedBody(Frame.turned(none, ca.SX(0)), *still)}
+        solved = list[Solved]()
+        point = Point(y[:2], ca.SX.eye(k)[:2, :], none)
         if handle.angle == "held":
-            turn = ca.SX.eye(k)[2:, :]
-            bodies[handle.body] = self._on_pin(point, p.get("operational_point.at"), y[2], turn)
+            local, frame = p.get("operational_point.at"), Frame.turned(none, y[2])
+            motion = ca.SX.eye(k)[2:, :], v[2], ca.SX(0)
+            bodies[handle.body] = self._on_pin(point, local, y[2], frame.rotation, *motion)
         for dyad, turns in zip(self._dyads, self._turns, strict=True):
             a, c = (
                 point
@@ -164,68 +178,90 @@ class PoseCoordinates(DeviceModel):
                 else bodies[anchor.known.body].point(p.get(anchor.known.parameter))
                 for anchor in (dyad.first, dyad.second)
             )
-            both, found = self._solve(dyad, turns, a, c, p)
+            both, found = self._solve(dyad, turns, a, c, p, v)
             bodies |= both
             solved.append(found)
         return bodies, solved
 
     def _solve(
-        self, dyad: Dyad, turns: _Turns, a: Point, c: Point, p: Parameters
+        self, dyad: Dyad, turns: _Turns, a: Point, c: Point, p: Parameters, v: ca.SX
     ) -> tuple[dict[str, PlacedBody], Solved]:
-        sides = (
+        own = (
             self._side(dyad.first, dyad.first_elbow, p),
             self._side(dyad.second, dyad.second_elbow, p),
         )
-        (l1, own1), (l2, own2) = sides
+        (l1, _), (l2, _) = own
         d, span = c.at - a.at, c.J - a.J
         r = ca.norm_2(d)
+        spare = PAST_STOPS * (1 - self.device.stop.reach) * (l1 + l2)
+        near = ca.fmax(ca.fmin(r, l1 + l2 - spare), ca.fabs(l1 - l2) + spare)
+        cos1, cos2 = (
+            (one**2 + near**2 - other**2) / (2 * one * near) for one, other in ((l1, l2), (l2, l1))
+        )
+        sin1 = turns.side * ca.sqrt(1 - cos1**2)
+        along, beside = d / r, across(d / r)
+        u1 = cos1 * along + sin1 * beside
+        u2 = cos2 * along - (l1 / l2) * sin1 * beside
+        s = ca.dot(u2, across(u1))
+        J1, J2 = u2.T @ span / (l1 * s), -(u1.T @ span) / (l2 * s)
+        # Beyond the limit the angles stay, and have no terms of the velocity.
+        w1, w2 = (ca.if_else(near == r, J @ v, 0) for J in (J1, J2))
+        pull = c.bias - a.bias + l1 * u1 * w1**2 + l2 * u2 * w2**2
+        pull = ca.if_else(near == r, pull, 0)
+        b1, b2 = ca.dot(u2, pull) / (l1 * s), -ca.dot(u1, pull) / (l2 * s)
+        # The angles are those of the sides as motors and encoders count them; the second side runs
+        # from its anchor to the elbow, against u_2.
         cos, sin = np.cos(turns.heading), np.sin(turns.heading)
         phi = turns.heading + ca.atan2(cos * d[1] - sin * d[0], cos * d[0] + sin * d[1])
-        spare = NEAREST * (l1 + l2)
-        near = ca.fmax(ca.fmin(r, l1 + l2 - spare), ca.fabs(l1 - l2) + spare)
-        alpha1 = phi + turns.side * ca.acos((l1**2 + near**2 - l2**2) / (2 * l1 * near))
-        alpha2 = phi - turns.side * ca.acos((l2**2 + near**2 - l1**2) / (2 * l2 * near))
-        u1, u2 = (ca.vertcat(ca.cos(angle), ca.sin(angle)) for angle in (alpha1, alpha2))
-        s = ca.dot(u2, across(u1))
-        rates = u2.T @ span / (l1 * s), -(u1.T @ span) / (l2 * s)
-        # The second side runs from its anchor to the elbow, against u_2.
-        angles = alpha1 - own1 + turns.whole[0], alpha2 + ca.pi - own2 + turns.whole[1]
-        places = (a, dyad.first), (c, dyad.second)
-        both = {
-            body: self._on_pin(pin, p.get(anchor.on.parameter), angle, rate)
-            for body, (pin, anchor), angle, rate in zip(
-                dyad.bodies, places, angles, rates, strict=True
-            )
-        }
-        return both, Solved(r, d.T @ span / r, (l1, l2))
+        headings = (
+            phi + turns.side * ca.acos(cos1) + turns.whole[0],
+            phi - turns.side * ca.acos(cos2) + ca.pi + turns.whole[1],
+        )
+        both = {}
+        for body, pin, anchor, u, (length, side), heading, motion in zip(
+            dyad.bodies, (a, c), (dyad.first, dyad.second), (u1, -u2), own, headings,
+            ((J1, w1, b1), (J2, w2, b2)), strict=True,
+        ):  # fmt: skip
+            rotation = ca.horzcat(u, across(u)) @ ca.horzcat(side, across(side)).T / length
+            angle = heading - ca.atan2(side[1], side[0])
+            local = p.get(anchor.on.parameter)
+            both[body] = self._on_pin(pin, local, angle, rotation, *motion)
+        return both, Solved(r, along.T @ span, (l1, l2))
 
     @staticmethod
-    def _on_pin(pin: Point, local: ca.SX | None, angle: ca.SX, turn: ca.SX) -> PlacedBody:
+    def _on_pin(
+        pin: Point, local: ca.SX | None, angle: ca.SX, rotation: ca.SX, *motion: ca.SX
+    ) -> PlacedBody:
         """The body at an angle whose point `local` is at a pin."""
-        frame = Frame.turned(pin.at, angle)
-        if local is not None:
-            frame = Frame(pin.at - frame.rotation @ local, angle, frame.rotation)
-        return PlacedBody(frame, pin, turn)
+        origin = pin.at if local is None else pin.at - rotation @ local
+        return PlacedBody(Frame(origin, angle, rotation), pin, *motion)
 
     def _side(self, anchor: Anchor, elbow: PinPlace, p: Parameters) -> tuple[ca.SX, ca.SX]:
-        """Length (m) and heading (rad) in the body's frame of its side from anchor to elbow."""
+        """Length (m) of the side from anchor to elbow, and itself in the body's frame."""
         ends = [p.get(place.parameter, ca.SX.zeros(2)) for place in (anchor.on, elbow)]
         side = ca.SX(ends[1]) - ca.SX(ends[0])
-        return ca.norm_2(side), ca.atan2(side[1], side[0])
+        return ca.norm_2(side), side
 
-    def _all_jacobians(self, y: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-        """(J, m): the Jacobians by y of every centre of mass, angle and rotor, stacked, and the
-        mass or moment of inertia that belongs to each row."""
-        bodies, _ = self._placed(y, p)
-        rows, inertias = [], []
+    def _all_jacobians(
+        self, y: ca.SX, p: Parameters, v: ca.SX | None = None
+    ) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """(J, Jdot v, m): of every centre of mass, angle and rotor, stacked, the Jacobian by y, the
+        acceleration at vdot = 0, and the mass or moment of inertia that belongs to each row."""
+        bodies, _ = self._placed(y, p, v)
+        rows, biases, inertias = [], [], []
         for body in self.device.body:
             placed, mass = bodies[body.name], p[f"{body.name}.mass"]
-            rows += [placed.point(p.get(f"{body.name}.center")).J, placed.turn]
+            center = placed.point(p.get(f"{body.name}.center"))
+            rows += [center.J, placed.turn]
+            biases += [center.bias, placed.bias]
             inertias += [mass, mass, p[f"{body.name}.inertia"]]
         if "rotor_inertia" in p:
+            driven = [motor.joint for motor in self.motors]
             rows.append(self.jacobian(y, p))
+            spins = [bodies[j.child].bias - bodies[j.parent].bias for j in driven]
+            biases.append(self._by_ratio(p, ca.vertcat(*spins)))
             inertias.append(p["rotor_inertia"])
-        return ca.vertcat(*rows), ca.vertcat(*inertias)
+        return ca.vertcat(*rows), ca.vertcat(*biases), ca.vertcat(*inertias)
 
     def _at_start(self, dyad: Dyad) -> _Turns:
         """The dyad's turns where the device is assembled."""
@@ -233,7 +269,7 @@ class PoseCoordinates(DeviceModel):
         a, elbow, c = (self._point0(place) for place in pins)
         span, side = c - a, elbow - a
         cross = float(span[0] * side[1] - span[1] * side[0])
-        if abs(cross) < NEAREST * float(span @ span):
+        if abs(cross) < IN_LINE * float(span @ span):
             raise ValueError(
                 f"at `start` the pins of bodies `{dyad.bodies[0]}` and `{dyad.bodies[1]}` are in "
                 "line, which leaves the side of their elbow open: give other angles"

@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from hapticlink.components.device.models import device_model
 from hapticlink.components.specs.device import Device
@@ -132,7 +133,7 @@ class Workspace:
 @cache
 def workspace(device: Device) -> Workspace:
     """The workspace on a grid: a coarse one over all that the lengths of the device's links could
-    reach, then a fine one over what of it is inside."""
+    reach, then a fine one over what of it is inside, and hangs together with the start."""
     model = device_model(device)
     center, reach = _reach(device)
     whole = 2 * math.pi if model.directions.has_moments else 0.0
@@ -158,7 +159,15 @@ def _around(side: Field, inside: Any) -> Field:
 
 def _on_grid(device: Device, x: Field, y: Field, theta: Field) -> Workspace:
     poses = np.stack(np.meshgrid(x, y, theta, indexing="ij"), axis=-1)
-    return Workspace(x, y, theta, margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3]))
+    margins = margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3])
+    start = device_model(device).start_pose
+    parts, _ = label(margins >= 0)
+    nearest = [
+        int(np.abs(axis - at).argmin()) for axis, at in zip((x, y, theta), start, strict=True)
+    ]
+    if own := parts[tuple(nearest)]:
+        margins = np.where((margins < 0) | (parts == own), margins, -np.inf)
+    return Workspace(x, y, theta, margins)
 
 
 def _reach(device: Device) -> tuple[Field, float]:

@@ -274,6 +274,11 @@ class Device:
         )
 
     @property
+    def torque_limit(self) -> float:
+        """The largest torque (N.m) that each of its motors can give."""
+        return min(motor.torque_limit for motor in self.motors)
+
+    @property
     def space(self) -> PortSpace:
         """That of the port at the handle."""
         return PLANE

@@ -70,7 +70,7 @@ def test_joint_coordinates_and_dyads_are_two_ways_to_one_device(name, keys):
     k = pose_model.directions.size
     random = np.random.default_rng(7)
     for _ in range(5):
-        pose = pose_model.start_pose + random.uniform(-0.03, 0.03, 3) * [1, 1, 5]
+        pose = pose_model.start_pose + random.uniform(-0.02, 0.02, 3) * [1, 1, 5]
         v = random.uniform(-0.4, 0.4, k)
         one, other = dyads(pose, v), joints(pose, v)
         for i in (0, 2, 3, 4, 5):

@@ -177,7 +177,7 @@ def test_a_run_of_two_users_has_the_handles_and_arms_of_both(tmp_path: Path) -> 
     left = frame["others"]["left"]
     assert left["handle"] == r["haptic_device_left.x_true"][-1].tolist()
     assert left["F_env"] == r["virtual_mechanism.left.F_env"][-1].tolist()
-    assert len(left["arms"]) == len(frame["arms"]) == 12
+    assert len(left["arms"]) == len(frame["arms"]) == 19
     assert left["arms"] != frame["arms"]
     assert len(left["directions"]) == left["n"][0] == 1
 
