@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6166,
+    "components": 6981,
     "fmus": 2987,
-    "orchestrator": 15626,
+    "orchestrator": 15979,
     "programs": 1023,
-    "analysis": 7834,
-    "visualization": 3417,
-    "api": 488,
-    "commands": 1520,
+    "analysis": 8535,
+    "visualization": 3503,
+    "api": 591,
+    "commands": 1567,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
