@@ -32,9 +32,9 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6981,
     "fmus": 2987,
-    "orchestrator": 15979,
+    "orchestrator": 15988,
     "programs": 1023,
-    "analysis": 8535,
+    "analysis": 8537,
     "visualization": 3503,
     "api": 591,
     "commands": 1567,
