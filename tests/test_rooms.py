@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6166,
     "fmus": 2822,
-    "orchestrator": 14401,
+    "orchestrator": 14410,
     "programs": 1021,
     "analysis": 8044,
     "visualization": 3470,
     "api": 581,
-    "commands": 1532,
+    "commands": 1533,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
