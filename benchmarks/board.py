@@ -108,7 +108,8 @@ def _signalled(
             keys = "".join(f"{key} = {toml(value, key)}\n" for key, value in OPTIONS.items())
             path.write_text(f'extends = "{SCENE}"\n{keys}duration = 10.0\n')
             program = (ALONE if alone else "") + RUN
-            command = [sys.executable, "-c", program, path, scene.device.driver.port, folder]
+            port = scene.device.driver.port
+            command = [sys.executable, "-c", program, str(path), port, str(folder)]
             with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
                 assert process.stdout
                 process.stdout.readline()
