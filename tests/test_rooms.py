@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6166,
-    "fmus": 2822,
-    "orchestrator": 14410,
-    "programs": 1021,
-    "analysis": 8044,
-    "visualization": 3470,
-    "api": 581,
-    "commands": 1533,
+    "components": 6168,
+    "fmus": 2987,
+    "orchestrator": 15814,
+    "programs": 1023,
+    "analysis": 8414,
+    "visualization": 3486,
+    "api": 591,
+    "commands": 1568,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -115,7 +115,10 @@ def find_users(results: Results) -> list[UserSignals]:
 
 def table_of(results: Results, signal: str) -> Table | None:
     """The table that contains `signal`, whose rate depends on the scene; None if there is none."""
-    return next((t for t in results.tables.values() if signal in t), None)
+    for table in results.tables.values():
+        if signal in table:
+            return table
+    return None
 
 
 def of_block(results: Results, signal: str, *shape: int) -> Table | None:

@@ -13,7 +13,13 @@ from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
 from hapticlink.orchestrator.base.plain_data import plain
-from hapticlink.orchestrator.scene import checks, families, overrides, registry_tables
+from hapticlink.orchestrator.scene import (
+    checks,
+    families,
+    hold_tables,
+    overrides,
+    registry_tables,
+)
 from hapticlink.orchestrator.scene.extends import document, tables_of, with_family
 from hapticlink.orchestrator.scene.rates import find_traces, read_frame_times
 from hapticlink.orchestrator.scene.recorded_tables import (
@@ -28,8 +34,14 @@ from hapticlink.orchestrator.scene.refused_keys_and_values import (
 )
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
-from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals, written_path
-from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem, flat, flatten
+from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals
+from hapticlink.orchestrator.scene.toml_keys import (
+    Problem,
+    collect_problem,
+    flat,
+    flatten,
+    written_path,
+)
 
 
 def read_scene(
@@ -84,7 +96,8 @@ def from_source(source: Source) -> Scene:
             if isinstance(fmu.get(key), dict):
                 fmu[key] = dict(flat(fmu[key]))
     parts, errors, unread = registry_tables.read_registry_tables(data)
-    wrong += unread
+    of_holds, unread_holds = hold_tables.read_hold_tables(data)
+    errors, wrong = errors + of_holds, wrong + unread + unread_holds
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
         scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
@@ -94,4 +107,6 @@ def from_source(source: Source) -> Scene:
         refuse([*wrong, *find_further_problems(wrong, data)[: COUNTED - len(wrong)]])
     refuse(checks.check_scene(scene))
     scene = registry_tables.put_registry_tables(scene, parts)
-    return WrittenScene(**vars(scene), read_from=source, origin=origin, written=scene)
+    return WrittenScene(
+        **vars(scene), read_from=source, origin=origin, written=scene, signals=moved
+    )

@@ -45,7 +45,7 @@ from hapticlink.orchestrator.scene.scene_tables import (
     TimedEvent,
     Wire,
 )
-from hapticlink.orchestrator.scene.toml_keys import Path
+from hapticlink.orchestrator.scene.toml_keys import Path, written_path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +104,9 @@ class Scene:
     """The report's experiment that the scene stands for; the summary lists the differences."""
     duration: Duration
     """Simulated time."""
+    resume: str = ""
+    """State of a run, from which this one goes on, relative to the scene's file: [save, resume,
+    branch](resume.md)."""
     hold: HoldName = "zoh"
     """Hold on connections from a slow rate to a fast one: [holds](holds.md)."""
     downsampling: Annotated[str, HOLDS.names(lambda hold: hold.downsamples)] = "latest"
@@ -270,9 +273,12 @@ class WrittenScene(Scene):
     """The same with its options applied."""
     written: Scene = field(compare=False, repr=False)
     """The scene as it was read, before any change in Python."""
+    signals: Mapping[int, int] = field(compare=False, repr=False, default_factory=dict)
+    """By the index of an FMU that is made for a connection from a signal, that of the
+    connection."""
 
     def place(self, path: Path, message: str) -> Finding:
-        return self.origin.finding(path, message)
+        return self.origin.finding(written_path(path, self.signals), message)
 
     @property
     def source(self) -> Source | None:

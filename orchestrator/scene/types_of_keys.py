@@ -13,9 +13,11 @@ from hapticlink.components.registry import Names
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.paths import AnySine
 from hapticlink.components.specs.quantities import Quantity
+from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene import registry_tables
 from hapticlink.orchestrator.scene.extends import SceneFile
 from hapticlink.orchestrator.scene.families import FamilyLinkage
+from hapticlink.orchestrator.scene.hold_tables import HoldTable
 from hapticlink.orchestrator.scene.rates import Trace, VariableRate
 from hapticlink.orchestrator.scene.recorded_tables import RecordedTable
 from hapticlink.orchestrator.scene.scene import Scene
@@ -78,6 +80,8 @@ def find_quantities(
         inner, *beside = typing.get_args(kind)
         if names := next((b for b in beside if isinstance(b, Names)), None):
             inner = typing.Literal[tuple(names)]
+            if names.registry is HOLDS:
+                yield HoldTable, None
         yield from find_quantities(
             inner, next((b for b in beside if isinstance(b, Quantity)), quantity)
         )
