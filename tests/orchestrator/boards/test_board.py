@@ -90,7 +90,7 @@ def fault_at(port: Port, kind: str, tick: int, monkeypatch: pytest.MonkeyPatch) 
     """Have a fault come at a tick; returns what is said of it."""
     if kind == "silence":
         port.silent_from = tick
-        return "has sent no answer within 20 ms: torques are zero"
+        return "has sent no answer within 50 ms: torques are zero"
     if kind == "lost bytes":
         port.garbled_at = tick
         return "bytes were lost|of 17 bytes"
