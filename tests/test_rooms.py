@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6981,
     "fmus": 2987,
-    "orchestrator": 15997,
+    "orchestrator": 15996,
     "programs": 1023,
     "analysis": 8537,
     "visualization": 3503,
