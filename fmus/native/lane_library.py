@@ -7,6 +7,7 @@ import ctypes
 import hashlib
 import logging
 import re
+import sys
 import tempfile
 import zipfile
 from functools import lru_cache
@@ -35,8 +36,11 @@ _CHOICE = re.compile(r"\((a\d+)\?(a\d+):0\)")
 
 def step_of_lanes(fmu: Path, compiles: bool) -> Any:
     """The function `step_lanes` for a native FMU, or None: where it is neither there nor to be
-    compiled, where nothing is cached, without a compiler, and for an FMU whose functions vectors do
-    not take (they are in pieces, or look up tables), or with the interface of FMI 3."""
+    compiled, where nothing is cached, without a compiler, for an FMU whose functions vectors do not
+    take (they are in pieces, or look up tables), or with the interface of FMI 3, and on Windows,
+    where it was not tried."""
+    if sys.platform == "win32":
+        return None
     return _find(fmu, fmu.stat().st_mtime_ns, cache.folder(), compiles)
 
 
