@@ -31,10 +31,10 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 
 CODE_LINES = {
     "components": 6981,
-    "fmus": 2987,
-    "orchestrator": 15996,
+    "fmus": 2989,
+    "orchestrator": 16007,
     "programs": 1023,
-    "analysis": 8537,
+    "analysis": 8539,
     "visualization": 3503,
     "api": 591,
     "commands": 1568,
