@@ -187,7 +187,7 @@ class LiveRun:
         most = float(1 - haptics.longest / period)
         if not 0 <= jitter <= most:
             raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
-        require_result(self.system, clock, timeline.seconds(period) * (1 - jitter))
+        require_result(self.system, clock, float(period * timeline.base) * (1 - jitter))
         self._loop.events.change_rate(clock, period, jitter, seed)
         drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
         self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
