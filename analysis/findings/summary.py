@@ -275,6 +275,7 @@ def _steps(record: RunRecord) -> Iterator[str]:
             yield f"{fmu} has logged messages, {' and '.join(told)}: they are in fmus.log"
     if record.real_time:
         yield from _real_time(record.real_time)
+    yield from model_premises.describe_computing_times(record)
     for fmu, exchange in record.network.items():
         yield from _network(fmu, exchange)
     if (counts := record.iterations) and counts.unconverged:
