@@ -12,7 +12,7 @@ Log = Annotated[Path, Parameter(help="CSV or HDF5 file, or the folder of a run."
 OfScene = Annotated[str, Parameter(help="Scene whose device and hand are assumed.")]
 Fitted = Annotated[
     str | None,
-    Parameter(help="Keys of [device] to fit, name,name,...; by default handle and friction."),
+    Parameter(help="Keys of [device] to fit, key,key,...; by default of handle and friction."),
 ]
 
 
@@ -33,14 +33,13 @@ def fit(
 
     For example:
 
-        hapticlink fit shaken.csv --device handle_mass,motor_friction
+        hapticlink fit shaken.csv --device body.crank.mass,motor.friction
     """
-    from hapticlink.analysis.fit.device_fit import FITTED
     from hapticlink.analysis.fit.fit import fit as fitted
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
 
-    names = tuple(device.split(",")) if device else FITTED
+    names = tuple(device.split(",")) if device else ()
     with waiting(f"{log.name}: fitting, which takes seconds for each second of it", output.quiet):
         result = fitted(log, scene, tuple(set or ()), device=names)
     folder = folders.ensure(output.out or default_folder("fits", log.stem))

@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6168,
+    "components": 6981,
     "fmus": 2987,
-    "orchestrator": 15814,
+    "orchestrator": 15988,
     "programs": 1023,
-    "analysis": 8414,
-    "visualization": 3486,
+    "analysis": 8535,
+    "visualization": 3503,
     "api": 591,
     "commands": 1568,
 }

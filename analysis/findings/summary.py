@@ -14,8 +14,15 @@ from hapticlink.analysis.findings.changes_of_point import describe_changes
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.noticed import describe_noticed
+from hapticlink.analysis.findings.rendered import describe_devices
 from hapticlink.analysis.findings.report_premises import describe_experiment
-from hapticlink.analysis.findings.tracking import UserSignals, find_handle, of_block, of_port
+from hapticlink.analysis.findings.tracking import (
+    UserSignals,
+    compared_directions,
+    find_handle,
+    of_block,
+    of_port,
+)
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
@@ -122,8 +129,10 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
     loops. measures: those of the results, if they are there."""
     measures = measures or Measures(results)
     yield from describe_experiment(results.record.scene)
+    yield from describe_devices(results.record.scene)
     for user, error in measures.tracking.items():
-        yield _tracking(user, error)
+        turned = compared_directions(results, UserSignals.of(user))
+        yield _tracking(user, error, turns=turned is None or bool(turned[2, 2]))
         if user and _left(results, UserSignals.of(user).margin):
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
     if measures.forces:
@@ -150,15 +159,14 @@ def _left(results: Results, margin: str) -> bool:
     return table is not None and bool((table[margin] < 0).any())
 
 
-def _tracking(user: str, error: TrackingError) -> str:
+def _tracking(user: str, error: TrackingError, *, turns: bool) -> str:
+    """turns: whether the handle has an angle that is compared."""
+    turned = f"; turned from it by at most {short(error.max_rad)} rad" if turns else ""
     if user:
-        return (
-            f"handle of {user} at most {short(error.max_mm)} mm from its point; "
-            f"turned from it by at most {short(error.max_rad)} rad"
-        )
+        return f"handle of {user} at most {short(error.max_mm)} mm from its point{turned}"
     return (
         f"handle at most {short(error.max_mm)} mm from the operational point, "
-        f"{short(error.rms_mm)} mm RMS; turned from it by at most {short(error.max_rad)} rad"
+        f"{short(error.rms_mm)} mm RMS{turned}"
     )
 
 

@@ -68,7 +68,7 @@ def _find_removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str
     for scalar in fmu.description.scalars:
         if scalar.causality != "parameter":
             continue
-        if (block, scalar.name) == (DEVICE, "encoder_resolution"):
+        if block == DEVICE and scalar.name.partition("[")[0] == "encoder_resolution":
             yield scalar, 0.0, "quantisation of the encoders"
         elif (block, scalar.name) == ("virtual_wall", "quantum"):
             yield scalar, 0.0, "quantisation of the encoder"

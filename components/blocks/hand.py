@@ -22,8 +22,13 @@ import casadi as ca
 from hapticlink.components import integrators, time_signals
 from hapticlink.components.component import Block, Component, Timing, Variable
 from hapticlink.components.dynamics import grasp
+from hapticlink.components.dynamics.rendered_directions import (
+    RenderedDirections,
+    rendered_directions,
+)
 from hapticlink.components.paths import signal
 from hapticlink.components.port_space import PLANE
+from hapticlink.components.specs.device import Handle
 from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
 from hapticlink.components.time_signals import TimeSignal
 
@@ -50,7 +55,9 @@ def _hand(
     )
 
 
-def _wrench(spec: ConstantHand | ProfileHand, clutch: bool) -> Component:
+def _wrench(
+    spec: ConstantHand | ProfileHand, clutch: bool, rendered: RenderedDirections
+) -> Component:
     """F = F(t) - B v, with a damper to ground if the spec has one; 0 while a hand with a clutch
     holds no point."""
     parameters = []
@@ -68,10 +75,11 @@ def _wrench(spec: ConstantHand | ProfileHand, clutch: bool) -> Component:
         F, kind = signals[0].value(block.t), "a wrench over time"
     if spec.damping is not None:
         F = F - block.p["damping"] * block.u["v"]
-    return _hand(block, kind, "sampled", grasp.while_held(block.u, F), signals)
+    F = grasp.while_held(block.u, rendered.mask(F))
+    return _hand(block, kind, "sampled", F, signals)
 
 
-def _arm(spec: ArmHand) -> Component:
+def _arm(spec: ArmHand, rendered: RenderedDirections) -> Component:
     """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, with the grip's
     F = K_gr (x_a - x) + B_gr (x_a' - v)."""
     block = Block(
@@ -94,7 +102,7 @@ def _arm(spec: ArmHand) -> Component:
     over = ca.SX.sym("over", time_signals.size_over(signals))
     target, target_rate = ca.vertsplit(time_signals.within(signals, over, t), SPACE.size)
     F = p["grip_stiffness"] * SPACE.difference(x["x_arm"], u["x"])
-    F += p["grip_damping"] * (x["v_arm"] - u["v"])
+    F = rendered.mask(F + p["grip_damping"] * (x["v_arm"] - u["v"]))
     pull = p["stiffness"] * SPACE.difference(target, x["x_arm"])
     pull += p["damping"] * (target_rate - x["v_arm"])
     ode = block.ode({"x_arm": x["v_arm"], "v_arm": (pull - F) / p["mass"]}, over)
@@ -105,7 +113,7 @@ def _arm(spec: ArmHand) -> Component:
     return _hand(block, kind, spec.timing, F, signals, initial=initial, step=step)
 
 
-def _spring(spec: SpringHand) -> Component:
+def _spring(spec: SpringHand, rendered: RenderedDirections) -> Component:
     """F = K (x_t - x) + B (x_t' - v)."""
     damped = spec.damping is not None
     parameters = [Variable("stiffness", *SPACE.stiffness, spec.stiffness, "to target path")]
@@ -123,12 +131,16 @@ def _spring(spec: SpringHand) -> Component:
     F = block.p["stiffness"] * SPACE.difference(target, block.u["x"])
     if damped:
         F += block.p["damping"] * (rate - block.u["v"])
-    return _hand(block, "a spring to a target path", spec.timing, F, signals)
+    return _hand(block, "a spring to a target path", spec.timing, rendered.mask(F), signals)
 
 
-def hand(spec: Hand, *, clutch: bool = False) -> Component:
+def hand(spec: Hand, *, clutch: bool = False, handle: Handle | None = None) -> Component:
     """The hand that `spec` describes. clutch: it lets go of the points of a mechanism (grasp.py),
-    and then its wrench is 0; an arm and a spring keep the handle."""
+    and then its wrench is 0; an arm and a spring keep the handle. handle: of a device on which it
+    acts in some directions alone: F is without what the device's bearings take."""
+    rendered = rendered_directions(handle)
     if isinstance(spec, ArmHand):
-        return _arm(spec)
-    return _spring(spec) if isinstance(spec, SpringHand) else _wrench(spec, clutch)
+        return _arm(spec, rendered)
+    if isinstance(spec, SpringHand):
+        return _spring(spec, rendered)
+    return _wrench(spec, clutch, rendered)

@@ -35,8 +35,9 @@ def parameters_of(name: Any) -> Any:
 
 @cache
 def _record(kind: Any) -> Any:
-    arguments = () if isinstance(kind, HoldRow) else inspect.signature(kind.__init__).parameters
-    named = [a for a in argument_fields([arguments[n] for n in arguments][2:])]
+    shipped = isinstance(kind, HoldRow)
+    arguments = [] if shipped else [*inspect.signature(kind.__init__).parameters.values()]
+    named = argument_fields(arguments[2:])
     record = make_dataclass("HoldParameters", [("type", str), *named], kw_only=True)
     record.__module__ = getattr(kind, "__module__", __name__)
     return record
