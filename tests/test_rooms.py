@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6981,
     "fmus": 2987,
-    "orchestrator": 15988,
+    "orchestrator": 15991,
     "programs": 1023,
-    "analysis": 8535,
+    "analysis": 8795,
     "visualization": 3503,
     "api": 591,
-    "commands": 1568,
+    "commands": 1599,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.fit.log import read_log
 from hapticlink.api.runs import with_board
 from hapticlink.orchestrator.boards import DRIVERS
 from hapticlink.orchestrator.boards.safe_torques import SafeTorques
@@ -319,3 +320,14 @@ def test_what_is_said_of_a_board(port, tmp_path):
     assert np.array_equal(run.tracking().distance_mm, apart)
     simulated = hl.run("closed-loop", {"duration": 0.05, "device.observer.beside": True})
     assert "where the observer sees it" not in str(simulated)
+
+
+def test_a_log_with_skipped_ticks_can_be_fitted(port, tmp_path):
+    """The longest stretch without one is read."""
+    moving(port)
+    clock = WallClock(late={41 * MS: 5 * MS})
+    simulate("closed-loop", tmp_path, SCENE | {"duration": 0.7}, real_time=clock.run())
+    log = read_log(tmp_path)
+    assert log.period == pytest.approx(1 / 512)
+    assert 300 < len(log.pose) < 358
+    assert log.hand is None
