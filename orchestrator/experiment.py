@@ -334,7 +334,12 @@ def simulate(
                 host_state.restore_interpreter(),
             ):
                 outcome = run(plan, results, progress, real_time, state, saving)
-            outcome.details = replace(outcome.details, logged=results.count_logged())
+            unsaved = [name for name in save.files if saving and name not in saving.saved]
+            before = replace(before, files=[f for f in before.files if f not in unsaved])
+            results.leave_out(unsaved)
+            outcome.details = replace(
+                outcome.details, logged=results.count_logged(), unsaved=unsaved
+            )
             try:
                 results.end(outcome.ending(build_time), tables)
             except OSError as error:

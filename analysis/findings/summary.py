@@ -230,6 +230,8 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
             f"Lambda_inv, P_c and contacts{remedy}"
         )
+    if record.unsaved:
+        yield f"warning: {', '.join(record.unsaved)} not saved: the run ended before"
     yield from record.without_effect
     yield from describe_replacements(record.replaced)
     yield from _lacking(results)

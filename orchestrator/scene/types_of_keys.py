@@ -86,13 +86,14 @@ def find_quantities(
     origin = typing.get_origin(kind)
     if origin is typing.Annotated:
         inner, *beside = typing.get_args(kind)
-        if names := next((b for b in beside if isinstance(b, Names)), None):
+        names = next((b for b in beside if isinstance(b, Names)), None)
+        if names:
             inner = typing.Literal[tuple(names)]
-            if names.registry is HOLDS:
-                yield HoldTable, None
         yield from find_quantities(
             inner, next((b for b in beside if isinstance(b, Quantity)), quantity)
         )
+        if names and names.registry is HOLDS:
+            yield HoldTable, None
     elif origin in (typing.Union, UnionType):
         for member in typing.get_args(kind):
             yield from find_quantities(member, quantity)

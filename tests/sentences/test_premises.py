@@ -231,7 +231,7 @@ def test_what_differs_from_the_report_is_named_and_nothing_else() -> None:
 
 @pytest.mark.parametrize(("limit", "there"), [(0.02, True), (5.0, False)])
 def test_a_hand_feels_less_only_where_motors_reach_their_limit(limit: float, there: bool) -> None:
-    options = {"device.torque_limit": limit, "duration": 0.5, "stop_when": ""}
+    options = {"device.motor.torque_limit": limit, "duration": 0.5, "stop_when": ""}
     run = hl.run("closed-loop-ideal", options, figures=False)
     assert ("the hand felt less than the controller asked for" in str(run)) == there
 

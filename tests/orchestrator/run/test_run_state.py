@@ -92,10 +92,22 @@ def test_to_save_changes_no_byte(tmp_path):
         hl.run("single-body", SMALL, out=tmp_path / name, figures=False, save=save)
     for table in ("haptics.csv", "graphics.csv"):
         assert len({(tmp_path / name / table).read_bytes() for name in ("saved", "plain")}) == 1
+    assert not hl.load(tmp_path / "saved").run["unsaved"]
     states = {path.name for path in (tmp_path / "saved").glob("*.state")}
     assert states == {"at-0.3.state", "last.state", "end.state"}
     hl.run("single-body", SMALL, out=tmp_path / "saved", figures=False)  # replaces them as well
     assert not [*(tmp_path / "saved").glob("*.state")]
+
+
+def test_a_run_that_ends_before_says_what_it_did_not_save(tmp_path):
+    options = SMALL | {"stop_when": "hand.F[2] > 0.05"}  # the profile's, after 0.25 s
+    found = hl.run("single-body", options, out=tmp_path, figures=False, save=[0.1, "end"])
+    assert found.run["end"]["reason"] == "stop_when"
+    assert found.run["end"]["time"] > 0.1
+    assert found.run["unsaved"] == ["end.state"]
+    assert "warning: end.state not saved: the run ended before" in found.run["warnings"]
+    assert {*found.run["files"]} >= {path.name for path in tmp_path.glob("*.state")}
+    assert "end.state" not in found.run["files"]
 
 
 @pytest.fixture(scope="module")
