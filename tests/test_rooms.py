@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6981,
     "fmus": 2989,
-    "orchestrator": 16020,
+    "orchestrator": 16023,
     "programs": 1023,
-    "analysis": 8560,
+    "analysis": 8820,
     "visualization": 3505,
     "api": 591,
-    "commands": 1568,
+    "commands": 1599,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

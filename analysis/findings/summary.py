@@ -237,8 +237,8 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from _lacking(results)
     if find_handle(results) != HANDLE_POSE:
         yield (
-            "the handle is told where the observer sees it, a tick late: where a board's is, and "
-            "the work of the hand on it, nobody knows"
+            "the handle is told where the observer sees it: where a board's is, and the work of "
+            "the hand on it, nobody knows"
         )
     yield from describe_unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
