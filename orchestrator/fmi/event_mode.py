@@ -352,8 +352,8 @@ class EventSetter:
         self._clocks = [(s.reference, p) for s, p in rows if s.type == "Clock"]
         self._clocked = [(s, p) for s, p in rows if s.clocks and s.type != "Clock"]
         others = [(s, p) for s, p in rows if not s.clocks and s.type != "Clock"]
-        self._continuous = self._of([row for row in others if _is_continuous(row[0])])
-        self._discrete = self._of([row for row in others if not _is_continuous(row[0])])
+        self._continuous = self._of([row for row in others if is_continuous(row[0])])
+        self._discrete = self._of([row for row in others if not is_continuous(row[0])])
         self._signals: Vector = np.zeros(0)
         self._setters: dict[frozenset[int], Setter] = {}
 
@@ -396,7 +396,7 @@ def _one(reference: int) -> Any:
     return (ctypes.c_uint * 1)(reference)
 
 
-def _is_continuous(scalar: Scalar) -> bool:
+def is_continuous(scalar: Scalar) -> bool:
     """Whether it may be set in step mode: an input that varies continuously, as those of floating
     point do by default (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)."""
     default = "continuous" if scalar.type in CONTINUOUS else "discrete"
