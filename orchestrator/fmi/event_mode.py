@@ -40,6 +40,8 @@ from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 MOST = 1000
 """Event iterations at one instant, and doSteps that do not advance time, before the FMU counts as
 one that never settles."""
+MOST_PARTS = 10_000
+"""Parts of a step, each up to an event, before the FMU counts as one that chatters."""
 CHANGED = 2
 """The value of fmi3IntervalQualifier for a new interval."""
 
@@ -145,11 +147,14 @@ class WithEvents(InProcess):
     def _in_parts(self, do_step: Callable[[float, float], int], time: float, size: float) -> int:
         """The status of a step from `time` over `size` (s), in parts that end at events."""
         end, near, now = time + size, SHARE * size, time
-        status, stuck = 0, 0
+        status, stuck, parts = 0, 0, 0
         if (due := self._due(time, near)) and self.event(time, due):
             self._end(time)
             return status
         while now < end - near:
+            if (parts := parts + 1) > MOST_PARTS:
+                what = f"it has {MOST_PARTS} events within one step: it switches on and off"
+                raise self._fault(f"{what} all the time, which a hysteresis in it ends", now)
             until = self._until(now + near, end, near)
             status = do_step(now, size if (now, until) == (time, end) else until - now)
             if not succeeded(status):
