@@ -65,7 +65,8 @@ def info(
     for fmu in system.fmus:
         timing = fmu.description.timing
         every, some = (len(of.description.outputs) for of in (fmu, fetched[fmu.name]))
-        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {every} outputs, {some} fetched")
+        solved = f", {fmu.description.solver}" * bool(fmu.description.solver)
+        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {every} outputs, {some} fetched{solved}")
     say("\nconnections (age of the newest sample when it is used, ms)")
     ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(system)).items()}
     for connection in system.connections:

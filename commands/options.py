@@ -136,8 +136,10 @@ LONGEST = 100
 
 def title(scene: str) -> str:
     """What messages and folders call a scene, by its name or path."""
-    known = scene.endswith((".toml", ".ssp"))
-    return Path(scene).stem if known else Path(scene).name
+    path = Path(scene)
+    if path.suffix == ".state":
+        return f"{path.absolute().parent.name}-from-{path.stem}"
+    return path.stem if path.suffix in (".toml", ".ssp") else path.name
 
 
 def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:

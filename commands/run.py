@@ -20,8 +20,10 @@ from hapticlink.commands.options import (
     title,
 )
 from hapticlink.commands.progress import progress
+from hapticlink.commands.stop_key import stop_key
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.orchestrator.scene.blocks import driver_of
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 SetFile = Annotated[
@@ -41,7 +43,20 @@ RealTime = Annotated[
         help="Pace the haptic loop by the wall clock, with FMUs of other rates beside it.",
     ),
 ]
+Speed = Annotated[
+    float,
+    Parameter(
+        help="Simulated seconds in one of the wall clock, in real time: less than 1 is slow motion."
+    ),
+]
 
+Device = Annotated[
+    str | None,
+    Parameter(
+        help="Port of the board in the place of the simulated device (/dev/ttyACM0, COM3), or "
+        "simulated-board."
+    ),
+]
 Remote = Annotated[
     list[str] | None,
     repeatable(
@@ -56,8 +71,21 @@ Arrivals = Annotated[
 ]
 
 
+State = Annotated[
+    Path | None,
+    Parameter(
+        name="--from",
+        help="State of a run, from which this one goes on; without SCENE in the scene of that run.",
+    ),
+]
+Save = Annotated[
+    list[str] | None,
+    repeatable("Save the state at a time (s), at the `end`, or every so often, as every=0.5"),
+]
+
+
 def run(
-    scene: Scene,
+    scene: Scene | None = None,
     /,
     *,
     changes: SceneOptions = UNCHANGED,
@@ -66,9 +94,13 @@ def run(
     format: Format = "png",
     explain: Explain = False,
     real_time: RealTime = False,
+    speed: Speed = 1.0,
+    device: Device = None,
     remote: Remote = None,
     key: Key = None,
     arrivals: Arrivals = None,
+    state: State = None,
+    save: Save = None,
     output: Output = PRINTED,
 ) -> int:
     """Run a scene; write CSV files, run.json, plan.txt and figures to OUT (default
@@ -83,9 +115,18 @@ def run(
         hapticlink run closed-loop --set graphics.rate=10 --set hold=foh
         hapticlink run closed-loop --format pdf,svg
         hapticlink run my-scene.toml --no-figures --json > result.json
+        hapticlink run closed-loop --save 1 --save end
+        hapticlink run --from runs/closed-loop/at-1.state --set controller.K_pc=[20,20,0.2]
+        hapticlink run closed-loop --real-time --device simulated-board
     """
     import hapticlink as hl
 
+    if not (scene or state):
+        raise InputFault("give the name or path of a scene, or the state of a run (--from)")
+    if not scene:
+        scene = str(state)
+    elif state:
+        changes = replace(changes, set=[*(changes.set or ()), f"resume={state.absolute()}"])
     if set_file:
         from hapticlink.orchestrator.ssp import set_files
 
@@ -101,6 +142,9 @@ def run(
     try:
         read = hl.scene(scene, changes.options)
         with ExitStack() as shown:
+            stop = shown.enter_context(stop_key()) if real_time and not output.quiet else None
+            if stop and (device or driver_of(read, "")):
+                say("a key ends the run: motors are without torque then", file=sys.stderr)
             bar = progress(read.title, read.duration, hidden=output.quiet)
 
             def answer(result: hl.Run) -> None:
@@ -120,9 +164,13 @@ def run(
                 progress=shown.enter_context(bar),
                 answer=answer,
                 real_time=real_time,
+                speed=speed,
                 arrivals=arrivals,
+                device=device,
+                stop=stop,
                 remote=dict(map(_place, remote or ())),
                 key=key,
+                save=save or (),
             )
     except hl.RunInterrupted as ended:
         result = ended.run

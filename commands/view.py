@@ -6,6 +6,7 @@ import sys
 import time
 import webbrowser
 from contextlib import ExitStack, suppress
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -42,6 +43,9 @@ Port = Annotated[
         validator=validators.Number(gte=0, lte=65535),
     ),
 ]
+Speed = Annotated[
+    float, Parameter(help="Simulated seconds in one of the wall clock: 0.2 is slow motion.")
+]
 Browser = Annotated[bool, Parameter(help="Open the page in the browser.")]
 Second = Annotated[str | None, Parameter(help="Folder of a second run, beside the first.")]
 Export = Annotated[
@@ -75,6 +79,7 @@ def view(
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
+    speed: Speed = 1.0,
     export: Export = None,
     standalone: Standalone = None,
 ) -> int:
@@ -121,7 +126,7 @@ def view(
         import hapticlink as hl
         from hapticlink.visualization.live_page.session import LiveSession
 
-        session = LiveSession(read, link, root, hl.RealTime)
+        session = LiveSession(read, link, root, partial(hl.RealTime, speed=speed))
         with suppress(Interrupted, hl.RunInterrupted):
             session.run()
     for folder in session.recordings:

@@ -28,7 +28,7 @@ from hapticlink.fmus.versions import find_versions
 MAX_BUILD_TIME = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
 VERSIONS = ("hapticlink", "casadi", "pythonfmu")
-SOURCES = (".py", ".c", ".h", ".toml", ".png")
+SOURCES = (".py", ".c", ".cpp", ".h", ".toml", ".png")
 
 
 def folder() -> Path | None:

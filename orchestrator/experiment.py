@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator import open_scene, simulated_plant
 from hapticlink.orchestrator.base import interrupt, shelf
 from hapticlink.orchestrator.base.errors import (
     Fault,
@@ -34,16 +34,26 @@ from hapticlink.orchestrator.results.read_results import (
     with_record,
 )
 from hapticlink.orchestrator.results.run_folder import RunFolder
-from hapticlink.orchestrator.results.run_record import RunEnding, RunRecord, RunSetup, content
+from hapticlink.orchestrator.results.run_record import (
+    Resumed,
+    RunEnding,
+    RunRecord,
+    RunSetup,
+    content,
+)
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.results.write_files import remove_rows
-from hapticlink.orchestrator.run.compiled import library
+from hapticlink.orchestrator.run import run_state
+from hapticlink.orchestrator.run.compiled import lanes, library
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, require_concurrent
-from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
+from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run, run_side_by_side
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
 from hapticlink.orchestrator.run.open_fmus import find_isolated, refuse_hardware
 from hapticlink.orchestrator.run.real_time import RealTimeRun
+from hapticlink.orchestrator.run.run_state import RunState, require_savable
+from hapticlink.orchestrator.run.save_times import NO_TIMES, SaveTimes, Saving
 from hapticlink.orchestrator.run.signals import SignalVector
+from hapticlink.orchestrator.run.state_fits import require_fit
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_system
@@ -111,6 +121,22 @@ class Prepared:
     def system(self) -> System:
         return self.plan.system
 
+    def differs_in_starts(self, every: System) -> bool:
+        """Whether a system differs in start values alone, as `build_system` makes it of one."""
+        mine = self.every
+        return mine.connections is every.connections and mine.timeline is every.timeline
+
+    def experiment(
+        self,
+        scene: Scene,
+        outcome: Outcome,
+        folder: Path,
+        build_time: float,
+        memory: RunResults | None = None,
+    ) -> Experiment:
+        ending = outcome.ending(build_time)
+        return Experiment(scene, self.system, outcome, folder, self.before, ending, memory)
+
 
 _PREPARED: shelf.Shelf[Prepared] = shelf.Shelf(MAX_SYSTEMS)
 
@@ -132,14 +158,17 @@ def _prepare(
     return Prepared(every, plan, tables, setup(scene, plan, tables, _find_left_out(every, system)))
 
 
+def _prepare_once(scene: Scene, every: System) -> Prepared:
+    """The same, and kept for systems that `build_system` makes of this one by other start values,
+    which shows in that they share all else."""
+    ready = _prepare_again(scene, every) or _prepare(scene, every, None, NOWHERE)
+    _PREPARED.put(ready)
+    return ready
+
+
 def _prepare_again(scene: Scene, every: System) -> Prepared | None:
-    """The same for a system that `build_system` has made of one before by other start values, which
-    shows in that they share all else; None where there is none."""
-    known = _PREPARED.take(
-        lambda item: (
-            item.every.connections is every.connections and item.every.timeline is every.timeline
-        )
-    )
+    """Made of what is kept; None where there is none."""
+    known = _PREPARED.take(lambda item: item.differs_in_starts(every))
     if known is None:
         return None
     fmus = (
@@ -176,6 +205,44 @@ def _fits_in_memory(system: System, columns: Mapping[str, Sequence[str]]) -> boo
     return 8 * written <= IN_MEMORY
 
 
+def _find_state(
+    scene: Scene, system: System, folder: Path, real_time: RealTimeRun | None
+) -> RunState | None:
+    """The state from which a scene goes on, if it names one. Raises InputFault where it does not
+    fit, and where the run would replace the results that the state belongs to."""
+    if not scene.resume:
+        return None
+    if real_time:
+        open_scene.require_start(scene)
+    state = run_state.read(Path(scene.resume))
+    require_fit(state, system, open_scene.write_tables(scene))
+    if state.path.parent == folder:
+        raise InputFault(
+            f"{folder} has the state and the results before it, which this run would replace: give "
+            "another folder (--out)"
+        )
+    return state
+
+
+def _find_saving(
+    scene: Scene,
+    system: System,
+    folder: Path,
+    real_time: RealTimeRun | None,
+    save: SaveTimes,
+    state: RunState | None,
+) -> Saving | None:
+    """What saves the states of a run, if that is asked for. Raises InputFault for a time that is
+    not within it, and with the FMUs that cannot save their state."""
+    if not save.files:
+        return None
+    if real_time:
+        raise InputFault("--save: no state of a run in real time is saved: leave one out")
+    require_savable(system)
+    ticks = save.ticks(system.timeline, state.time if state else 0.0)
+    return Saving(ticks, folder, open_scene.write_tables(scene))
+
+
 def _watch(folder: Path) -> AbstractContextManager[None]:
     """Context in which a crash of this process is recorded in a folder."""
     guard: Callable[[int], object] = lambda on: None  # noqa: E731
@@ -196,6 +263,7 @@ def simulate(
     in_memory: bool = False,
     remote: Servers = NOWHERE,
     locked: bool = False,
+    save: SaveTimes = NO_TIMES,
 ) -> Experiment:
     """Run a scene (a name, a path, or a Scene), changed by `options`, with results in `folder`.
 
@@ -206,33 +274,40 @@ def simulate(
     writes them, with `keep_rows` beside the CSVs, until `remove_rows`. `in_memory`: nothing is
     written, unless the tables are too long (`IN_MEMORY`) or an FMU of others, which may crash the
     process, runs in it. remote: the FMUs that run on other computers. locked: the caller holds the
-    lock of the folder.
+    lock of the folder. save: when states are saved.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
-    read = open_scene.load(scene, options)
+    read = open_scene.load(scene, options, resumes=True)
     with ExitStack() as stack:
         if not (in_memory or locked):
             stack.enter_context(folder_lock.lock_folder(folder))
         try:
             every = stack.enter_context(build_system(read))
+            if real_time:
+                every = stack.enter_context(simulated_plant.attach(read, every))
         except Interrupted:
             raise Interrupted(when="before the run") from None
-        kept = in_memory and remote is NOWHERE and not real_time
-        ready = kept and _prepare_again(read, every)
-        ready = ready or _prepare(read, every, real_time, remote)
+        if in_memory and remote is NOWHERE and not real_time:
+            ready = _prepare_once(read, every)
+        else:
+            ready = _prepare(read, every, real_time, remote)
         system, plan, tables, before = ready.system, ready.plan, ready.tables, ready.before
+        state = _find_state(read, system, folder, real_time)
+        saving = _find_saving(read, system, folder, real_time, save, state)
+        before = replace(
+            before,
+            files=[*before.files, *save.files],
+            resumed=Resumed(str(state.path), state.time) if state else None,
+        )
+        ready = replace(ready, before=before)
         build_time = perf_counter() - begin
-        if kept:
-            _PREPARED.put(ready)
         alone = find_isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         if in_memory and not foreign and _fits_in_memory(system, tables):
             memory = RunResults()
             with host_state.restore_interpreter():
-                outcome = run(plan, memory, progress, real_time)
-            return Experiment(
-                read, system, outcome, folder, before, outcome.ending(build_time), memory
-            )
+                outcome = run(plan, memory, progress, real_time, state)
+            return ready.experiment(read, outcome, folder, build_time, memory)
         if in_memory:
             stack.enter_context(folder_lock.lock_folder(folder))
         csv = csv and read.record.format == "csv"
@@ -242,7 +317,7 @@ def simulate(
                 host_state.restore_directory(*foreign),
                 host_state.restore_interpreter(),
             ):
-                outcome = run(plan, results, progress, real_time)
+                outcome = run(plan, results, progress, real_time, state, saving)
             outcome.details = replace(outcome.details, logged=results.count_logged())
             try:
                 results.end(outcome.ending(build_time), tables)
@@ -252,7 +327,56 @@ def simulate(
                     outcome.reason = "fault"
                 results.end_in_place(outcome.ending(build_time))
             outcome.published = results.published
-    ended = Experiment(read, system, outcome, folder, before, outcome.ending(build_time))
+    ended = ready.experiment(read, outcome, folder, build_time)
     if not keep_rows:
         ended.remove_rows()
     return ended
+
+
+@interrupt.defer_signals()
+def simulate_together(
+    scenes: Sequence[Scene], folder: Path, compiles: bool
+) -> list[Experiment | None]:
+    """The runs of scenes with results in memory, the same ones as of `simulate`: those that differ
+    from the first in start values alone side by side, by vector instructions. None for a scene that
+    cannot be run so.
+
+    compiles: whether to compile the steps of several instances that the cache lacks. Raises
+    Interrupted.
+    """
+    begin = perf_counter()
+    ready: list[Prepared | None] = []
+    with ExitStack() as stack:
+        for scene in scenes:
+            ready.append(None)
+            with suppress(InputFault):
+                made = _prepare_once(scene, stack.enter_context(build_system(scene)))
+                if not (scene.fmu or scene.resume) and _fits_in_memory(made.system, made.tables):
+                    ready[-1] = made
+        build_time = (perf_counter() - begin) / len(scenes)
+        ended: list[Experiment | None] = []
+        together = _run_together(ready, compiles)
+        for scene, one, (outcome, memory) in zip(scenes, ready, together, strict=True):
+            ended.append(None)
+            if one and not outcome:
+                memory = RunResults()
+                outcome = run(one.plan, memory)
+            if one and outcome:
+                ended[-1] = one.experiment(scene, outcome, folder, build_time, memory)
+    return ended
+
+
+def _run_together(
+    ready: Sequence[Prepared | None], compiles: bool
+) -> list[tuple[Outcome | None, RunResults | None]]:
+    """The outcomes and results of those that differ from the first in start values alone; None of
+    the others, and of runs that did not last."""
+    first = next((one for one in ready if one), None)
+    beside = [
+        i for i, one in enumerate(ready) if one and first and one.differs_in_starts(first.every)
+    ]
+    steps = lanes.find_steps(first.system, compiles) if first and len(beside) > 1 else {}
+    plans = {i: (one.plan, RunResults()) for i in beside if steps and (one := ready[i])}
+    outcomes = iter(run_side_by_side([*plans.values()], steps) if plans else ())
+    none = (None, None)
+    return [(next(outcomes), plans[i][1]) if i in plans else none for i in range(len(ready))]

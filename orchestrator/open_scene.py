@@ -1,13 +1,16 @@
-"""Opens a scene by its name or path: a shipped one, a TOML file, or an SSP."""
+"""Opens a scene by its name or path: a shipped one, a TOML file, an SSP, or that of a run's state,
+which then goes on from it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path as FilePath
+from typing import Any
 
 from hapticlink.orchestrator.base import plugins
-from hapticlink.orchestrator.base.errors import Finding, SceneFault
+from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
+from hapticlink.orchestrator.results.state_file import SUFFIX, read_state
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find_scene import find_scene
@@ -17,22 +20,26 @@ from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
 
 
-def load(scene: str | FilePath | Scene | Source, options: Options = ()) -> Scene:
+def load(
+    scene: str | FilePath | Scene | Source, options: Options = (), resumes: bool = False
+) -> Scene:
     """Find a scene, change it by `options` and check it.
 
     scene: the name of a shipped one, the path of a TOML file or SSP, a Scene, or a Source. A Scene
     that was read from a file is read again with its own options and the given ones; one that was
     created or changed in Python is checked. Raises SceneFault with every finding, InputFault for a
-    scene that is not found and for an option that cannot be applied.
+    scene that is not found, for an option that cannot be applied, and for a scene that goes on from
+    a state, unless it is for what `resumes`.
     """
     further = overrides.write_options(options)
     if isinstance(scene, Scene) and scene.source and not further:
-        return scene
+        return scene if resumes else require_start(scene)
     source = scene if isinstance(scene, Source) else source_of(scene)
     source = replace(source, options=(*source.options, *further))
     if source.name.endswith(".ssp"):
         _check_ssp(source)
-    return from_source(source)
+    read = from_source(source)
+    return read if resumes else require_start(read)
 
 
 def source_of(scene: str | FilePath | Scene) -> Source:
@@ -43,6 +50,9 @@ def source_of(scene: str | FilePath | Scene) -> Source:
 
 
 def _find(scene: str) -> Source:
+    if scene.endswith(SUFFIX):
+        tables = read_state(FilePath(scene))["scene"]
+        return Source(tables["title"], tables | {"resume": scene}, {})
     if scene.endswith(".ssp"):
         # Imported here, since its XML parsers are slow to load.
         from hapticlink.orchestrator.ssp import read as ssp
@@ -55,10 +65,28 @@ def _find(scene: str) -> Source:
 def _of(scene: Scene) -> Source:
     if scene.source:
         return scene.source
-    tables = adapter().dump_python(scene.plain(), mode="json", by_alias=True, exclude_none=True)
+    tables = write_tables(scene)
     if isinstance(scene, WrittenScene):
         return replace(scene.origin, tables=tables)
     return Source(scene.title, tables, {})
+
+
+def require_start(scene: Scene) -> Scene:
+    """The scene. Raises InputFault for one that goes on from a state."""
+    if scene.resume:
+        raise InputFault(
+            f"resume = {scene.resume!r}: runs and sweeps alone go on from a state, and not in real "
+            "time: leave it out"
+        )
+    return scene
+
+
+def write_tables(scene: Scene) -> dict[str, Any]:
+    """The tables of a scene as it is, which are read as those of a file."""
+    tables: dict[str, Any] = adapter().dump_python(
+        scene.plain(), mode="json", by_alias=True, exclude_none=True
+    )
+    return tables
 
 
 def _check_ssp(source: Source) -> None:

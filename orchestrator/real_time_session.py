@@ -18,7 +18,7 @@ from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
-from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, require_speed
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.arguments import require, require_name
 from hapticlink.orchestrator.scene.overrides import Options
@@ -43,9 +43,12 @@ class LiveRun:
     changes the running FMUs, holds and clocks themselves. run.json lists the changes with their
     times (`changes` of `real_time`)."""
 
-    def __init__(self, scene: str | Path | Scene, options: Options = ()) -> None:
+    def __init__(
+        self, scene: str | Path | Scene, options: Options = (), speed: float = 1.0
+    ) -> None:
         self.scene = open_scene.load(scene, options)
         """The scene that runs."""
+        self._speed = require_speed(speed)
         self._schedule: Callable[[Callable[..., object]], RealTimeRun] = RealTimeRun
         self.paused = False
         """Whether time stands still; turns go on."""
@@ -63,6 +66,7 @@ class LiveRun:
             self._connections: dict[str, Connection] = {}
             self._places: dict[str, list[int]] = {}
             self._run = self._schedule(self._turn)
+            self._run.pace.change_speed(self._speed, 0.0)
             ended = run(self._run)
             if not self._again:
                 return ended
@@ -191,6 +195,20 @@ class LiveRun:
         self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
 
     # --- time ---------------------------------------------------------------------------------
+
+    @property
+    def speed(self) -> float:
+        """Simulated seconds in one of the wall clock: 1 in real time, less in slow motion. It can
+        be set, before the run too, and stays after a `reset`. Raises InputFault where it is no
+        number between 0.001 and 1000, and with hardware."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        self._speed = require_speed(speed)
+        if hasattr(self, "_run"):
+            self._run.change_speed(self._speed, self.time)
+            self._note(f"speed: {self._speed:g}")
 
     def pause(self) -> None:
         """Let time stand still after this turn."""

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6956,
-    "fmus": 2822,
-    "orchestrator": 13825,
-    "programs": 1021,
-    "analysis": 7911,
+    "components": 6979,
+    "fmus": 2987,
+    "orchestrator": 15762,
+    "programs": 1023,
+    "analysis": 7951,
     "visualization": 3434,
-    "api": 467,
-    "commands": 1459,
+    "api": 488,
+    "commands": 1520,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

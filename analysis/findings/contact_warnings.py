@@ -45,7 +45,8 @@ def warn_of_contacts(results: Results) -> Iterator[str]:
     contacts = scene_part(results, "contacts", Contacts)
     mechanism = scene_part(results, "mechanism", Mechanism)
     if JOINT_COORDINATES in table:  # both are recorded
-        yield from warn_of_pressed_start(linkage, contacts, table[JOINT_COORDINATES][0])
+        if not results.record.resumed:
+            yield from warn_of_pressed_start(linkage, contacts, table[JOINT_COORDINATES][0])
         yield from _deep(table, linkage, contacts)
         if contacts.detection == "graphics":
             yield from _unseen(table, linkage, contacts)

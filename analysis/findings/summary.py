@@ -115,7 +115,8 @@ def print_lines(results: Results, name: str, known: Sequence[str] | None = None)
         yield f"  {line}"
     record = results.record
     if record.timings.run and record.end.time:  # a signal may come before the first event
-        speed = record.end.time / record.timings.run
+        begun = record.resumed.time if record.resumed else 0.0
+        speed = (record.end.time - begun) / record.timings.run
         yield f"  {record.timings.run:.2f} s of run time, {speed:.1f} times real time"
     if results.folder:
         files = sorted(record.files, key=lambda name: not name.endswith(TABLES))
@@ -212,7 +213,13 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     signals that are not recorded, held outputs, repeated steps, contacts, convergence, lost
     samples, stability, and holds that did not fit."""
     record, measures = results.record, measures or Measures(results)
-    yield from _start(results)
+    if resumed := record.resumed:
+        yield (
+            f"goes on from {resumed.state}, at {resumed.time:.6g} s: its rows are from then on, "
+            "energies of holds and counts from 0 s"
+        )
+    else:
+        yield from _start(results)
     off, frames = measures.folded
     if off:
         remedy = ": take graphics.sync = 'exact'"
@@ -341,7 +348,9 @@ def deadlines(report: Mapping[str, Any]) -> str:
     missed = f"{report['deadlines_missed'] or 'none'} of {report['ticks']} deadlines missed"
     largest = (1e3 * report[name]["max"] for name in ("step_time", "lateness"))
     step, late = map(short, largest)
-    return f"{rate} Hz in real time: {missed}; largest step time {step} ms, lateness {late} ms"
+    speed = report["speed"]
+    how = "in real time" if speed == 1.0 else f"at {short(speed)} times real time"
+    return f"{rate} Hz {how}: {missed}; largest step time {step} ms, lateness {late} ms"
 
 
 def _network(fmu: str, exchange: Mapping[str, Any]) -> Iterator[str]:

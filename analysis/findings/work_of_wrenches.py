@@ -183,7 +183,8 @@ class Works:
             part = table.part(slice(first, int(rows.max()) + 1))
             return _signed(sign, part[signal][rows - first])
 
-        meter = meters[name] if name else None
+        # Of a run that goes on from a state, meters have the energies before its rows, too.
+        meter = meters[name] if name and not results.record.resumed else None
         at = int(np.searchsorted(times, meter.until)) if meter else 0
         if between := meter and not (at < len(times) and times[at] == meter.until):
             times = np.insert(times, at, meter.until)

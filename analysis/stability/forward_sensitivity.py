@@ -46,7 +46,6 @@ from hapticlink.analysis.stability.state_vector import (
     StateVector,
     Template,
     ages,
-    blocks,
     doubles,
     parameters_of,
 )
@@ -68,6 +67,7 @@ from hapticlink.orchestrator.plan.operations import (
     Step,
     flat,
 )
+from hapticlink.orchestrator.run.run_state import state_blocks
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -126,7 +126,7 @@ class ForwardSensitivity:
         self._graphs: dict[str, GraphSlopes | None] = {}
         self._named: dict[Any, list[StateEntry]] = {}
         self._polynomials = {n for n, hold in simulation.holds.items() if is_polynomial(hold)}
-        self._blocks = blocks(simulation)
+        self._blocks = state_blocks(simulation, with_own=True)
         self._evaluated: dict[str, tuple[Fraction, bytes]] = {}
         self._applied: dict[Key, Applied] = {}
 
@@ -471,9 +471,11 @@ class ForwardSensitivity:
         match operation:
             case Repeat(body=body):
                 fmus = {op.fmu for op in flat(body) if isinstance(op, Step)}
-                return Reach(StateVector(simulation, fmus, set(blocks(simulation))), every, every)
+                return Reach(
+                    StateVector(simulation, fmus, set(state_blocks(simulation))), every, every
+                )
             case OfHold(connection) if not self._is_smooth(connection):
-                shared = set(blocks(simulation)) - set(simulation.holds)
+                shared = set(state_blocks(simulation)) - set(simulation.holds)
                 state = StateVector(simulation, set(), {connection} | shared)
                 return Reach(state, every, every)
             case Push(connection):  # with derivatives or integrals behind what is held

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.run.compiled.state import Saved, StateBlock
+from hapticlink.orchestrator.run.compiled.state import Saved
+from hapticlink.orchestrator.run.run_state import state_blocks
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.system import Fmu, System
 
@@ -63,7 +64,7 @@ class StateVector:
         holds: Container[str] | None = None,
     ) -> None:
         self._simulation = simulation
-        every = blocks(simulation)
+        every = state_blocks(simulation, with_own=True)
         self._holds = {name: every[name] for name in every if holds is None or name in holds}
         self._fmus = [f for f in simulation.system.fmus if fmus is None or f.name in fmus]
         self._taken: dict[str, NDArray[np.intp]] = {}
@@ -163,14 +164,6 @@ class StateVector:
             names = self._holds[owner].names(saved)
             coordinates += [StateEntry(owner, name, "hold") for name in names]
         return coordinates
-
-
-def blocks(simulation: Simulation) -> dict[str, StateBlock]:
-    """The states of the holds and the energy tanks of a simulation, by name."""
-    tanks = {f"energy tank {i + 1}": tank for i, tank in enumerate(simulation.springs)}
-    holds = simulation.holds.items()
-    found = {name: StateBlock(hold.c, partial(getattr, hold, "own")) for name, hold in holds}
-    return found | {name: StateBlock(tank) for name, tank in tanks.items()}
 
 
 def ages(integers: NDArray[np.int64], tick: int) -> bytes:

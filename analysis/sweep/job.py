@@ -73,7 +73,7 @@ def job(
     signal."""
     interrupt.raise_if_interrupted()  # 100,000 points take minutes
     try:
-        loaded = open_scene.load(scene, options)
+        loaded = open_scene.load(scene, options, resumes=True)
         return Job(point, loaded, key(loaded), plugins=tuple(plugins.list_plugins()))
     except Fault as fault:
         return Job(point, None, refusal=str(fault))
@@ -85,7 +85,7 @@ def key(scene: Scene) -> str:
     computed_with = [*_list_code(), plugins.list_plugins()]
     whole: dict[str, Any] = {"scene": scene.plain(), "made_with": computed_with}
     try:
-        paths = [Path(f.path) for f in scene.fmu if f.path]
+        paths = [Path(path) for path in (scene.resume, *(f.path for f in scene.fmu)) if path]
         files = [sha256(path.read_bytes()).hexdigest() for path in paths]
     except OSError as error:
         raise InputFault(f"{error.filename}: cannot be read: {error.strerror}") from error

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.bodies import Body
+from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.joint_types import JOINT_TYPES, JointType
 from hapticlink.components.specs.linkage import Joint, Linkage, Loop, OperationalPoint
 from hapticlink.components.specs.quantities import (
@@ -212,6 +213,8 @@ class Device:
     """Integration steps per communication step; the size of the FMU's equations grows with them."""
     observer: Observer = field(default_factory=Observer)
     """The observer, used with sensing = "encoders"."""
+    driver: Driver | None = None
+    """The board that takes the device's place in a run in real time, once it has a port."""
 
     def __post_init__(self) -> None:
         for j in self.joint:

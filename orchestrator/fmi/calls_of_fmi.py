@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import logging
+import math
 import sys
 import time as clock
 from collections.abc import Callable, Sequence
@@ -222,6 +223,18 @@ class InProcess(Instance):
             raise self.failed(name, getattr(error, "status", ERROR)) from error
         finally:
             self._keep_arithmetic()
+
+    def _fmi(self, function: str, *arguments: Any) -> None:
+        """Call a function that all versions of FMI have."""
+        self._call(f"fmi{self.description.fmi}{function}", *arguments)
+
+    def update_discrete_states(self) -> tuple[bool, bool, float]:
+        """In event mode: whether its discrete states need another update, whether it requests the
+        end of the simulation, and the time (s) of its next time event, infinity without one."""
+        info = fmi2.fmi2EventInfo()
+        self._call("fmi2NewDiscreteStates", ctypes.byref(info))
+        next_event = info.nextEventTime if info.nextEventTimeDefined else math.inf
+        return bool(info.newDiscreteStatesNeeded), bool(info.terminateSimulation), next_event
 
     def _keep_arithmetic(self) -> None:
         """Restores how this process rounds numbers where an FMU of others has changed it."""

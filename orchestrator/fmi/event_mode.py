@@ -1,4 +1,5 @@
-"""An FMI 3.0 co-simulation FMU whose events its importer handles (`hasEventMode`).
+"""An FMU whose events its importer handles: here those of FMI 3.0 for co-simulation that declare it
+(`hasEventMode`), in `model_exchange` those that a solver integrates.
 
 FMI 3.0.2 section 4.2.1: "The importer must call fmi3EnterEventMode when any of the following
 conditions are met: time has reached nextEventTime as returned by fmi3UpdateDiscreteStates, or the
@@ -18,7 +19,7 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
@@ -28,12 +29,13 @@ import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, FmiClock
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.status import SHARE, succeeded
 from hapticlink.orchestrator.fmi.transfer import Transfer
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 
 MOST = 1000
 """Event iterations at one instant, and doSteps that do not advance time, before the FMU counts as
@@ -55,8 +57,14 @@ class Pending:
     seen: dict[int, float] = field(default_factory=dict)
 
 
-class InProcessWithEvents(InProcess3):
-    """An FMU of FMI 3.0 with event mode, whose library is loaded into this process."""
+class WithEvents(InProcess):
+    """What FMUs with event mode have in common, before the class of their version of FMI. Their
+    step function ends at an event, and tells by `step_flags` and `reached` as fmi3DoStep does."""
+
+    _back = "EnterStepMode"
+    """The function that leaves event mode."""
+    step_flags: list[Any]
+    reached: Any
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -70,29 +78,13 @@ class InProcessWithEvents(InProcess3):
         self._clocks = self.description.clocks
         self._readings: dict[frozenset[int] | None, tuple[list[int], Vector, list[Transfer]]] = {}
         self._saved_pending: dict[int, Pending] = {}
+        self.taken_over: Mapping[str, Any] | None = None
+        """What the inputs' setter of an earlier run had set, until one of this run is called."""
 
     @property
     def has_events(self) -> bool:
         """Whether its events are handled here, by Python."""
         return not self.in_c
-
-    def _instantiate(self) -> Any:
-        """One whose library refuses what its modelDescription.xml declares handles its events
-        itself."""
-        try:
-            return super()._instantiate()
-        except Exception:  # FMPy raises bare Exception, which comes again where this was not it
-            if self._clocks or self.texts:
-                raise
-        self.in_c = True
-        slave = super()._instantiate()
-        warning = "%s declares event mode (hasEventMode) and refuses it: it handles its own events"
-        logging.getLogger(__name__).warning(warning, self.name)
-        return slave
-
-    def _logging(self) -> dict[str, Any]:
-        used = {"eventModeUsed": self.has_events, "earlyReturnAllowed": self._returns_early}
-        return super()._logging() | used
 
     @property
     def _returns_early(self) -> bool:
@@ -107,11 +99,11 @@ class InProcessWithEvents(InProcess3):
             return
         self._clocks = tuple(self._with_interval(clock) for clock in self._clocks)
         self._plan(0.0, {c.reference for c in self._clocks if c.kind == "changing"})
-        self._call("fmi3ExitInitializationMode")
+        self._fmi("ExitInitializationMode")
         self._initialized = True
         if self._iterate():
             raise AsksToEnd(self.name, "has asked to end the simulation", 0.0)
-        self._call("fmi3EnterStepMode")
+        self._fmi(self._back)
         self.read()
         self._start_loop()
 
@@ -216,28 +208,26 @@ class InProcessWithEvents(InProcess3):
         """Event mode at `time` (s), in which `settings` are made and the clocks of the references
         `active` are activated. Returns whether the FMU requests the end of the simulation."""
         self.place.time = time
-        self._call("fmi3EnterEventMode")
+        self._fmi("EnterEventMode")
         settings()
         for _ in range(MOST):
             if self._iterate(active):
                 return True
             active = {r for r, at in self.pending.planned.items() if at <= time}
             if not active:
-                self._call("fmi3EnterStepMode")
+                self._fmi(self._back)
                 return False
         raise self._fault(f"its clocks are due {MOST} times at one instant", time)
 
     def _iterate(self, active: Collection[int] = ()) -> bool:
         """Event iterations until the discrete states need no update. Returns whether the FMU
-        requests the end of the simulation (FMI 3.0.2 section 2.3.5, fmi3UpdateDiscreteStates)."""
-        more, ends, _, _, defined = flags = [ctypes.c_bool() for _ in range(5)]
-        next_event = ctypes.c_double()
-        results = [*(ctypes.byref(flag) for flag in flags), ctypes.byref(next_event)]
+        requests the end of the simulation (FMI 3.0.2 section 2.3.5, fmi3UpdateDiscreteStates; FMI
+        2.0.5 section 3.2.2, fmi2NewDiscreteStates)."""
         for _ in range(MOST):
             self._activate(active)
-            self._call("fmi3UpdateDiscreteStates", *results)
+            more, ends, next_event = self.update_discrete_states()
             self._plan(self.time, active)
-            active, self.pending.next_event = (), next_event.value if defined else math.inf
+            active, self.pending.next_event = (), next_event
             if ends:
                 return True
             if not more:
@@ -324,6 +314,41 @@ class InProcessWithEvents(InProcess3):
         self.pending = deepcopy(self._saved_pending[slot])
         self.restored += 1
 
+    def saved_events(self) -> dict[str, Any]:
+        """What of its events is not in the FMU's own state."""
+        return vars(deepcopy(self.pending)) | {"inputs": self.inputs and self.inputs.saved()}
+
+    def restore_events(self, saved: Mapping[str, Any]) -> None:
+        """As `saved_events` had it, for the state that was deserialised. The setter of inputs that
+        is called first takes on what the one before had set."""
+        own = {name: saved[name] for name in vars(self.pending)}
+        self.pending, self.taken_over = Pending(**own), saved["inputs"]
+
+    def take_continuous(self, setter: Setter) -> None:
+        """Continuous inputs have been set in step mode."""
+
+
+class InProcessWithEvents(WithEvents, InProcess3):
+    """An FMU of FMI 3.0 for co-simulation with event mode."""
+
+    def _instantiate(self) -> Any:
+        """One whose library refuses what its modelDescription.xml declares handles its events
+        itself."""
+        try:
+            return super()._instantiate()
+        except Exception:  # FMPy raises bare Exception, which comes again where this was not it
+            if self._clocks or self.texts:
+                raise
+        self.in_c = True
+        slave = super()._instantiate()
+        warning = "%s declares event mode (hasEventMode) and refuses it: it handles its own events"
+        logging.getLogger(__name__).warning(warning, self.name)
+        return slave
+
+    def _logging(self) -> dict[str, Any]:
+        used = {"eventModeUsed": self.has_events, "earlyReturnAllowed": self._returns_early}
+        return super()._logging() | used
+
 
 class EventSetter:
     """Sets continuous inputs in step mode, and the others, which are discrete inputs and tunable
@@ -332,7 +357,7 @@ class EventSetter:
     grown."""
 
     def __init__(
-        self, instance: InProcessWithEvents, scalars: Sequence[Scalar], places: Sequence[int]
+        self, instance: WithEvents, scalars: Sequence[Scalar], places: Sequence[int]
     ) -> None:
         self._instance, self._before = instance, (-1, b"")
         rows = [*zip(scalars, places, strict=True)]
@@ -352,9 +377,12 @@ class EventSetter:
         if instance.ended:
             return
         instance.inputs = self
+        if before := instance.taken_over:
+            self._before, instance.taken_over = (instance.restored, before["discrete"]), None
         if self._clocked:
             self._signals = signals.copy()  # as they are now, when a clock is active
         self._continuous(signals)
+        instance.take_continuous(self._continuous)
         seen, active = instance.pending.seen, []
         for reference, place in self._clocks:
             if signals[place] > seen.get(reference, 0.0):
@@ -366,6 +394,10 @@ class EventSetter:
             self._before = now
             settings = (lambda: discrete(signals)) if changed else (lambda: None)
             instance.place.ended = instance.event(instance.time, active, settings)
+
+    def saved(self) -> dict[str, Any]:
+        """The discrete inputs that it has set."""
+        return {"discrete": self._before[1]}
 
     def set_clocked(self, active: frozenset[int]) -> None:
         """Set the inputs of clocks that are active."""
@@ -384,6 +416,6 @@ def _one(reference: int) -> Any:
 
 def _is_continuous(scalar: Scalar) -> bool:
     """Whether it may be set in step mode: an input that varies continuously, as those of floating
-    point do by default (FMI 3.0.2 section 2.4.7.4)."""
-    default = "continuous" if scalar.type.startswith("Float") else "discrete"
+    point do by default (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)."""
+    default = "continuous" if scalar.type in CONTINUOUS else "discrete"
     return scalar.causality == "input" and (scalar.variability or default) == "continuous"

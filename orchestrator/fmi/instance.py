@@ -88,6 +88,14 @@ class OutputBounds:
         """Stand as before `start`."""
         self.inverse[:] = self._shares[:] = self._before[:] = 0.0
 
+    def saved(self) -> Vector:
+        """How far outputs without a unit were beyond their bounds, which `find_diverged` needs."""
+        return self._before.copy()
+
+    def restore(self, saved: Vector) -> None:
+        if len(saved) == len(self._before):  # else other outputs are recorded
+            self._before[:] = saved
+
     def hold(self) -> bool:
         """Whether all outputs are certainly finite and within their bounds: one pass over the
         vector, since this is asked at every read."""
@@ -196,6 +204,23 @@ class Instance(ABC):
         self.place.waiting = min((due for due, _ in self._waiting), default=math.inf)
         for setting in ready:
             setting(time)
+
+    def due_time(self, setting: Callable[[float], object]) -> float | None:
+        """From when on (s) a setting waits for a step; None where it does not wait."""
+        return next((due for due, waiting in self._waiting if waiting is setting), None)
+
+    def forget_settings(self) -> None:
+        """Nothing waits for a step any more."""
+        self._waiting.clear()
+        self.place.waiting = math.inf
+
+    # --- hardware -------------------------------------------------------------------------
+
+    def begin(self) -> None:  # noqa: B027
+        """Everything else is ready to run."""
+
+    def rest(self) -> None:  # noqa: B027
+        """The run has ended, however: hardware is left without torque before anything else."""
 
     # --- what each kind does in its way, every call of which may raise FmuFault -----------
 

@@ -95,7 +95,7 @@ class RunFolder(RunResults):
         """Called by each recorder after its first row; once all have one, replaces the results of
         an earlier run."""
         recorders = self._recorders.values()
-        if any(recorder.last is None for recorder in recorders):
+        if not self._may_be_published():
             return
         write_atomically(self.folder / RUN, self._begun + b" " * ROOM)
         super()._publish()

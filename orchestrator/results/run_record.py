@@ -49,6 +49,14 @@ class RefusedHold:
 
 
 @dataclass(frozen=True)
+class Resumed:
+    """The file of a state, and its time (s)."""
+
+    state: str
+    time: float
+
+
+@dataclass(frozen=True)
 class RunSetup:
     """What is known before a run; `scene` is its scene as tables, with all defaults."""
 
@@ -87,6 +95,8 @@ class RunSetup:
     """Times (s) and texts of what `[[at]]` does, each with the first step that it acts on."""
     units: dict[str, str] = field(default_factory=dict)
     """By column of a table, as its FMU names it; columns without a unit are left out."""
+    resumed: Resumed | None = None
+    """The state from which the run went on, None for one from the start."""
     without_effect: list[str] = field(default_factory=list)
     """What the scene asks for that acts nowhere in this run, each with the reason."""
 
@@ -203,6 +213,8 @@ class RunEnding:
     beyond all that it was given."""
     isolated: dict[str, str] = field(default_factory=dict)
     """Why an FMU ran in a process of its own."""
+    solvers: dict[str, str] = field(default_factory=dict)
+    """What has integrated an FMU for model exchange."""
     logged: dict[str, dict[str, int]] = field(default_factory=dict)
     """The number of messages in fmus.log, by FMU and status."""
     held_outputs: dict[str, int] = field(default_factory=dict)

@@ -16,8 +16,8 @@ class Recorder:
     """Records rows of a table: `time` and those `values` whose places the columns `recorded` name,
     at every `every`-th call of `row`, and at the one numbered `end`, the last one, from 0 on; where
     `recorded` is None there is no table, and rows are counted only. `first` is called after the
-    first row. most: calls of `row` that there may be, where a rate may be raised during the run. A
-    context manager.
+    first row. most: calls of `row` that there may be, where a rate may be raised during the run.
+    before: calls of `row` in the run that this one goes on from. A context manager.
 
     rows: of the whole run, of which `filled` are written. `view` is `values` at `places` where
     these are side by side, else None. `due`: whether the next row is written. `room`: the rows that
@@ -36,6 +36,7 @@ class Recorder:
         every: int = 1,
         end: int = 0,
         most: int = 0,
+        before: int = 0,
     ) -> None:
         places = [*(recorded or {}).values()]
         self.values, self.places = values, np.array(places, np.int64)
@@ -43,10 +44,12 @@ class Recorder:
         self.columns = ("time", *(recorded or ()))
         span = slice(places[0], places[-1] + 1) if places else slice(0)
         self.view = values[span] if places == [*range(len(values))[span]] else None
-        self._first = first
-        self.due, self.room, self.count = (ctypes.c_int64(n) for n in (1, 0, 0))
+        self._first, self.before = first, before
+        due = before % every == 0 or before == end
+        self.due, self.room, self.count = (ctypes.c_int64(n) for n in (due, 0, before))
         self.reached = ctypes.c_double()
-        self.rows, self.filled = self._new_rows(recorded is not None, max(end, most) // every + 2)
+        coming = max(end - before, most) // every + 2
+        self.rows, self.filled = self._new_rows(recorded is not None, coming)
 
     def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
         """Room for the rows of the whole run, and the number of those that are written."""
@@ -55,14 +58,22 @@ class Recorder:
     @property
     def last(self) -> float | None:
         """The time (s) of the newest row, None before the first."""
-        return self.reached.value if self.count.value else None
+        return self.reached.value if self.count.value > self.before else None
 
     @property
     def recorded(self) -> int:
         """The rows that were to be written so far, of those that were counted."""
-        count = self.count.value
+        return 0 if self.rows is None else self._due(self.count.value) - self._due(self.before)
+
+    def _due(self, count: int) -> int:
+        """The rows that are to be written of so many calls."""
         ended = count > self.end > 0 and self.end % self.every != 0
-        return 0 if self.rows is None else -(-count // self.every) + ended
+        return -(-count // self.every) + ended
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether its first row is to come: of a run that goes on there may be none."""
+        return self.last is None and not self.before
 
     def row(self, time: float) -> None:
         """Write a row at `time` (s). Raises OSError, as on a full disk."""
@@ -74,7 +85,7 @@ class Recorder:
         self.reached.value = time
         self.count.value += 1
         self.due.value = self.count.value % self.every == 0 or self.count.value == self.end
-        if self.count.value == 1:
+        if self.count.value == self.before + 1:
             self._first()
             self.room.value = self._make_room()
 
@@ -120,10 +131,12 @@ class RunResults:
         every: int = 1,
         end: int = 0,
         most: int = 0,
+        before: int = 0,
     ) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
         new = self._recorder_of(clock)
-        self._recorders[clock] = made = new(recorded, values, self._publish, every, end, most)
+        made = new(recorded, values, self._publish, every, end, most, before)
+        self._recorders[clock] = made
         return made
 
     def _recorder_of(self, clock: str) -> Callable[..., Recorder]:
@@ -143,10 +156,14 @@ class RunResults:
 
     def _publish(self) -> None:
         """Called by each recorder after its first row."""
-        if all(recorder.last is not None for recorder in self._recorders.values()):
+        if self._may_be_published():
             for recorder in self._recorders.values():
                 recorder.publish()
             self.published = True
+
+    def _may_be_published(self) -> bool:
+        awaited = any(recorder.is_awaited for recorder in self._recorders.values())
+        return not (self.published or awaited)
 
     def tables(self) -> dict[str, Table]:
         """The tables by clock."""

@@ -34,6 +34,7 @@ class FileRecorder(Recorder):
         every: int = 1,
         end: int = 0,
         most: int = 0,
+        before: int = 0,
     ) -> None:
         self.path, self.target = path, path.with_suffix(rows_file.SUFFIX)
         self._unfinished = path.with_name(f".{self.target.name}.{os.getpid()}")
@@ -41,7 +42,7 @@ class FileRecorder(Recorder):
             self._unfinished = self.target
         self._file: rows_file.RowsBeingWritten | None = None
         self._published, self._full = False, 0.0
-        super().__init__(recorded, values, first, every, end, most)
+        super().__init__(recorded, values, first, every, end, most, before)
 
     def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
         if not recorded:
@@ -77,13 +78,13 @@ class FileRecorder(Recorder):
             self._published = True
 
     def finish(self) -> None:
-        if self._published and self.last is not None:
+        if self._published and not self.is_awaited:
             table = rows_file.RowsFile(self.target)
             make_csv(self.path, table)
             self._require_rows(table)
 
     def require_whole(self) -> None:
-        if self._published and self.last is not None:
+        if self._published and not self.is_awaited:
             self._require_rows(rows_file.RowsFile(self.target))
 
     def _require_rows(self, table: rows_file.RowsFile) -> None:

@@ -8,6 +8,8 @@ change that is due costs one comparison of two numbers.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +42,22 @@ class InputSetter:
     def wait(self, time: float = -math.inf) -> None:
         """Act before the first step that begins at `time` (s) or later."""
         self._instance.before_step(self, time)
+
+    def saved(self) -> dict[str, Any]:
+        """From when on it waits, what it sets and what it draws, and the inputs."""
+        return {
+            "due": self._instance.due_time(self),
+            "values": self.values,
+            "drawn": self._random.bit_generator.state,
+            "inputs": [f"{self._change.fmu}.{s.name}" for s in self._change.inputs],
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Wait, set and draw as that did."""
+        self.values = saved["values"]
+        self._random.bit_generator.state = saved["drawn"]
+        if saved["due"] is not None:
+            self.wait(saved["due"])
 
     def __call__(self, now: float) -> None:
         change = self._change

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +69,18 @@ class FixedPoint:
         if isinstance(self._solver, Newton) and all(_constant(c, system) for c in connections):
             self._partial = jacobians.find_derivatives(simulation, connections, self._places)
             self._solver.supplied = self._jacobian
+
+    def saved(self) -> dict[str, Any]:
+        """What it keeps from step to step."""
+        solver = {k: v for k, v in vars(self._solver).items() if not callable(v)}
+        return {"solver": solver, "counts": vars(self.counts), "derives": self._partial is not None}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go on from what it kept."""
+        vars(self._solver).update(saved["solver"])
+        self.counts = Iterations(**saved["counts"])
+        if not saved["derives"]:
+            self._partial = None
 
     def __call__(self, tick: int) -> None:
         values, places, counts = self._signals.values, self._places, self.counts

@@ -9,6 +9,7 @@ from functools import partial
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.boards.board import Board
 from hapticlink.orchestrator.fmi.description import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
@@ -44,8 +45,9 @@ def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
 
 def refuse_hardware(fmus: Iterable[Fmu]) -> None:
     """Raises InputFault for FMUs that drive hardware, outside of a run in real time."""
-    if hardware := [fmu.name for fmu in fmus if fmu.hardware]:
-        what = f"{', '.join(hardware)}: hardware = true"
+    if hardware := [fmu for fmu in fmus if fmu.hardware]:
+        keys = {"device.driver.port" if fmu.driver else "hardware = true" for fmu in hardware}
+        what = f"{', '.join(fmu.name for fmu in hardware)}: {', '.join(sorted(keys))}"
         raise InputFault(f"{what}: it is moved by runs in real time alone (--real-time)")
 
 
@@ -66,7 +68,11 @@ class LoadedFmus:
             interrupt.raise_if_interrupted()
             kind = Isolated if fmu.name in self.isolated else in_process(fmu.description)
             outputs = self.signals.values[self.signals.fmu(fmu.name)]
-            opening = partial(Remote, fmu.served) if fmu.served else kind
+            opening: Callable[..., Instance] = kind
+            if fmu.served:
+                opening = partial(Remote, fmu.served)
+            elif fmu.driver:
+                opening = partial(Board, fmu.driver)
             instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
             instance.recorded_only, instance.log_path = fmu.recorded_only, log_path
             self.instances[fmu.name] = stack.enter_context(instance)

@@ -1,10 +1,11 @@
 """The wall clock of a run in real time: its schedule, and what became of it.
 
-The event of tick k is due at origin + t_k. Of the events of the haptic clock, lateness is the time
-from there to the event's beginning, step time that from its beginning to its completion; a deadline
-is missed where it is complete after the next one is due. Events that are late are caught up with;
-with hardware in the loop, ticks that are past are skipped instead. Where an event begins more than
-MOST after it was due, as after the machine was suspended, the schedule moves.
+The event of tick k is due at origin + t_k/s, with s the speed, 1 in real time. Of the events of the
+haptic clock, lateness is the time from there to the event's beginning, step time that from its
+beginning to its completion; a deadline is missed where it is complete after the next one is due.
+Events that are late are caught up with; with hardware in the loop, ticks that are past are skipped
+instead. Where an event begins more than MOST after it was due, as after the machine was suspended,
+the schedule moves.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ _CLOCK, _WAIT = ctypes.CFUNCTYPE(ctypes.c_int64), ctypes.CFUNCTYPE(None, ctypes.
 
 
 class Pace:
-    """Schedule and statistics of a run; the compiled loop works on `c`.
+    """Schedule and statistics of a run; the compiled loop works on `c`. speed: simulated seconds in
+    one of the clock.
 
     clock: time (ns) of a clock that is never set back; wait: waits until a time of that clock, or
     shorter. Without them `take` gets those of the machine.
@@ -42,11 +44,12 @@ class Pace:
         self,
         clock: Callable[[], int] | None = None,
         wait: Callable[[int], object] | None = None,
+        speed: float = 1.0,
     ) -> None:
         self._given = clock and wait and (clock, wait)
         self.priority: dict[str, str] = {}
         self.lateness, self.steps = np.zeros(BINS, np.int64), np.zeros(BINS, np.int64)
-        self.c = structures.Pace(most=MOST)
+        self.c = structures.Pace(most=MOST, speed=speed)
         self.c.fill(self, "lateness", "steps")
 
     def take(self, library: ctypes.CDLL) -> None:
@@ -57,6 +60,15 @@ class Pace:
         self.clock, self.wait = self._given or own
         clock, wait = (_CLOCK(self.clock), _WAIT(self.wait)) if self._given else own
         self.c.fill(clock=clock, wait=wait)
+
+    @property
+    def speed(self) -> float:
+        return float(self.c.speed)
+
+    def change_speed(self, speed: float, time: float) -> None:
+        """Go on at another speed from a simulated time (s) on, which stays due when it is."""
+        self.c.origin += round(1e9 * time * (1 / self.c.speed - 1 / speed))
+        self.c.speed = speed
 
     def skip_late(self, most: float) -> None:
         """Let haptic ticks that are past be skipped, and the schedule move where an event is more
@@ -86,6 +98,7 @@ class Pace:
         c = self.c
         return {
             "reproducible": False,
+            "speed": self.speed,
             "priority": self.priority,
             "ticks": c.ticks,
             "deadlines_missed": c.missed,

@@ -4,6 +4,7 @@ itself (in other processes, in event mode, beside the loop), repeated steps, and
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from hapticlink.orchestrator.plan.operations import (
     Get,
@@ -34,6 +35,15 @@ class OperationsInPython:
         self._simulation, self._joined = simulation, joined
         self.loops: dict[Repeat, FixedPoint] = {}
         self._loop_of: dict[int, FixedPoint] = {}  # a Repeat's hash takes as long as a step
+        self._remembered: dict[str, dict[str, Any]] = {}
+
+    def saved(self) -> dict[str, dict[str, Any]]:
+        """What the fixed-point iterations keep from step to step, by their operation as text."""
+        return self._remembered | {repr(of): loop.saved() for of, loop in self.loops.items()}
+
+    def restore(self, saved: dict[str, dict[str, Any]]) -> None:
+        """Let the iterations, each from its first step on, go on from what they kept."""
+        self._remembered = saved
 
     def __call__(self, instruction: Instruction, tick: int) -> None:
         simulation = self._simulation
@@ -68,7 +78,10 @@ class OperationsInPython:
     def _loop(self, repeat: Repeat) -> FixedPoint:
         """The iteration of a Repeat, which all events share with its solver's state."""
         if repeat not in self.loops:
-            self.loops[repeat] = FixedPoint(repeat, self._simulation, self._sequence)
+            made = FixedPoint(repeat, self._simulation, self._sequence)
+            if kept := self._remembered.pop(repr(repeat), None):
+                made.restore(kept)
+            self.loops[repeat] = made
         return self.loops[repeat]
 
     def _sequence(self, operations: Iterable[Operation]) -> Call:

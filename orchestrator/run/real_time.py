@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Annotated, Any
 
+from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import VARIABLE_STEP
 from hapticlink.orchestrator.plan.operations import Event
@@ -15,6 +16,7 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.concurrent_fmus import Side, ThreadWorker, Worker
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.scene.arguments import require
 from hapticlink.orchestrator.system.system import Fmu, System
 
 SKIPPED = 8
@@ -30,7 +32,7 @@ class RealTimeRun:
 
     turn: called about every 20 ms between two events, with the simulation and the loop. clock, wait
     and worker: as of Pace and Side, of the machine by default. changes: time (s) and text of
-    what was changed during the run.
+    what was changed during the run. speed: as of Pace.
     """
 
     def __init__(
@@ -39,8 +41,9 @@ class RealTimeRun:
         clock: Callable[[], int] | None = None,
         wait: Callable[[int], object] | None = None,
         worker: Callable[[str], Worker] = lambda clock: ThreadWorker(),
+        speed: float = 1.0,
     ) -> None:
-        self.pace, self._turn, self._worker = Pace(clock, wait), turn, worker
+        self.pace, self._turn, self._worker = Pace(clock, wait, require_speed(speed)), turn, worker
         self.changes: list[tuple[float, str]] = []
         self._abandoned: list[str] = []
         self._in_loop: dict[str, str] = {}
@@ -51,6 +54,7 @@ class RealTimeRun:
         self._simulation = simulation
         simulation.beside, self._in_loop = concurrent_fmus.find_concurrent(plan)
         hardware = [fmu for fmu in plan.system.fmus if fmu.hardware]
+        self._require_own_time(plan.system, self.pace.speed)
         self._require_skipping(plan.system, hardware)
         haptics = plan.system.timeline.clocks[0]
         if any(fmu.clock == haptics.name for fmu in hardware):
@@ -86,6 +90,17 @@ class RealTimeRun:
                     f"which {', '.join(fixed)} cannot take ({VARIABLE_STEP} is not true)"
                 )
 
+    def change_speed(self, speed: float, time: float) -> None:
+        """As of `Pace`. Raises InputFault with hardware."""
+        self._require_own_time(self._simulation.system, speed)
+        self.pace.change_speed(speed, time)
+
+    def _require_own_time(self, system: System, speed: float) -> None:
+        """Raises InputFault for a speed other than 1 of hardware."""
+        if speed != 1.0 and (names := [fmu.name for fmu in system.fmus if fmu.hardware]):
+            what = f"{', '.join(names)} drives hardware, whose time is the clock's: take 1"
+            raise InputFault(f"speed = {speed:g}: {what}")
+
     def kinds(self, coming: Iterable[Event]) -> set[Event]:
         """The kinds of events that are likely beside wall clocks, of which those of the plan are
         `coming`."""
@@ -114,6 +129,14 @@ class RealTimeRun:
             "changes": self.changes,
             "abandoned": self._abandoned,
         }
+
+
+SPEEDS = Annotated[float, Quantity("1", ge=1e-3, le=1e3)]
+
+
+def require_speed(speed: float) -> float:
+    """A speed. Raises InputFault for one that nobody would wait for, or no machine reach."""
+    return float(require("speed", speed, SPEEDS))
 
 
 def with_skips(haptics: str, kinds: set[Event]) -> set[Event]:

@@ -29,7 +29,7 @@ from hapticlink.orchestrator.run.initialize import StartOrder, initialize
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.step_check import StepCheck
-from hapticlink.orchestrator.system.system import Connection, System
+from hapticlink.orchestrator.system.system import Connection, InputChange, System
 
 Call = Callable[[int], object]
 Set = Callable[[Vector], object]
@@ -47,7 +47,8 @@ class Simulation(LoadedFmus):
     steps are then taken beside the loop, each with its clock; `sides` and `arrivals`, tables of
     their samples, are by clock, `frames`, tables of what went to other computers, by FMU. late:
     ticks by which the current event comes after its own. loops_at_start: whether start values
-    depend on each other.
+    depend on each other. changing: the timed changes, with what makes them. rows_before: of a run
+    that goes on, the rows of each clock so far.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class Simulation(LoadedFmus):
         self.sides: dict[str, Side] = {}
         self.arrivals: dict[str, Recorder] = {}
         self.frames: dict[str, Recorder] = {}
+        self.rows_before: Mapping[str, int] = {}
         self.late = 0
         self.loops_at_start = False
         self._order: StartOrder | None = None
@@ -85,6 +87,7 @@ class Simulation(LoadedFmus):
         self.balance = Balance(self.signals)
         self._take_time()
         self.recorders: dict[str, Recorder] = {}
+        self.changing: list[tuple[InputChange, InputSetter]] = []
         self.setters: dict[tuple[str, bool], Set] = {}
 
     def _take_time(self) -> None:
@@ -105,9 +108,11 @@ class Simulation(LoadedFmus):
             hold.push(0, values[hold.places], 0)
         self.meters.start()
         self.balance.start()
+        self.changing.clear()
         for change in self.system.changes:
             if change.fmu:
-                InputSetter(change, self).wait(change.begin)
+                self.changing.append((change, setter := InputSetter(change, self)))
+                setter.wait(change.begin)
         if not self.setters:
             self._bind_setters()
         self._open_recorders()
@@ -144,7 +149,10 @@ class Simulation(LoadedFmus):
             recorded, every = self.signals.recorded(clock.name), self.system.recording.every
             end = time.points(clock) - 1
             values = self.signals.values
-            recorder = self._results.recorder(clock.name, recorded, values, every, end, most)
+            before = self.rows_before.get(clock.name, 0)
+            recorder = self._results.recorder(
+                clock.name, recorded, values, every, end, most, before
+            )
             self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:

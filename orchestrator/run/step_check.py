@@ -4,7 +4,8 @@ run/compiled/step_check.c."""
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,7 @@ them are at rest."""
 
 REGULAR = 1
 """What the library tells of a step that is one of these."""
+_ARRAYS = ("scales", "jumps", "last", "estimates", "times", "weights")
 ROOM = 256
 """Checks for which there is room at first."""
 
@@ -77,6 +79,20 @@ class StepCheck:
         self.estimates = np.concatenate([self.estimates, np.zeros_like(self.estimates)])
         self.times, self.weights = (np.append(v, 0.0 * v) for v in (self.times, self.weights))
         self.take_rows()
+
+    def saved(self) -> dict[str, Any]:
+        """All that its checks have found, and what decides on the next one."""
+        arrays = {name: getattr(self, name).copy() for name in _ARRAYS}
+        numbers = [self.steps.value, self.count.value, self.size.value]
+        return {"arrays": arrays, "numbers": numbers}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from there."""
+        while len(self.times) < len(saved["arrays"]["times"]):
+            self.grow()
+        for name in _ARRAYS:
+            getattr(self, name)[:] = saved["arrays"][name]
+        self.steps.value, self.count.value, self.size.value = saved["numbers"]
 
     def around(self, step: Callable[[], object], time: float, end: float) -> None:
         """Call `step`, which takes an FMU that the loop does not call itself from `time` to `end`

@@ -9,6 +9,7 @@ from typing import Any
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
 from hapticlink.components.specs.device import Handle
+from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.linkage import GraphicsCopy
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
@@ -129,13 +130,16 @@ def _loop(scene: Scene, skip: bool) -> Iterator[BlockPlan]:
 def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
     clutch, partial = bool(scene.linkage and scene.linkage.choices), partial_handles(scene)
     for user, hand in scene.all_hands.items():
+        if driver_of(scene, user):  # somebody's own hand holds the board
+            continue
         settings: dict[str, Any] = {"hand": hand}
         if clutch and not user:
             settings["clutch"] = True
         if user in partial:
             settings["handle"] = partial[user]
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
-    beside = {user: scene.all_devices[user] for user in observed_beside(scene)}
+    devices = {user: replace(d, driver=None) for user, d in scene.all_devices.items()}
+    beside = {user: devices[user] for user in observed_beside(scene)}
     for user, device in beside.items():
         yield BlockPlan(block_of_user(OBSERVER, user), OBSERVER, "haptics", {"device": device})
     for user, controller in scene.all_controllers.items():
@@ -151,7 +155,7 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
         yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
     for user, device in beside.items():
         yield BlockPlan(block_of_user(MOTOR_MAP, user), MOTOR_MAP, "haptics", {"device": device})
-    for user, device in scene.all_devices.items():
+    for user, device in devices.items():
         settings = {"device": device}
         if scene.sensing == "encoders":
             settings["encoders"] = True
@@ -225,6 +229,13 @@ def observed_beside(scene: Scene) -> list[str]:
     """The users whose device has its observer beside it."""
     sensed = scene.all_devices if scene.sensing == "encoders" else {}
     return [user for user, device in sensed.items() if device.observer.beside]
+
+
+def driver_of(scene: Scene, user: str) -> Driver | None:
+    """The board in the place of a user's device, None where that is simulated."""
+    device = scene.all_devices.get(user)
+    driver = device.driver if device else None
+    return driver if driver and driver.active else None
 
 
 def others(scene: Scene) -> bool:

@@ -62,6 +62,8 @@ def document(
     for fmu in tables_of(data, "fmu"):
         if folder and isinstance(fmu.get("path"), str):
             fmu["path"] = str(folder / fmu["path"])
+    if folder and isinstance(data.get("resume"), str):
+        data["resume"] = str(folder / data["resume"])
     for _, table in find_traces(data) if folder else ():
         table["rate"] = {"trace": str(folder / table["rate"]["trace"])}
     if folder:

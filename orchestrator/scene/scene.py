@@ -28,6 +28,7 @@ from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.base.plain_data import Plain, plain
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN, by_user
+from hapticlink.orchestrator.boards import DRIVERS as DRIVERS  # registers the drivers
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
@@ -103,6 +104,9 @@ class Scene:
     """The report's experiment that the scene stands for; the summary lists the differences."""
     duration: Duration
     """Simulated time."""
+    resume: str = ""
+    """State of a run, from which this one goes on, relative to the scene's file: [save, resume,
+    branch](resume.md)."""
     hold: HoldName = "zoh"
     """Hold on connections from a slow rate to a fast one: [holds](holds.md)."""
     downsampling: Annotated[str, HOLDS.names(lambda hold: hold.downsamples)] = "latest"
@@ -254,7 +258,8 @@ class Scene:
     def ends_when(self) -> str:
         """The condition that ends the run, its default included; "" where there is none."""
         if self.stop_when is None:
-            return f"{WORKSPACE_MARGIN} < 0" if self.device else ""
+            simulated = self.device and not (self.device.driver and self.device.driver.active)
+            return f"{WORKSPACE_MARGIN} < 0" if simulated else ""
         return self.stop_when
 
 

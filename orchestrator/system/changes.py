@@ -47,6 +47,17 @@ def settable(system: System, name: str) -> tuple[Scalar, ...]:
     return scalars
 
 
+def why_at_start_alone(system: System, fmu: str, scalar: Scalar) -> str:
+    """Why a start value acts at the start of a run alone, "" for one that can be set later."""
+    if scalar.causality == "parameter" and scalar.variability != "tunable":
+        return "is a fixed parameter, which a start alone sets"
+    if scalar.causality not in ("input", "parameter") or feeding(system, f"{fmu}.{scalar.name}"):
+        return "is a start value, which acts at the start alone"
+    if f"{fmu}.{scalar.port}" in springs.find_limited_gains(system):
+        return "is a gain of a spring whose hold counts its energy"
+    return ""
+
+
 def feeding(system: System, name: str) -> list[Connection]:
     """The connections that feed an input or parameter, `fmu.port`."""
     named = {s.name for s in scalars_of(system.fmu, name, "input", "parameter")}

@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 
+from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
@@ -43,6 +44,8 @@ class Fmu:
     recorded_only: frozenset[str] = frozenset()
     served: ServedAt | None = None
     """Where it runs, if that is on another computer."""
+    driver: Driver | None = None
+    """The board in its place."""
 
     @property
     def sampled(self) -> bool:

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from tests.little_fmus import python_fmu
 from tests.orchestrator.foreign_scenes import scene
@@ -319,3 +321,48 @@ def test_a_gain_of_the_spring_whose_energy_is_limited_is_not_changed() -> None:
     assert not refused
     ran("closed-loop-direct", turn, *ENERGY)
     assert ["whose energy `pspm` limits" in said for said in refused] == [True, True]
+
+
+def due(time: float) -> int:
+    return round(1e9 * time)
+
+
+@pytest.mark.parametrize("speed", [0.25, 1.0, 8.0])
+def test_a_run_takes_its_duration_over_the_speed(bar, tmp_path, speed):
+    clock = WallClock()
+    run = simulate(str(bar), tmp_path, real_time=clock.run(speed=speed)).run
+    assert run["fault"] is None
+    assert clock.time == due(run["end"]["time"] / speed)
+    assert (run["real_time"]["speed"], run["real_time"]["deadlines_missed"]) == (speed, 0)
+    said = summary.deadlines(run["real_time"])
+    assert ("512 Hz in real time" in said) == (speed == 1.0)
+    assert (f"at {speed:g} times real time" in said) == (speed != 1.0)
+
+
+def test_the_speed_changes_from_now_on(bar):
+    changed: list[float] = []
+
+    def slow(live: hl.RealTime) -> None:
+        changed.append(live.time)
+        live.speed = 0.5
+
+    clock = WallClock()
+    run = ran(str(bar), once(0.1, slow), clock=clock)
+    end = run.run["end"]["time"]
+    assert clock.time == pytest.approx(due(changed[0] + (end - changed[0]) / 0.5), abs=1)
+    assert run.run["real_time"]["changes"] == [(changed[0], "speed: 0.5")]
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan"), 1e4, True])
+def test_a_speed_that_is_none(bar, speed):
+    with pytest.raises(InputFault, match=r"speed = .*: give a number"):
+        hl.RealTime(bar, speed=speed)
+
+
+def test_a_speed_needs_real_time_and_no_hardware(bar, tmp_path):
+    with pytest.raises(InputFault, match="add real_time"):
+        hl.run(bar, speed=0.5)
+    python_fmu(tmp_path, "Drives")
+    path = scene(tmp_path, '[[fmu]]\nname = "board"\npath = "Drives.fmu"\nhardware = true\n')
+    found = hl.run(path, real_time=True, speed=0.5)
+    assert "speed = 0.5: board drives hardware, whose time is the clock's: take 1" in found.fault

@@ -42,6 +42,8 @@ NOT_RUN = {
         "many runs; docs/rates.md has a sweep that is run",
     "hapticlink sweep closed-loop-direct --vary graphics.rate=10..60..10 --vary hold=zoh,lead,foh":
         "many runs",
+    "hapticlink sweep first/at-0.1.state --vary hold=zoh,foh":
+        "sweeps are shorter here than its state; tests/orchestrator/run/test_run_state.py",
     "hapticlink stability virtual-wall --set fmu.wall.settings.unilateral=false "
     "--set 'hand.wrench=[0.0, 0.0, 0.0]' --set fmu.wall.settings.damping=1.0 "
     "--vary fmu.wall.start.damping=0.5..60.5:9 --vary fmu.wall.start.stiffness=200..12200:9 "

@@ -142,3 +142,13 @@ int fmi3GetFMUState(Model *m, State **state) {
 }
 int fmi3SetFMUState(Model *m, State *state) { *m = *state; return 0; }
 int fmi3FreeFMUState(Model *m, State **state) { free(*state); *state = NULL; return 0; }
+int fmi3SerializedFMUStateSize(Model *m, State *state, size_t *size) { *size = sizeof *state; return 0; }
+int fmi3SerializeFMUState(Model *m, State *state, uint8_t *bytes, size_t size) {
+    memcpy(bytes, state, size);
+    return 0;
+}
+int fmi3DeserializeFMUState(Model *m, const uint8_t *bytes, size_t size, State **state) {
+    *state = malloc(sizeof(Model));
+    memcpy(*state, bytes, size);
+    return 0;
+}

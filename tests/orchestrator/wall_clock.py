@@ -45,6 +45,6 @@ class WallClock:
     def close(self, seconds: float) -> bool:
         return True
 
-    def run(self, turn: Callable[..., object] | None = None) -> RealTimeRun:
+    def run(self, turn: Callable[..., object] | None = None, speed: float = 1.0) -> RealTimeRun:
         """What a run takes to be paced by this clock."""
-        return RealTimeRun(turn, self, self.wait, lambda clock: self)
+        return RealTimeRun(turn, self, self.wait, lambda clock: self, speed)

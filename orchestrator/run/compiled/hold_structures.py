@@ -219,6 +219,33 @@ class CompiledHold:
         for growing in filter(None, (self.link, self.account)):
             growing.room = self.room
 
+    def counted(self) -> dict[str, Any]:
+        """What it has counted and drawn, which its values do not depend on otherwise: it is no part
+        of the state that a `StateBlock` has."""
+        found: dict[str, Any] = {"room": self.room}
+        found["published"] = [self.c.published, self.c.describes]
+        if link := self.link:
+            found["link"] = [link.sent, link.lost, link.overtaken]
+            found["drawn"] = [*link.generator.state, *link.generator.increment]
+        if self.premises is not None:
+            found["premises"] = self.premises.copy()
+        return found
+
+    def restore_published(self, counted: Mapping[str, Any]) -> None:
+        """Know when the source had its newest sample, as whatever hold takes the place of this."""
+        self.c.published, self.c.describes = counted["published"]
+
+    def restore_counted(self, counted: Mapping[str, Any]) -> None:
+        """Have counted and drawn the same, with room for as many samples."""
+        while self.room < counted["room"]:
+            self.grow()
+        if link := self.link:
+            link.sent, link.lost, link.overtaken = counted["link"]
+            link.generator.state[:] = counted["drawn"][:2]
+            link.generator.increment[:] = counted["drawn"][2:]
+        if self.premises is not None:
+            self.premises[:] = counted["premises"]
+
     def serve(self, code: int) -> None:
         """Do what `push` or `value` in C have returned for. Raises what the hold of a plugin has
         raised."""

@@ -298,6 +298,7 @@ typedef struct {
     int64_t (*clock)(void);
     void (*wait)(int64_t until);
     int64_t origin, most;                 /* when tick 0 is due; lateness that moves it */
+    double speed;                         /* simulated time in a unit of that of the clock */
     int64_t skips;                        /* whether ticks that are past are skipped */
     int64_t reached, due, deadline, begun; /* the last tick that was waited for; of the event */
     int64_t ticks, missed, skipped, moved;
@@ -331,6 +332,7 @@ typedef struct {
 typedef struct {
     Clock *clocks /* [n_clocks] */;
     int64_t n_clocks, end;
+    int64_t halt;                         /* the loop returns before the first event at this tick or later; 0: never */
     int64_t *keys /* [n_kinds * (1 + n_clocks)] */; /* of the kinds */
     int64_t *key /* [1 + n_clocks] */;    /* of the current event */
     Block *kinds /* [n_kinds] */;
@@ -341,6 +343,21 @@ typedef struct {
     Pace *pace;                           /* NULL: as fast as possible */
     At at;
 } Events;
+
+/* Takes a step of `n` instances at once; `taken` says which have taken it: fmus/native/lanes.cpp. */
+typedef void StepOfLanes(void *const *instances, int64_t n, double start, double size, int64_t *taken);
+
+enum { MOST_LANES = 8 };
+
+/* Runs of one plan that go through their events together: lanes.c. Which of them the loop returned for;
+ * codes that others wait to return. */
+typedef struct {
+    int64_t n, lane;
+    Loop **loops /* [n] */;
+    Events **events /* [n] */;
+    void **steps /* [n_fmus] */;          /* a StepOfLanes of each FMU, or NULL */
+    int64_t waiting[8];
+} Lanes;
 
 /* Why the loop returns to Python. */
 enum {
@@ -359,10 +376,26 @@ enum {
     GROW,        /* a hold, a meter or a check has no room left */
     SETTLE,      /* settings wait for a step of the FMU */
     REFUSED,     /* a hold in Python has raised an exception */
+    HALT,        /* the next event is not before tick `halt` */
 };
 
 static inline double tick_time(const Loop *l, int64_t tick) { /* s */
     return (double)tick * l->numerator / l->denominator;
+}
+
+/* When a step begins and ends (s): from part `first` to part `last` of `parts` of a tick each, from 0 on. */
+typedef struct {
+    int64_t first, last, parts;
+    double begin, end;
+} StepTimes;
+
+/* Those of operation STEP at a tick, computed where they are others than those of the step before. */
+static inline void locate_step(const Loop *l, const Op *op, int64_t tick, StepTimes *s) {
+    const int64_t first = tick * op->c + op->b, last = first + op->d;
+    if (first == s->first && last == s->last && op->c == s->parts) return;
+    const double whole = l->denominator * (double)op->c;
+    *s = (StepTimes){first, last, op->c, (double)first * l->numerator / whole,
+                     (double)last * l->numerator / whole};
 }
 
 #ifndef EXPORT
@@ -380,6 +413,7 @@ static inline int fmu_succeeded(int status) {
 
 /* Those that Python calls: library.py. */
 EXPORT int hapticlink_events(Loop *l, Events *e);
+EXPORT int hapticlink_lanes(Lanes *s);
 EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick);
 EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t published, int64_t arrival);
 EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
@@ -400,9 +434,15 @@ int fmu_get(const Fmu *f, int64_t judged, At *at);
 int fmu_set(const Setter *s, const double *board, At *at);
 int fmu_do_step(const Fmu *f, double time, double size);
 int fmu_save(const Fmu *f, void *get_state, void **state);
+void fmu_begin_step(const Fmu *f, double time, double end, double size);
+int fmu_end_step(Fmu *f, int status, int64_t took, At *at);
 int fmu_step(Fmu *f, double time, double end, double size, At *at);
+int fmu_step_with_halves(Fmu *f, double time, double end, double size, int due, At *at);
 int fmu_checked_step(Fmu *f, double time, double end, double size, At *at);
 int push_sample(const Loop *l, Hold *h, int64_t stamp, int64_t arrival);
+int next_event(Loop *l, Events *e);
+void complete_event(Events *e);
+int turn_is_due_by_now(Events *e);
 int further_points(Clock *c); /* of a clock whose rate was changed; 0 for others */
 int meter_sample(Meter *m, const double *board, int64_t stamp);
 int meter_move(Meter *m, const double *board, int64_t tick);

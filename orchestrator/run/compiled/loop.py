@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ctypes
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -23,11 +24,15 @@ from hapticlink.orchestrator.run.concurrent_fmus import Side
 from hapticlink.orchestrator.run.fixed_point import sum_iterations
 from hapticlink.orchestrator.run.instructions import instructions
 from hapticlink.orchestrator.run.pace import Pace
+from hapticlink.orchestrator.run.python_operations import OperationsInPython
 from hapticlink.orchestrator.run.simulation import Simulation
 
 WINDOW = 4096
 """Communication points of a clock that the loop gets at a time."""
 NEVER = 2**62
+Halt = tuple[int, Callable[[], object]]
+_NO_HALT: Halt = (0, lambda: None)
+NO_HALTS: Iterator[Halt] = iter(())
 
 
 class Events:
@@ -72,20 +77,66 @@ class Events:
         events: int = self._c.events
         return events
 
-    def run(self, turn: Callable[[int], object]) -> None:
-        """Run all events; `turn` is called from time to time, and at the end, with the tick."""
+    def run(self, turn: Callable[[int], object], halts: Iterator[Halt] = NO_HALTS) -> None:
+        """Run all events; `turn` is called from time to time, and at the end, with the tick; what
+        belongs to each of `halts`, in the order of their ticks, before the first event then or
+        later."""
         c, machine = self._c, self._machine
         loop, here = ctypes.addressof(machine.loop), ctypes.addressof(c)
+        c.halt, halted = next(halts, _NO_HALT)
         while code := machine.code(c.at, machine.library.events, loop, here):
-            if code == structures.KIND:
-                self._new_kind()
-            elif code == structures.STARTS:
-                self._next_window(c.at.what)
-            elif code == structures.PAUSE:
+            if code == structures.PAUSE:
                 turn(c.tick)
+            elif code == structures.HALT:
+                halted()
+                c.halt, halted = next(halts, _NO_HALT)
             else:
-                machine.serve(code, c.at, c.tick)
+                self.serve(code)
         turn(c.tick)
+
+    def serve(self, code: int) -> None:
+        """Do what the loop returned for, so that it can go on."""
+        if code == structures.KIND:
+            self._new_kind()
+        elif code == structures.STARTS:
+            self._next_window(self._c.at.what)
+        else:
+            self._machine.serve(code, self._c.at, self._c.tick)
+
+    @property
+    def c(self) -> structures.Events:
+        """The structure that the loop works on."""
+        return self._c
+
+    def has_kinds_of(self, other: Events) -> bool:
+        """Whether kinds of events, and their operations, have the same numbers."""
+        return [*self._kinds.items()] == [*other._kinds.items()]
+
+    @property
+    def next(self) -> int:
+        """The tick of the next event, between two."""
+        return min(starts[given + c.at] for starts, given, c in self._positions())
+
+    def _positions(self) -> Iterator[tuple[Sequence[int], int, Any]]:
+        return zip(self._starts, self._given, self._clocks, strict=True)
+
+    def saved(self) -> dict[str, Any]:
+        """Where the clocks stand between two events: the number, and the tick, of the next
+        communication point of each, and the tick of its newest event."""
+        clocks = zip(self._timeline.clocks, self._positions(), strict=True)
+        stand = {
+            clock.name: [given + c.at, starts[given + c.at], c.last]
+            for clock, (starts, given, c) in clocks
+        }
+        return {"tick": self._c.tick, "events": self._c.events, "clocks": stand}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Stand where the clocks stood, of which each has the same communication points."""
+        self._c.tick, self._c.events = saved["tick"], saved["events"]
+        for i, clock in enumerate(self._timeline.clocks):
+            self._given[i], _, last = saved["clocks"][clock.name]
+            self._clocks[i].fill(at=0, last=last)
+            self._next_window(i)
 
     def previous(self, clock: str) -> int:
         """The communication point (ticks) at which the newest sample of a clock is."""
@@ -172,17 +223,32 @@ class CompiledLoop:
         self._take(plan)
         self.events.prepare(self.events.coming())
 
+    def goes_with(self, other: CompiledLoop) -> bool:
+        """Whether both have the same operations, under the same numbers."""
+        mine, its = self._machine, other._machine
+        return mine.has_operations_of(its) and self.events.has_kinds_of(other.events)
+
+    @property
+    def structure(self) -> structures.Loop:
+        """What the compiled loop works on."""
+        return self._machine.loop
+
+    @property
+    def fmus(self) -> list[str]:
+        """The FMUs that operations refer to, by number."""
+        return self._machine.names("fmu")
+
     def begin_again(self) -> None:
         """Stand at the first event, with the kinds of events that are known."""
         self._machine.begin_again()
         self.events = self.events.again()
 
-    def run(self, turn: Callable[[int], object]) -> None:
-        """Run all events; `turn` is called from time to time, and at the end, with the tick."""
+    def run(self, turn: Callable[[int], object], halts: Iterator[Halt] = NO_HALTS) -> None:
+        """As `Events.run`."""
         watch = self._machine.library.watch
         try:
             watch(True)
-            self.events.run(turn)
+            self.events.run(turn, halts)
         finally:
             watch(False)
             self.complete = self.events.complete
@@ -195,6 +261,10 @@ class CompiledLoop:
         if self.complete not in self._delays:
             self._delays = {self.complete: delays(self._plan, self.complete)}
         return self._delays[self.complete]
+
+    @property
+    def operations(self) -> OperationsInPython:
+        return self._machine.operations
 
     def iterations(self) -> Iterations | None:
         """The counts of all fixed-point iterations together; None where there is none."""

@@ -69,8 +69,8 @@ class Machine:
 
     def change_hold(self, name: str, hold: CompiledHold, stamp: int) -> None:
         """Replace the hold of a connection; it begins with the newest sample, of tick `stamp`."""
+        index, loop = self._hold(name), ctypes.addressof(self.loop)
         self._simulation.holds[name] = hold
-        index, loop = self._index("hold", name, lambda index: hold), ctypes.addressof(self.loop)
         while code := self.library.change_hold(loop, index, hold.address, stamp):
             hold.serve(code)
 
@@ -84,6 +84,10 @@ class Machine:
         """The number of entries of each array, by the names that loop.h uses."""
         of_objects = {f"n_{kind}s": len(indices) for kind, indices in self._indices.items()}
         return {**of_objects, "n_ops": len(self._instructions), "n_points": len(self._points)}
+
+    def has_operations_of(self, other: Machine) -> bool:
+        """Whether the operations are those of another simulation, and the numbers of objects."""
+        return self._indices == other._indices and self._instructions == other._instructions
 
     # --- records --------------------------------------------------------------------------
 

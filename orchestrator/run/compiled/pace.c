@@ -13,7 +13,7 @@ static int64_t bin(int64_t ns) {
 }
 
 static int64_t due(const Loop *l, const Pace *p, int64_t tick) {
-    return p->origin + (int64_t)(1e9 * tick_time(l, tick));
+    return p->origin + (int64_t)(1e9 * tick_time(l, tick) / p->speed);
 }
 
 /* Waits until a tick is due; PAUSE where Python is to have its turn first. */

@@ -24,17 +24,18 @@ LEAST = 1e-6
 
 
 class Balance:
-    """Energy balance of the mechanism, checked where only wrenches put energy into it."""
+    """Energy balance of the mechanism, checked where only wrenches put energy into it. begun: its
+    energy at t = 0 (J)."""
 
     def __init__(self, signals: SignalVector) -> None:
         self._system, self._values = signals.system, signals.values
         mechanism = self._system.fmu.get(MECHANISM)
         known = mechanism and any(s.name == "energy" for s in mechanism.description.outputs)
         self._place = signals.scalar(MECHANISM, "energy") if known else None
-        self._start = 0.0
+        self.begun = 0.0
 
     def start(self) -> None:
-        self._start = self._energy()
+        self.begun = self._energy()
 
     def _energy(self) -> float:
         return 0.0 if self._place is None else float(self._values[self._place])
@@ -46,8 +47,8 @@ class Balance:
         if self._place is None or in_play is None:
             return None
         work = [e.held for n, e in booked.items() if self._system.connection[n].target == MECHANISM]
-        gained = self._energy() - self._start - sum(work)
-        scale = abs(self._start) + sum(map(abs, work)) + in_play + LEAST
+        gained = self._energy() - self.begun - sum(work)
+        scale = abs(self.begun) + sum(map(abs, work)) + in_play + LEAST
         if gained <= scale:
             return None
         what = f"has {gained:.3g} J more than it had at the start and was given: the run has"
@@ -58,7 +59,7 @@ class Balance:
         """A message if sampling and holding have generated more energy than hands and mechanism put
         in, else ""."""
         generated, by_hands = sum_energies(self._system, booked)
-        put_in = by_hands + max(self._start - self._energy(), 0.0)
+        put_in = by_hands + max(self.begun - self._energy(), 0.0)
         if self._system.energy.driven or generated <= put_in + LEAST:
             return ""
         generation = f"sampling and holding generated {generated:.3g} J, where "

@@ -4,8 +4,8 @@ measured, and how, is told in run/compiled/meters.c."""
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
-from typing import TypeVar
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ Rows = TypeVar("Rows", NDArray[np.float64], NDArray[np.int64])
 ROWS = 1024
 """Rows of the target's steps that are kept before they are added to the sums."""
 Mark = tuple[int, int, int]
+_ROWS = ("stamps", "samples", "ticks", "moves", "efforts")
 
 
 class Meter:
@@ -49,7 +50,7 @@ class Meter:
 
     def take_rows(self) -> None:
         """Tell the loop where the rows are, and how many there can be."""
-        self.c.fill(self, "stamps", "samples", "ticks", "moves", "efforts")
+        self.c.fill(self, *_ROWS)
         self.c.fill(room=len(self.stamps), rows=len(self.ticks))
 
     def start(self, values: Vector) -> None:
@@ -77,6 +78,20 @@ class Meter:
     def rollback(self, mark: Mark) -> None:
         """Remove what was recorded since the checkpoint `mark`."""
         self.counts[:] = np.minimum(self.counts, mark)
+
+    def saved(self) -> dict[str, Any]:
+        """All that it has counted and not added up yet."""
+        arrays = {name: getattr(self, name).copy() for name in ("counts", "totals", *_ROWS)}
+        return {"arrays": arrays, "full": self.c.full, "least": self.c.least}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from there."""
+        arrays = saved["arrays"]
+        self.counts[:], self.totals[:] = arrays["counts"], arrays["totals"]
+        for name in _ROWS:
+            setattr(self, name, arrays[name].copy())
+        self.take_rows()
+        self.c.fill(full=saved["full"], least=saved["least"])
 
     def energy(self, seconds: float) -> Energy:
         """The energies until now; `seconds` is the length of a tick (s)."""

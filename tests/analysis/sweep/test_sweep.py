@@ -180,8 +180,8 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of rows, not of processes, each of which would import everything again."""
 
-    def one_by_one(work: pool.Work, jobs: Sequence[Job], count: int) -> Iterator[pool.Done]:
-        return ((job, work(job)) for job in jobs)
+    def one_by_one(work: pool.Work, batches: Sequence[pool.Batch], n: int) -> Iterator[pool.Done]:
+        return (done for batch in batches for done in zip(batch, work(batch), strict=True))
 
     monkeypatch.setattr(pool, "in_processes", one_by_one)
 
