@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6979,
+    "components": 7038,
     "fmus": 2987,
-    "orchestrator": 15762,
+    "orchestrator": 15763,
     "programs": 1023,
-    "analysis": 7951,
+    "analysis": 7938,
     "visualization": 3434,
     "api": 488,
     "commands": 1520,

@@ -22,7 +22,13 @@ from hapticlink.components.ports import Kind
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
+from hapticlink.components.specs.hand import (
+    ArmHand,
+    ConstantHand,
+    FingertipHand,
+    ProfileHand,
+    SpringHand,
+)
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.errors import Finding
@@ -83,7 +89,8 @@ Hand = Annotated[
     Annotated[ConstantHand, Tag("constant")]
     | Annotated[ProfileHand, Tag("profile")]
     | Annotated[ArmHand, Tag("arm")]
-    | Annotated[SpringHand, Tag("spring")],
+    | Annotated[SpringHand, Tag("spring")]
+    | Annotated[FingertipHand, Tag("fingertip")],
     Discriminator(_hand_type),
 ]
 
@@ -167,7 +174,7 @@ class Scene:
     directions: Directions = field(default_factory=Directions)
     """Detection of constrained directions, in which the loop closures allow no motion."""
     device: Device | None = None
-    """The twin pantograph, the block `haptic_device`: [device](device.md)."""
+    """The block `haptic_device`: [device](device.md)."""
     controller: Controller | None = None
     """The block `controller`."""
     hand: Hand | None = None
