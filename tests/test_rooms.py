@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7038,
+    "components": 7042,
     "fmus": 2987,
-    "orchestrator": 15763,
+    "orchestrator": 15783,
     "programs": 1023,
-    "analysis": 7938,
-    "visualization": 3434,
+    "analysis": 7947,
+    "visualization": 3437,
     "api": 488,
     "commands": 1520,
 }

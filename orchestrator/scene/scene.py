@@ -12,7 +12,7 @@ further point NAME, blocks `hand_NAME`, `haptic_device_NAME` and `controller_NAM
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Annotated, Any, Literal
 
@@ -243,9 +243,17 @@ class Scene:
     def all_controllers(self) -> dict[str, Controller]:
         """The controllers of `all_devices`, by user."""
         own = self.controller or Controller()
-        return by_user(
+        written = by_user(
             self.controller, {name: self.controllers.get(name, own) for name in self.devices}
         )
+        return {user: self._with_bias(user, controller) for user, controller in written.items()}
+
+    def _with_bias(self, user: str, controller: Controller) -> Controller:
+        """The controller with its default bias, which follows from the device's mass."""
+        device = self.all_devices.get(user)
+        if controller.bias or not (device and device.is_light and controller.impedance):
+            return controller
+        return replace(controller, bias="full")
 
     @property
     def named_holds(self) -> dict[str, str]:
