@@ -68,7 +68,8 @@ def scaled(name: str, factor: float) -> Options:
 def check(name: str, found: Stability, factor: float) -> Check:
     """The verdict with gains of factor times the margin that was found, and its run."""
     assert found.margin.stiffness
-    pose, times = found.poses[0], factor * found.margin.stiffness
+    pose = next(pose for pose in found.poses if pose.name == found.worst.pose)
+    times = factor * found.margin.stiffness
     with resting(hl.scene(SCENE, options(name)), pose.held, joints=pose.joints) as place:
         scales = dict.fromkeys(Gains(place.map.system).laws, times)
         cases = InHands(place, scales).cases(pose.name, dict(HANDS), DRIFT)
