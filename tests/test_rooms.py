@@ -38,6 +38,12 @@ CODE_LINES = {
     "visualization": 3505,
     "api": 591,
     "commands": 1599,
+=======
+    "analysis": 7947,
+    "visualization": 3437,
+    "api": 488,
+    "commands": 1520,
+>>>>>>> dev45
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.orchestrator.base.signal_names import MECHANISM, MOBILITIES
+from hapticlink.orchestrator.base.signal_names import CONTROLLER, MECHANISM, MOBILITIES
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.run_record import RunRecord
@@ -41,6 +41,10 @@ def describe_computing_times(record: RunRecord) -> Iterator[str]:
             )
 
 
+COMPENSATION = f"{MECHANISM}.a_bias -> {CONTROLLER}.a_bias"
+"""The connection by which velocity terms are compensated."""
+
+
 def describe_premises(results: Results) -> Iterator[str]:
     """A line for each setting of a run with early steps in which its hold gains less."""
     record = results.record
@@ -54,7 +58,7 @@ def describe_premises(results: Results) -> Iterator[str]:
             f"{less} with encoders the observer's estimate of the hand's wrench decides"
             f"{better if observer.get('law') == 'nicosia' else ''}"
         )
-    if (scene["controller"] or {}).get("bias") == "none":
+    if scene["controller"] and COMPENSATION not in record.connections:
         yield (
             f"{less} without Coriolis and centrifugal compensation the handle moves otherwise "
             "than the mechanism, whatever is held: take controller.bias = 'full'"

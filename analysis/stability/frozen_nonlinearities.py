@@ -24,6 +24,7 @@ TAKEN_OUT, AS_AT_REST = "taken out", "as at the equilibrium"
 """What becomes of a nonlinearity, at the end of its line."""
 DISCRETE = {
     ("fmu", "n_constrained"),
+    ("fmu", "turns"),
     ("fmu", "deflection"),
     ("fmu", "contact_deflection"),
     ("hold", "beta"),
