@@ -16,6 +16,9 @@ STIFF = 1.5
 """k lambda H^2 of a hand of stiffness k on the mobility lambda, with frames of H, from which on
 firmer gains than soft ones seldom keep the limits (results/model)."""
 
+COMPENSATION = f"{MECHANISM}.a_bias -> {CONTROLLER}.a_bias"
+"""The connection by which velocity terms are compensated."""
+
 
 def describe_computing_times(record: RunRecord) -> Iterator[str]:
     """A line for each FMU of a run in real time whose early step took longer, in the mean, than its
@@ -39,10 +42,6 @@ def describe_computing_times(record: RunRecord) -> Iterator[str]:
                 f"warning: a step of {fmu} took {short(1e3 * took)} ms in the mean, and its result "
                 f"counts as there {counts}: take {remedy}"
             )
-
-
-COMPENSATION = f"{MECHANISM}.a_bias -> {CONTROLLER}.a_bias"
-"""The connection by which velocity terms are compensated."""
 
 
 def describe_premises(results: Results) -> Iterator[str]:
