@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6143,
+    "components": 6500,
     "fmus": 2822,
-    "orchestrator": 13652,
+    "orchestrator": 13740,
     "programs": 1021,
-    "analysis": 7790,
-    "visualization": 3417,
+    "analysis": 7792,
+    "visualization": 3442,
     "api": 467,
-    "commands": 1459,
+    "commands": 1460,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
