@@ -30,7 +30,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6500,
+    "components": 6510,
     "fmus": 2822,
     "orchestrator": 13740,
     "programs": 1021,

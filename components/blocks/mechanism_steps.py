@@ -22,7 +22,11 @@ from hapticlink.components.dynamics.closed_loop_solver import (
 )
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.projection import projection
-from hapticlink.components.dynamics.redundant_closures import is_overconstrained, nearest_closed
+from hapticlink.components.dynamics.redundant_closures import (
+    is_overconstrained,
+    least_pivot,
+    nearest_closed,
+)
 from hapticlink.components.forces import friction, gravity
 from hapticlink.components.integrators.base import Integrator, MechanicalSystem
 from hapticlink.components.linkage.model import same_point
@@ -229,7 +233,8 @@ class MechanismSteps(MechanicalSystem):
         inertia: Inertia = tree
         if softened:
             inertia = MatrixInertia(model.D + A, tree.k, model.leaf_to_root, tree.d)
-        solver = ClosedLoopSolver(inertia, model.W, model.rows)
+        pivot = least_pivot(model.linkage)
+        solver = ClosedLoopSolver(inertia, model.W, model.rows, pivot=pivot)
         a = solver.follow(model.momentum(V) + b, -model.W @ s)
         solved = ca.Function("solved", [model.q, V, b, A, s, self.p], [a], _ONCE)
         if self._nearest is None:

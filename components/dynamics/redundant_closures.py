@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.components.component import Signals
-from hapticlink.components.dynamics.closed_loop_solver import UnitInertia
+from hapticlink.components.dynamics.closed_loop_solver import PIVOT, UnitInertia
 from hapticlink.components.dynamics.projection import projection
 from hapticlink.components.linkage.closures import gear_parameters
 from hapticlink.components.linkage.model import LinkageModel
@@ -26,6 +26,8 @@ RANK = 1e-7
 """Singular values, relative to the largest, that count as 0."""
 AWAY, POSES = 0.1, 3
 """By how much (rad, m) coordinates are moved from the start to further poses, and how many."""
+DEPENDENT = 1e-12
+"""Pivots, as PIVOT of closed_loop_solver.py, of rows that depend on others."""
 STEPS, CLOSED = 50, 1e-12
 """Steps to close the loops, and the gap (m) at which they are."""
 
@@ -37,6 +39,12 @@ def nearest_closed(model: LinkageModel) -> ca.Function:
     q, p = model.q, model.p.vector
     closed, _ = projection(model, UnitInertia(q.numel()))(q, model.q * 0, p)
     return ca.Function("closed", [q, p], [closed], {"cse": True})
+
+
+def least_pivot(linkage: Linkage) -> float:
+    """The floor of the pivots of W D^-1 W', relative to the mean of its diagonal over the rows of a
+    closure: above rounding by as much as elimination adds where rows are always redundant."""
+    return DEPENDENT if is_overconstrained(linkage) else PIVOT
 
 
 def is_overconstrained(linkage: Linkage) -> bool:
