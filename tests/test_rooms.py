@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6510,
+    "components": 6523,
     "fmus": 2822,
-    "orchestrator": 13740,
+    "orchestrator": 13750,
     "programs": 1021,
-    "analysis": 7792,
+    "analysis": 7800,
     "visualization": 3442,
     "api": 467,
     "commands": 1460,

@@ -109,10 +109,13 @@ def _controller(
     return block.controller(controller, linkage.space, length, clutch=clutch)
 
 
-def _hand(hand: Hand, clutch: bool = False) -> Component:
+def _hand(
+    hand: Hand, clutch: bool = False, space: Literal["plane", "point"] = "plane"
+) -> Component:
     from hapticlink.components.blocks import hand as block
+    from hapticlink.components.port_space import PLANE, POINT
 
-    return block.hand(hand, clutch=clutch)
+    return block.hand(hand, PLANE if space == "plane" else POINT, clutch=clutch)
 
 
 def _discrete_equivalent(rule: str) -> Component:

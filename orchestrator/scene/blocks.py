@@ -131,6 +131,8 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
         settings: dict[str, Any] = {"hand": hand}
         if clutch and not user:
             settings["clutch"] = True
+        if scene.linkage and scene.linkage.dimension > 2:
+            settings["space"] = "point"
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
     beside = {user: scene.all_devices[user] for user in observed_beside(scene)}
     for user, device in beside.items():

@@ -7,6 +7,7 @@ from typing import get_args
 
 import numpy as np
 
+from hapticlink.components.specs.hand import ArmHand
 from hapticlink.components.specs.joint_types import JOINT_TYPES, CutType, TreeType
 from hapticlink.components.specs.linkage import Joint, Linkage, Loop
 from hapticlink.orchestrator.scene.scene import Scene
@@ -14,6 +15,8 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 PARALLEL = 1e-9
 """Sine of the angle between two axes below which they are one."""
+_ARM = ArmHand(target=())
+_OF_ARM = ("mass", "stiffness", "damping", "grip_stiffness", "grip_damping")
 ON_JOINTS = ("stiffness", "rest", "damping", "friction", "limits", "drive")
 """Keys that act on the coordinate of a joint."""
 TURNED_ROUND = 1e-9
@@ -96,10 +99,16 @@ def _inertia(path: Path, moments: tuple[float, ...]) -> Iterator[Problem]:
 
 def _of_the_plane(scene: Scene, linkage: Linkage) -> Iterator[Problem]:
     """What a scene with a linkage in space cannot have yet."""
-    for key in ("device", "devices", "hand", "hands", "controller", "controllers"):
+    for key in ("device", "devices", "controller", "controllers"):
         if getattr(scene, key):
-            text = "holds a planar linkage: the mechanism of a linkage in space runs without it"
+            text = "renders a planar linkage: one in space runs with hands alone, take it out"
             yield (key,), text
+    for user, hand in scene.all_hands.items():
+        here: Path = ("hands", user) if user else ("hand",)
+        for key in _OF_ARM if isinstance(hand, ArmHand) else ():
+            if getattr(hand, key) == getattr(_ARM, key):
+                text = "the default is of the plane, with a moment: give three numbers for x, y, z"
+                yield (*here, key), text
     if scene.contacts:
         yield ("contacts",), "are of the plane: a linkage in space has none, take them out"
     if scene.local_model:

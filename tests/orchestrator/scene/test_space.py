@@ -59,9 +59,9 @@ REFUSED = [
     (CUT % ", type = 'prismatic', angle = 0.1", "in space the frames become parallel"),
     ("linkage.body.bar.inertia=[0.1, 0.02, 0.02]", "no body has the principal moments 0.02, 0.02,"),
     ("linkage.body.bar.radius=0.1", "is a shape of the plane, and in space nothing touches"),
-    ("hand={ wrench = [1, 0, 0] }", "hand: holds a planar linkage"),
-    ("controller={}", "controller: holds a planar linkage"),
-    ("device={}", "device: holds a planar linkage"),
+    ("hand={ type = 'arm', target = [[0, 0, 0, 0]] }", "hand.mass: the default is of the plane"),
+    ("controller={}", "controller: renders a planar linkage"),
+    ("device={}", "device: renders a planar linkage"),
     ("contacts={ stiffness = 1e3 }", "are of the plane: a linkage in space has none, take them"),
     ("local_model=true", "local_model: is of the plane: leave it out"),
 ]
