@@ -30,8 +30,8 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6523,
-    "fmus": 2822,
+    "components": 6525,
+    "fmus": 2824,
     "orchestrator": 13750,
     "programs": 1021,
     "analysis": 7800,

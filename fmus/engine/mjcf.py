@@ -125,6 +125,8 @@ def _names(joint: Joint) -> list[str]:
 def _misfits(linkage: Linkage) -> Iterator[str]:
     """What this model does not hold, each with the remedy."""
     ours = "leave the block to hapticlink"
+    if linkage.dimension > 2:
+        yield f"a linkage in space is not passed on: {ours}"
     if linkage.driven:
         yield f"drives of joints are not passed on: {ours}"
     if linkage.force:

@@ -12,11 +12,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
-from hapticlink.components.dynamics.assembly import start_coordinates
+from hapticlink.components.dynamics.assembly import AssemblyError, start_coordinates
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.linkage.rotations import X_AXIS, Y_AXIS, Z_AXIS, unit
 from hapticlink.components.specs.joint_types import JOINT_TYPES
-from hapticlink.components.specs.linkage import Body, Joint, Linkage, Mechanism, OperationalPoint
+from hapticlink.components.specs.linkage import (
+    Body,
+    Joint,
+    Linkage,
+    Loop,
+    Mechanism,
+    OperationalPoint,
+)
 from tests.mechanisms import evaluated
 from tests.spatial_linkages import bennett, bricard, rssr, sarrus, top
 
@@ -288,6 +295,22 @@ def test_a_passive_method_makes_no_energy_in_space(axis):
     found, _ = run(linkage, 200, 0.016, "passive-midpoint")
     assert np.diff(found["energy"]).max() < 1e-12
     assert found["stops"].max() == 0
+
+
+def test_a_loop_that_nothing_can_close_is_refused():
+    """A planar four-bar whose cut is 1 mm off the plane, where no coordinate moves it."""
+    linkage = bennett()
+    flat = {"axis": Z_AXIS, "at_parent": (0.3, 0.0, 0.0)}
+    joints = [replace(j, **(flat if i else {"axis": Z_AXIS})) for i, j in enumerate(linkage.joint)]
+    cut = Loop(bodies=("rod2", "ground"), at=((0.3, 0.0, 0.001), (0.4, 0.0, 0.0)), name="cut")
+    start = {"joint0": 1.2, "joint1": -1.2, "joint2": -1.2}
+    planar = replace(linkage, joint=tuple(joints), loop=(cut,), start=start)
+    with pytest.raises(AssemblyError) as refused:
+        virtual_mechanism(planar, Mechanism())
+    said = (
+        "loop `cut` (rod2 to ground) can never close: no coordinate moves 3 of its rows, and 0.001"
+    )
+    assert said in str(refused.value)
 
 
 FALLING = replace(bennett(), gravity=(0.0, -9.81, 0.0))
