@@ -167,3 +167,38 @@ def top(**changes):
         start_velocity={"ball": spin},
     )
     return replace(linkage, **changes)
+
+
+DELTA = {"base": 0.06, "platform": 0.03, "arm": 0.1, "rod": 0.22, "mass": 0.2, "inertia": 4e-4}
+"""Radii of the pivots and of the platform's joints, lengths (m), mass of the platform (kg), and
+inertia of an arm about its pivot (kg.m2)."""
+
+
+def delta():
+    """Three arms on the ground and a platform that does not turn, coupled by rods without mass:
+    of a delta each pair of rods keeps the platform's directions, and is one rod here."""
+    bodies = [Body(name="platform", mass=DELTA["mass"], inertia=1e-4)]
+    bodies += [Body(name=n, mass=0.0, inertia=1e-4) for n in ("x", "xy")]
+    slides = [("x", "ground", "x", X), ("y", "x", "xy", Y), ("z", "xy", "platform", Z)]
+    joints = [
+        Joint(name=name, type="prismatic", parent=parent, child=child, axis=axis)
+        for name, parent, child, axis in slides
+    ]
+    loops = []
+    for k in range(3):
+        out = np.array([math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0.0])
+        axis, arm = np.cross(out, Z), tuple((DELTA["arm"] * out).tolist())
+        bodies.append(Body(name=f"arm{k}", mass=0.0, inertia=DELTA["inertia"]))
+        pivot = tuple((DELTA["base"] * out).tolist())
+        joints.append(
+            Joint(name=f"arm{k}", child=f"arm{k}", at_parent=pivot, axis=tuple(axis.tolist()))
+        )
+        at = tuple((DELTA["platform"] * out).tolist())
+        ends = {"bodies": (f"arm{k}", "platform"), "at": (arm, at)}
+        loops.append(Loop(type="rod", **ends, length=DELTA["rod"]))
+    return Linkage(
+        body=tuple(bodies),
+        joint=tuple(joints),
+        loop=tuple(loops),
+        operational_point=OperationalPoint(body="platform"),
+    )

@@ -24,8 +24,9 @@ from hapticlink.components.specs.linkage import (
     Mechanism,
     OperationalPoint,
 )
+from tests.components.linkage.test_lifted import accelerations
 from tests.mechanisms import evaluated
-from tests.spatial_linkages import bennett, bricard, rssr, sarrus, top
+from tests.spatial_linkages import DELTA, bennett, bricard, delta, rssr, sarrus, top
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -247,16 +248,16 @@ def run(linkage, steps, h, integrator="rk4"):
 def test_bricard_of_the_library_of_benchmarks():
     """IFToMM benchmark A04 at 1 kHz: P3 after 10 s as by a method of order 5 with error control on
     Pinocchio's terms, the period, energy and gap."""
-    found, _ = run(bricard(), 10000, 1e-3)
+    found, states = run(bricard(), 10000, 1e-3)
     P3 = [found[f"x[{i}]"][-1] for i in (1, 2, 3)]
     np.testing.assert_allclose(P3, [0.999730987, -0.999999964, -0.000268976], rtol=0, atol=1e-9)
     assert np.ptp(found["energy"]) < 1e-10
     assert found["closure_error"].max() < 1e-14
-
-
-def quarters(lean):
-    """Of a turn of the top about the vertical, by its angle from the x axis."""
-    return np.unwrap(np.arctan2(lean[:, 1], lean[:, 0]))
+    rates = states[4980:5004, 5]  # at rest again after a period, by a polynomial of degree 5
+    times = np.arange(4980, 5004) * 1e-3 - 4.99
+    roots = np.roots(np.polyfit(times, rates, 5))
+    period = 4.99 + min(roots[np.isreal(roots)].real, key=abs)
+    assert period == pytest.approx(4.991712, abs=1e-6)
 
 
 @pytest.mark.parametrize(("h", "error"), [(4e-3, 2e-4), (2e-3, 1.3e-5)])
@@ -354,3 +355,38 @@ def test_a_top_against_its_equations_in_quaternions():
     found, _ = run(linkage, 1000, 1e-3)
     x = [found[f"x[{i}]"][-1] for i in (1, 2, 3)]
     np.testing.assert_allclose(x, wanted, rtol=0, atol=1e-7)
+
+
+def pose_of_delta(place):
+    """Coordinates of a delta at a place of its platform, arms below their pivots, and its inertia
+    there, of platform and arms behind rods without mass."""
+    angles, inertia = [], DELTA["mass"] * np.eye(3)
+    for k in range(3):
+        out = np.array([math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0.0])
+        to = place + (DELTA["platform"] - DELTA["base"]) * out  # from the pivot
+        r, low = to @ out, -to[2]
+        size = to @ to + DELTA["arm"] ** 2 - DELTA["rod"] ** 2
+        # |to - arm (cos out - sin z)| = rod, with the elbow outward
+        reach = math.acos(size / (2 * DELTA["arm"] * math.hypot(r, low)))
+        angles.append(math.atan2(low, r) - reach)
+        arm = np.array([0, 0, -math.sin(angles[-1])]) + math.cos(angles[-1]) * out
+        turned = np.array([0, 0, -math.cos(angles[-1])]) - math.sin(angles[-1]) * out
+        rod = to - DELTA["arm"] * arm
+        rate = rod / (DELTA["arm"] * (rod @ turned))
+        inertia += DELTA["inertia"] * np.outer(rate, rate)
+    return np.array([*place, *(-angle for angle in angles)]), inertia
+
+
+def test_inertia_of_a_delta_with_rods():
+    """By closures of rods, over its workspace, against the closed form."""
+    linkage = delta()
+    of = evaluated(linkage, lambda m: [OperationalSpace(m).Lambda_inv, m.h])
+    draw = np.random.default_rng(0)
+    for _ in range(50):
+        place = np.array([*draw.uniform(-0.05, 0.05, 2), draw.uniform(-0.24, -0.17)])
+        q, inertia = pose_of_delta(place)
+        found, h = of(q, np.zeros(6))
+        assert np.abs(h).max() < 1e-15
+        np.testing.assert_allclose(np.linalg.inv(found), inertia, rtol=0, atol=1e-12)
+    (qdd, _), _ = accelerations(linkage)
+    assert qdd.n_instructions() <= 800
