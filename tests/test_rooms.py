@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7044,
-    "fmus": 2989,
-    "orchestrator": 16084,
+    "components": 7434,
+    "fmus": 2991,
+    "orchestrator": 16182,
     "programs": 1023,
-    "analysis": 8827,
-    "visualization": 3508,
+    "analysis": 8837,
+    "visualization": 3533,
     "api": 591,
-    "commands": 1599,
+    "commands": 1600,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -92,14 +92,17 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     # an SSP has the block, but not its description
     linkage, devices = scene_part(results, "linkage", Linkage), described_devices(results)
     size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
-    if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
+    planar = linkage and linkage.dimension == 2
+    if linkage and planar and (table := of_block(results, JOINT_COORDINATES, size)):
         q = table[JOINT_COORDINATES]
         finite = np.flatnonzero(np.isfinite(q).all(axis=1))
         if len(finite) and of_port(results, POINT_POSE):
             ends = q[finite[[0, -1]]]
             drawn_by["mechanism"] = partial(_mechanism, results, linkage, ends, port)
     if of_port(results, POINT_POSE):
-        if "mechanism" not in drawn_by:
+        if linkage and not planar:
+            drawn_by["trajectories"] = partial(_places_in_time, results, linkage)
+        elif "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
         if of_port(results, find_handle(results)):
             drawn_by["distance"] = partial(_distance, results)
@@ -263,6 +266,21 @@ def _trajectories(results: Results) -> Figure:
     if contacts := scene_part(results, "contacts", Contacts):
         drawing.paint(axes, marks.obstacles(contacts), marks.STILL)
     axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(fontsize="small")
+    return figure
+
+
+def _places_in_time(results: Results, linkage: Linkage) -> Figure:
+    """The operational point in space."""
+    table = of_port(results, POINT_POSE)
+    assert table is not None
+    path = table[POINT_POSE] * 1e3
+    reach = short(float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0)))
+    title = f"The operational point moves up to {reach} mm from its start"
+    figure, axes = titled_axes(results, title, "time (s)", "place (mm)")
+    time, drawn = curve(table["time"], path)
+    for name, column, style in zip(linkage.space.names, drawn.T, cycle(STYLES)):
+        axes.plot(time, column, style, label=name)
     axes.legend(fontsize="small")
     return figure
 
