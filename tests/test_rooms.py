@@ -30,9 +30,9 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6534,
+    "components": 6546,
     "fmus": 2824,
-    "orchestrator": 13750,
+    "orchestrator": 13751,
     "programs": 1021,
     "analysis": 7800,
     "visualization": 3507,
