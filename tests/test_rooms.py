@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6546,
+    "components": 6548,
     "fmus": 2824,
     "orchestrator": 13751,
     "programs": 1021,
     "analysis": 7800,
-    "visualization": 3507,
+    "visualization": 3508,
     "api": 467,
     "commands": 1460,
 }

@@ -8,7 +8,7 @@ FMU. SI units throughout.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -303,8 +303,10 @@ class Linkage:
         for j in self._joints:
             if not j.kind.in_plane:
                 return f"a {j.type} joint"
-        held = (self.operational_point, *self.points.values(), *self.point)
-        vectors = {
+        points = [*self.points.values(), *self.point]
+        if not isinstance(self.operational_point, str):
+            points.append(self.operational_point)
+        vectors: dict[str, Iterable[object]] = {
             "at_parent": (j.at_parent for j in self.joint),
             "at_child": (j.at_child for j in self.joint),
             "axis": (j.axis for j in self.joint),
@@ -313,7 +315,7 @@ class Linkage:
             "at": (at for pair in (*self.loop, *self.spring) for at in pair.at),
             "center": (body.center for body in self.body),
             "inertia": (body.inertia for body in self.body),
-            "at of a point": (point.at for point in held if not isinstance(point, str)),
+            "at of a point": (point.at for point in points),
             "gravity": (self.gravity,),
         }
         for name, values in vectors.items():

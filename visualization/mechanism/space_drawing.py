@@ -4,7 +4,7 @@ from above. Up is against gravity, z without it."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,8 @@ def draw(axes: Axes, linkage: Linkage, q: Matrix, end: Matrix, path: Matrix) -> 
     view = projection(linkage)
     for at, width in ((end, 1.0), (q, 4.0)):
         for i, (body, points) in enumerate(strokes(linkage, at).items()):
-            look = {"color": CURVES[i % len(CURVES)], "linewidth": width, "markersize": width}
+            look: dict[str, Any] = {"linewidth": width, "markersize": width}
+            look["color"] = CURVES[i % len(CURVES)]
             axes.plot(*view(points), "o-", label=body if at is q else "", **look)
         for points in rods(linkage, at):
             axes.plot(*view(points), "-", color="0.5", linewidth=width / 2)
