@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7434,
+    "components": 7457,
     "fmus": 2991,
-    "orchestrator": 16182,
+    "orchestrator": 16183,
     "programs": 1023,
     "analysis": 8837,
-    "visualization": 3533,
+    "visualization": 3599,
     "api": 591,
     "commands": 1600,
 }

@@ -8,7 +8,7 @@ FMU. SI units throughout.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -297,20 +297,36 @@ class Linkage:
         return point if isinstance(point, str) and self.choices else "operational_point"
 
     @property
+    def spatial(self) -> str:
+        """What makes it one in space: a type of joint, or a vector of more numbers than two; "" in
+        the plane."""
+        for j in self._joints:
+            if not j.kind.in_plane:
+                return f"a {j.type} joint"
+        points = [*self.points.values(), *self.point]
+        if not isinstance(self.operational_point, str):
+            points.append(self.operational_point)
+        vectors: dict[str, Iterable[object]] = {
+            "at_parent": (j.at_parent for j in self.joint),
+            "at_child": (j.at_child for j in self.joint),
+            "axis": (j.axis for j in self.joint),
+            "second_axis": (j.second_axis for j in self.joint),
+            "axes": (axis for loop in self.loop for axis in loop.axes or ()),
+            "at": (at for pair in (*self.loop, *self.spring) for at in pair.at),
+            "center": (body.center for body in self.body),
+            "inertia": (body.inertia for body in self.body),
+            "at of a point": (point.at for point in points),
+            "gravity": (self.gravity,),
+        }
+        for name, values in vectors.items():
+            if any(isinstance(value, tuple) and len(value) > 2 for value in values):
+                return f"three numbers of {name}"
+        return ""
+
+    @property
     def dimension(self) -> int:
-        """2 in the plane; 3 in space, where a type of joint is spatial or a vector has more numbers
-        than two."""
-        held = (self.operational_point, *self.points.values(), *self.point)
-        vectors = (
-            *(at for j in self.joint for at in (j.at_parent, j.at_child, j.axis, j.second_axis)),
-            *(at for loop in self.loop for at in (*loop.at, *(loop.axes or ()))),
-            *(at for spring in self.spring for at in spring.at),
-            *(of for body in self.body for of in (body.center, body.inertia)),
-            *(point.at for point in held if not isinstance(point, str)),
-            self.gravity,
-        )
-        spatial = any(isinstance(vector, tuple) and len(vector) > 2 for vector in vectors)
-        return 3 if spatial or any(not j.kind.in_plane for j in self._joints) else 2
+        """2 in the plane, 3 in space."""
+        return 3 if self.spatial else 2
 
     @property
     def space(self) -> PortSpace:

@@ -74,7 +74,7 @@ def test_forces_in_space_have_no_moment(pushed):
     assert not others
     assert (moment == 0).all()
     assert force == pytest.approx(np.linalg.norm(pushed["hand.F"], axis=1), rel=1e-15)
-    assert {*pushed.figures()} == {"trajectories", "forces"}
+    assert {*pushed.figures()} == {"mechanism", "trajectories", "forces"}
 
 
 def test_an_equilibrium_in_space_is_judged_in_its_own_hand(tmp_path):
@@ -104,6 +104,6 @@ def test_what_is_of_the_plane_is_refused(scene, made, message):
         made(scene)
 
 
-def test_a_run_in_space_is_not_drawn(pushed):
-    with pytest.raises(InputFault, match="its linkage is in space, and what is drawn is of the pl"):
+def test_a_run_in_space_is_not_replayed(pushed):
+    with pytest.raises(InputFault, match="its linkage is in space, and pages and replays draw the"):
         hl.view(pushed)

@@ -39,7 +39,7 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector, with_record
 from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.curve_colours import CURVES
@@ -54,7 +54,7 @@ from hapticlink.visualization.figure_files import encode
 from hapticlink.visualization.figures.curves import curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
-from hapticlink.visualization.mechanism import drawing, marks
+from hapticlink.visualization.mechanism import drawing, marks, space_drawing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -102,6 +102,8 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if of_port(results, POINT_POSE):
         if linkage and not planar:
             drawn_by["trajectories"] = partial(_places_in_time, results, linkage)
+            if table := of_block(results, JOINT_COORDINATES, size):
+                drawn_by["mechanism"] = partial(_in_space, results, linkage, table)
         elif "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
         if of_port(results, find_handle(results)):
@@ -270,15 +272,32 @@ def _trajectories(results: Results) -> Figure:
     return figure
 
 
-def _places_in_time(results: Results, linkage: Linkage) -> Figure:
-    """The operational point in space."""
+def _in_space(results: Results, linkage: Linkage, table: Table) -> Figure:
+    """The linkage at the start and the end of the run, and the path of its operational point."""
+    (_, path), q = _path(results), table[JOINT_COORDINATES]
+    figure, axes = titled_axes(results, _reach_in_space(path), "", "")
+    finite = np.flatnonzero(np.isfinite(q).all(axis=1))
+    space_drawing.draw(axes, linkage, q[finite[0]], q[finite[-1]], path)
+    return figure
+
+
+def _path(results: Results) -> tuple[Vector, Vector]:
+    """Times (s) and places (m) of the operational point in space."""
     table = of_port(results, POINT_POSE)
     assert table is not None
-    path = table[POINT_POSE] * 1e3
-    reach = short(float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0)))
-    title = f"The operational point moves up to {reach} mm from its start"
-    figure, axes = titled_axes(results, title, "time (s)", "place (mm)")
-    time, drawn = curve(table["time"], path)
+    return table["time"], table[POINT_POSE]
+
+
+def _reach_in_space(path: Vector) -> str:
+    reach = short(1e3 * float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0)))
+    return f"The operational point moves up to {reach} mm from its start"
+
+
+def _places_in_time(results: Results, linkage: Linkage) -> Figure:
+    """The operational point in space over time."""
+    times, path = _path(results)
+    figure, axes = titled_axes(results, _reach_in_space(path), "time (s)", "place (mm)")
+    time, drawn = curve(times, 1e3 * path)
     for name, column, style in zip(linkage.space.names, drawn.T, cycle(STYLES)):
         axes.plot(time, column, style, label=name)
     axes.legend(fontsize="small")

@@ -28,11 +28,11 @@ LEAST_SHARE = 0.05
 
 
 def require_planar(linkage: Linkage, name: str) -> None:
-    """Raises InputFault for a linkage in space, which nothing draws."""
+    """Raises InputFault for a linkage in space, which no page and no replay draws."""
     if linkage.dimension > 2:
         raise InputFault(
-            f"{name}: its linkage is in space, and what is drawn is of the plane; `hapticlink run` "
-            "writes its tables and the path of its operational point"
+            f"{name}: its linkage is in space, and pages and replays draw the plane; the figures "
+            "of `hapticlink run` have it at the start and the end"
         )
 
 

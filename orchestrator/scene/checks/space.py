@@ -101,8 +101,8 @@ def _of_the_plane(scene: Scene, linkage: Linkage) -> Iterator[Problem]:
     """What a scene with a linkage in space cannot have yet."""
     for key in ("device", "devices", "controller", "controllers"):
         if getattr(scene, key):
-            text = "renders a planar linkage: one in space runs with hands alone, take it out"
-            yield (key,), text
+            text = "renders a planar linkage: take it out, as one in space runs with hands alone"
+            yield (key,), f"{text}; here {linkage.spatial} put it in space"
     for user, hand in scene.all_hands.items():
         here: Path = ("hands", user) if user else ("hand",)
         for key in _OF_ARM if isinstance(hand, ArmHand) else ():
@@ -110,7 +110,8 @@ def _of_the_plane(scene: Scene, linkage: Linkage) -> Iterator[Problem]:
                 text = "the default is of the plane, with a moment: give three numbers for x, y, z"
                 yield (*here, key), text
     if scene.contacts:
-        yield ("contacts",), "are of the plane: a linkage in space has none, take them out"
+        text = "are of the plane: a linkage in space has none, take them out"
+        yield ("contacts",), f"{text}; here {linkage.spatial} put it in space"
     if scene.local_model:
         yield ("local_model",), "is of the plane: leave it out"
     if linkage.points:

@@ -61,7 +61,7 @@ REFUSED = [
     ("linkage.body.bar.radius=0.1", "is a shape of the plane, and in space nothing touches"),
     ("hand={ type = 'arm', target = [[0, 0, 0, 0]] }", "hand.mass: the default is of the plane"),
     ("controller={}", "controller: renders a planar linkage"),
-    ("device={}", "device: renders a planar linkage"),
+    ("device={}", "hands alone; here a spherical joint put it in space"),
     ("contacts={ stiffness = 1e3 }", "are of the plane: a linkage in space has none, take them"),
     ("local_model=true", "local_model: is of the plane: leave it out"),
 ]
@@ -78,3 +78,18 @@ def test_refused(option, message):
     with pytest.raises(InputFault) as refused:
         read_and_check.read_scene(SCENE, [option])
     assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("option", "cause"),
+    [
+        ("linkage.gravity=[0.0, -9.81, 0.0]", "three numbers of gravity"),
+        ("linkage.body.link1.inertia=[1e-4, 1e-4, 1e-4]", "three numbers of inertia"),
+        ("linkage.operational_point.at=[0.02, 0.0, 0.0]", "three numbers of at of a point"),
+    ],
+)
+def test_a_planar_scene_is_told_what_put_it_in_space(option, cause):
+    with pytest.raises(InputFault) as refused:
+        open_scene.load("closed-loop-ideal", [option])
+    assert "device: renders a planar linkage: take it out" in str(refused.value)
+    assert f"here {cause} put it in space" in str(refused.value)
