@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2822,
     "orchestrator": 13668,
     "programs": 1021,
-    "analysis": 7826,
+    "analysis": 7840,
     "visualization": 3433,
     "api": 467,
     "commands": 1459,
