@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 13668,
     "programs": 1021,
     "analysis": 7840,
-    "visualization": 3433,
+    "visualization": 3434,
     "api": 467,
     "commands": 1459,
 }

@@ -214,12 +214,8 @@ class Stability:
 
         if margin.stiffness is not None:
             some = told("stiffness", "stiffnesses ", f"times {_within(margin.stiffness)}")
-            least = f"{2.0**-DOUBLINGS:.1g}"
-            yield (
-                some
-                if margin.stiffness
-                else f"stable with no stiffnesses tried, down to times {least}"
-            )
+            least = f"down to times {2.0**-DOUBLINGS:.1g}"
+            yield some if margin.stiffness else f"stable with no stiffnesses tried, {least}"
         if margin.delay is not None:
             some = told("delay", "", f"{_within(1e3 * margin.delay, 3)} ms of further delay")
             yield some if margin.delay else "less than a haptic period of further delay"
