@@ -34,8 +34,8 @@ CODE_LINES = {
     "fmus": 2991,
     "orchestrator": 16183,
     "programs": 1023,
-    "analysis": 8837,
-    "visualization": 3599,
+    "analysis": 8851,
+    "visualization": 3600,
     "api": 591,
     "commands": 1600,
 }

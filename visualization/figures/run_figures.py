@@ -372,18 +372,19 @@ def _source(block: str) -> str:
 def _port(results: Results, port: UserPort) -> Figure:
     measured = port.measured
     peak, at = measured.peak, int(np.argmax(port.generated_J))
+    whose = summary.name_hands(measured)
     title = f"The rendering {summary.describe_generated(peak, measured.generated)}"
     if peak > summary.ROUNDING_J:
         title = f"At most {short(1e3 * peak)} mJ generated, at {port.time_s[at]:.3g} s"
         if put_in := float(port.put_in_J[at]):
-            title += f", where the hand had {summary.describe_work(1e3 * put_in, 'taken')}"
+            title += f", where {whose} had {summary.describe_work(1e3 * put_in, 'taken')}"
     if peak > summary.ROUNDING_J and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name][at]))
         title += f"; largest source then: {_source(largest)}"
     label = "energy at the user's port (mJ)"
     figure, axes = titled_axes(results, title, "time (s)", label)
     axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="generated in all")
-    axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label="put in by the hand")
+    axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label=f"put in by {whose}")
     least = DRAWN * np.abs(port.generated_J).max()
     drawn = {name: e for name, e in port.blocks_J.items() if np.abs(e).max() > least}
     looks = product(("-", "-."), CURVES)
