@@ -32,9 +32,9 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6143,
     "fmus": 2822,
-    "orchestrator": 13665,
+    "orchestrator": 13691,
     "programs": 1021,
-    "analysis": 7845,
+    "analysis": 7847,
     "visualization": 3419,
     "api": 467,
     "commands": 1459,
