@@ -312,7 +312,7 @@ class Linkage:
             "axis": (j.axis for j in self.joint),
             "second_axis": (j.second_axis for j in self.joint),
             "axes": (axis for loop in self.loop for axis in loop.axes or ()),
-            "at": (at for pair in (*self.loop, *self.spring) for at in pair.at),
+            "at": (at for ends in (self.loop, self.spring) for one in ends for at in one.at),
             "center": (body.center for body in self.body),
             "inertia": (body.inertia for body in self.body),
             "at of a point": (point.at for point in points),
