@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2822,
     "orchestrator": 14046,
     "programs": 1023,
-    "analysis": 8057,
+    "analysis": 8079,
     "visualization": 3417,
     "api": 467,
     "commands": 1460,
