@@ -31,7 +31,6 @@ from hapticlink.orchestrator.results.read_results import (
     Results,
     Table,
     load,
-    with_record,
 )
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import (
@@ -56,7 +55,7 @@ from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.state_fits import require_fit
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_system
+from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_again, build_system
 from hapticlink.orchestrator.system.system import System
 
 
@@ -97,13 +96,29 @@ class Experiment:
                     raise self.outcome.fault or Fault(
                         f"the results are gone, or were changed while the run wrote them: {why}"
                     ) from None
-            return with_record(Results(None, self.run, self.memory.tables()), record)
+            return _ResultsInMemory(self, self.memory.tables(), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:
             columns = ("time", *recorded.get(clock.name, ()))
             empty[clock.name] = Table(columns, np.zeros((0, len(columns))), empty)
         return Results(self.folder, self.run, empty)
+
+
+class _ResultsInMemory(Results):
+    """Those of an experiment whose rows are in no file; its run.json is made where it is asked
+    for."""
+
+    _experiment: Experiment
+
+    def __init__(
+        self, experiment: Experiment, tables: Mapping[str, Table], record: RunRecord
+    ) -> None:
+        vars(self).update(folder=None, tables=tables, record=record, _experiment=experiment)
+
+    @cached_property
+    def run(self) -> dict[str, Any]:
+        return self._experiment.run
 
 
 @dataclass(frozen=True)
@@ -284,6 +299,7 @@ def simulate(
         try:
             every = stack.enter_context(build_system(read))
             if real_time:
+                every = real_time.with_recordings(every)
                 every = stack.enter_context(simulated_plant.attach(read, every))
         except Interrupted:
             raise Interrupted(when="before the run") from None
@@ -318,7 +334,12 @@ def simulate(
                 host_state.restore_interpreter(),
             ):
                 outcome = run(plan, results, progress, real_time, state, saving)
-            outcome.details = replace(outcome.details, logged=results.count_logged())
+            unsaved = [name for name in save.files if saving and name not in saving.saved]
+            before = replace(before, files=[f for f in before.files if f not in unsaved])
+            results.leave_out(unsaved)
+            outcome.details = replace(
+                outcome.details, logged=results.count_logged(), unsaved=unsaved
+            )
             try:
                 results.end(outcome.ending(build_time), tables)
             except OSError as error:
@@ -350,7 +371,9 @@ def simulate_together(
         for scene in scenes:
             ready.append(None)
             with suppress(InputFault):
-                made = _prepare_once(scene, stack.enter_context(build_system(scene)))
+                every = build_again(scene) if any(ready) else None
+                every = every or stack.enter_context(build_system(scene))
+                made = _prepare_once(scene, every)
                 if not (scene.fmu or scene.resume) and _fits_in_memory(made.system, made.tables):
                     ready[-1] = made
         build_time = (perf_counter() - begin) / len(scenes)

@@ -14,13 +14,13 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, shorten, unknown
 from hapticlink.orchestrator.base.signal_names import CHOSEN_POINT
-from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun, require_speed
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.arguments import require, require_name
+from hapticlink.orchestrator.scene.hold_tables import read_hold
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.changes import (
@@ -140,8 +140,8 @@ class LiveRun:
         that no scene may have."""
         system = self.system
         require_name("connection", name)
-        if hold is not None and require_name("hold", hold) not in HOLDS:
-            raise InputFault(unknown("hold", hold, HOLDS))
+        if hold is not None:
+            hold = read_hold(require_name("hold", hold))
         if delay is not None:
             delay = require(f"delay of {name}", delay, Elapsed)
         connections = [c for c in system.connections if name in names(c) and c.hold]
@@ -246,6 +246,9 @@ class LiveRun:
             return
         self._until = None
         self._called(self)
+        if self.paused:
+            for instance in simulation.instances.values():
+                instance.rest()
         while self.paused and self._until is None:
             pace.wait(pace.now() + self._every)
             interrupt.raise_if_interrupted(self.time)

@@ -10,6 +10,7 @@ the time (s, of the monotonic clock) and the torques (N.m) of the connectors. WA
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import select
@@ -134,7 +135,8 @@ def attach(
     """The system, whose device that asks for a simulated board gets the terminal of one that is a
     process within the context. log, watchdog: of the process. Raises InputFault where there can be
     none."""
-    asking = [u for u in system.fmus if u.driver and u.driver.port == SIMULATED_BOARD]
+    boards = [u for u in system.fmus if u.driver and not u.replayed]
+    asking = [u for u in boards if u.driver and u.driver.port == SIMULATED_BOARD]
     if not asking:
         yield system
         return
@@ -177,6 +179,7 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
         tty.setraw(slave)
         print(os.ttyname(slave), flush=True)
         told: list[float] = []
+        gc.disable()  # nothing below leaves cycles
         stack.enter_context(raise_priority())  # a board has a processor of its own
         while True:
             ready, _, _ = select.select([master, 0], [], [], 1 / RATE)

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7042,
+    "components": 7044,
     "fmus": 2987,
-    "orchestrator": 15783,
+    "orchestrator": 16018,
     "programs": 1023,
-    "analysis": 7947,
-    "visualization": 3437,
-    "api": 488,
-    "commands": 1520,
+    "analysis": 8533,
+    "visualization": 3506,
+    "api": 591,
+    "commands": 1568,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

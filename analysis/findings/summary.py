@@ -18,6 +18,7 @@ from hapticlink.analysis.findings.report_premises import describe_experiment
 from hapticlink.analysis.findings.tracking import (
     UserSignals,
     compared_directions,
+    find_handle,
     of_block,
     of_port,
 )
@@ -227,9 +228,16 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
             f"warning: the graphics copy was folded in {off} of {frames} frames, and with it "
             f"Lambda_inv, P_c and contacts{remedy}"
         )
+    if record.unsaved:
+        yield f"warning: {', '.join(record.unsaved)} not saved: the run ended before"
     yield from record.without_effect
     yield from describe_replacements(record.replaced)
     yield from _lacking(results)
+    if find_handle(results) != HANDLE_POSE:
+        yield (
+            "the handle is told where the observer sees it, a tick late: where a board's is, and "
+            "the work of the hand on it, nobody knows"
+        )
     yield from describe_unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
         yield (
@@ -430,7 +438,7 @@ def _percent(how: str, share: float) -> str:
     """A share, which says nothing any more beyond LARGEST_PERCENT."""
     percent = 100 * share
     far = percent > LARGEST_PERCENT
-    return f"more than {LARGEST_PERCENT} %" if far else f"{how} {percent:.2g} %"
+    return f"more than {LARGEST_PERCENT} %" if far else f"{how} {float(f'{percent:.2g}'):g} %"
 
 
 def describe_replacements(replacements: Mapping[str, Replacement]) -> Iterator[str]:

@@ -14,6 +14,7 @@ from hapticlink.components.dynamics.rendered_directions import rendered_directio
 from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import (
     APPLIED_TORQUES,
+    BOARD_SENT_AT,
     CONSTRAINT_COUNTS,
     COPY_BRANCH_OK,
     DEVICE,
@@ -126,7 +127,10 @@ def find_users(results: Results) -> list[UserSignals]:
 
 def table_of(results: Results, signal: str) -> Table | None:
     """The table that contains `signal`, whose rate depends on the scene; None if there is none."""
-    return next((t for t in results.tables.values() if signal in t), None)
+    for table in results.tables.values():
+        if signal in table:
+            return table
+    return None
 
 
 def of_block(results: Results, signal: str, *shape: int) -> Table | None:
@@ -159,14 +163,22 @@ def have_one_shape(results: Results, *signals: str) -> bool:
 
 def has_tracking(results: Results, user: UserSignals = FIRST) -> bool:
     """Whether there are the poses of a user's point and handle."""
-    return all(of_port(results, signal) for signal in (user.point, user.handle))
+    return all(of_port(results, s) for s in (user.point, find_handle(results, user)))
+
+
+def find_handle(results: Results, user: UserSignals = FIRST) -> str:
+    """The signal of the pose of a user's handle: the true one, of a board the measured one, as
+    nobody knows another."""
+    if of_any_shape(results, signal_of_user(BOARD_SENT_AT, user.name)):
+        return find_measured_handle(results, user) or user.handle
+    return user.handle
 
 
 def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
     """Tracking error of a user at the mechanism's samples up to the device's last one at which the
     hand holds a point; the handle's pose is interpolated linearly where its clock differs. Raises
     KeyError without these signals."""
-    point, handle = user.point, user.handle
+    point, handle = user.point, find_handle(results, user)
     mechanism, device = of_port(results, point), of_port(results, handle)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {point} and {handle}")

@@ -169,10 +169,11 @@ def user_port(results: Results) -> UserPort | None:
 
 def find_other_pushes(results: Results) -> list[str]:
     """The connections to handles from other sources than the hands of their users."""
+    users = find_users(results)
     return [
         name
         for name in results.record.connections
-        for user in find_users(results)
+        for user in users
         if name.endswith(f" -> {user.handle.partition('.')[0]}.F_hand")
         and not name.startswith(f"{user.hand} ")
     ]

@@ -28,6 +28,7 @@ from hapticlink.analysis.sweep.row import DIED, Row, failed
 from hapticlink.orchestrator.base import interrupt, process, temporary_folders
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.fmi import process_cache
+from hapticlink.orchestrator.system.fmu_files import prefer_compiled
 
 Batch = Sequence[Job]
 Work = Callable[[Batch], Sequence[Row]]
@@ -85,7 +86,7 @@ class _Worker(SpawnProcess):
     def run(self) -> None:
         process.raise_gc_threshold()
         process.freeze_gc()  # what is loaded by now
-        with process_cache.keep_unpacked(), one_blas_thread():
+        with process_cache.keep_unpacked(), one_blas_thread(), prefer_compiled():
             super().run()
         process.freeze_gc()
         process.leave_threads(0)

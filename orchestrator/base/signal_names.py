@@ -33,6 +33,8 @@ MEASURED_HANDLE_POSES = (f"{OBSERVER}.x", f"{DEVICE}.x")
 """The measured pose, computed by either block."""
 HANDLE_INERTIAS = (f"{OBSERVER}.M", f"{DEVICE}.M")
 """The device's inertia at the handle, computed by either block."""
+BOARD_SENT_AT = f"{DEVICE}.sent_at"
+"""When torques were sent to a board in the place of the device."""
 WORKSPACE_MARGIN = f"{DEVICE}.workspace_margin"
 """Negative (m) where the device is outside its workspace."""
 

@@ -131,13 +131,15 @@ class Board(Instance):
         return take
 
     def enter_initialization(self, stop_time: float) -> None:
-        pass
+        self._stop_time = stop_time
 
     def read(self) -> None:
         if self._driver is None:
             self._read_start()
         elif self._awaited:
             self._receive()
+        if self._driver and self.place.time >= self._stop_time:
+            self.rest()  # before what else there is to wait for at the end of a run
 
     def _read_start(self) -> None:
         """The outputs of the device's own FMU at the start."""
@@ -248,7 +250,8 @@ class Board(Instance):
             (SENT_AT, self._sent_at - self._began),
             (READ_AT, now - self._began),
         ):
-            self.outputs[self._places[name]] = value
+            if places := self._places[name]:  # it is recorded, or read
+                self.outputs[places] = value
 
     def _stopped(self, what: str) -> FmuFault:
         """The fault, with zero torque."""

@@ -13,7 +13,7 @@ import struct
 from collections.abc import Sequence
 from typing import Protocol
 
-WATCHDOG = 0.05
+WATCHDOG = 0.04
 """Time (s) after the last torques, from which on there are none."""
 KIT_LIMIT = 0.123
 """Torque (N.m) at which the firmware clips, MAX_TORQUE: that of the kit's motors."""

@@ -55,7 +55,7 @@ class ModelExchange(WithEvents):
         self._failed: tuple[str, int] | None = None
         self._unfit = ""
         self._stop_time = math.inf
-        self._counts = dict.fromkeys(("solver_steps", "evaluations", "state_events"), 0)
+        self._counts = dict.fromkeys(("solver_steps", "evaluations", "events"), 0)
 
     @property
     def do_step(self) -> str:
@@ -63,7 +63,8 @@ class ModelExchange(WithEvents):
 
     @property
     def calls(self) -> dict[str, int]:
-        """Besides, of the solver: its steps, evaluations of the derivatives, and state events."""
+        """Besides, of the solver: its steps and evaluations of the derivatives; and how often there
+        was event mode."""
         return super().calls | (self._counts if self._counted else {})
 
     def enter_initialization(self, stop_time: float) -> None:
@@ -158,7 +159,6 @@ class ModelExchange(WithEvents):
                 reached, root = solver.advance(until, stop=stop, once=completes)
             except Unsolved as failure:
                 raise self._unsolved(failure, time) from failure
-            self._counts["state_events"] += root
             if status := self._tell(reached, solver.states):
                 assert self._failed
                 raise self.failed(*self._failed)
@@ -225,6 +225,7 @@ class ModelExchange(WithEvents):
             self._of_fmu = next_event
             self._fmi("SetTime", next_event)
         self._begins = True
+        self._counts["events"] += 1
         return super().event(time, active, settings)
 
     def rollback(self, slot: int = 0) -> None:

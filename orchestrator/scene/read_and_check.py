@@ -17,6 +17,7 @@ from hapticlink.orchestrator.scene import (
     checks,
     device_files,
     families,
+    hold_tables,
     overrides,
     registry_tables,
 )
@@ -34,8 +35,14 @@ from hapticlink.orchestrator.scene.refused_keys_and_values import (
 )
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
-from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals, written_path
-from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem, flat, flatten
+from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals
+from hapticlink.orchestrator.scene.toml_keys import (
+    Problem,
+    collect_problem,
+    flat,
+    flatten,
+    written_path,
+)
 
 
 def read_scene(
@@ -97,7 +104,8 @@ def from_source(source: Source) -> Scene:
             if isinstance(fmu.get(key), dict):
                 fmu[key] = dict(flat(fmu[key]))
     parts, errors, unread = registry_tables.read_registry_tables(data)
-    wrong += unread
+    of_holds, unread_holds = hold_tables.read_hold_tables(data)
+    errors, wrong = errors + of_holds, wrong + unread + unread_holds
     try:
         # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
         scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
@@ -107,4 +115,6 @@ def from_source(source: Source) -> Scene:
         refuse([*wrong, *find_further_problems(wrong, data)[: COUNTED - len(wrong)]])
     refuse(checks.check_scene(scene))
     scene = registry_tables.put_registry_tables(scene, parts)
-    return WrittenScene(**vars(scene), read_from=read_from, origin=origin, written=scene)
+    return WrittenScene(
+        **vars(scene), read_from=read_from, origin=origin, written=scene, signals=moved
+    )

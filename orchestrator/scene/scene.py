@@ -51,7 +51,7 @@ from hapticlink.orchestrator.scene.scene_tables import (
     TimedEvent,
     Wire,
 )
-from hapticlink.orchestrator.scene.toml_keys import Path
+from hapticlink.orchestrator.scene.toml_keys import Path, written_path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,9 +288,12 @@ class WrittenScene(Scene):
     """The same with its options applied."""
     written: Scene = field(compare=False, repr=False)
     """The scene as it was read, before any change in Python."""
+    signals: Mapping[int, int] = field(compare=False, repr=False, default_factory=dict)
+    """By the index of an FMU that is made for a connection from a signal, that of the
+    connection."""
 
     def place(self, path: Path, message: str) -> Finding:
-        return self.origin.finding(path, message)
+        return self.origin.finding(written_path(path, self.signals), message)
 
     @property
     def source(self) -> Source | None:

@@ -209,7 +209,8 @@ def page(found: Found, elsewhere: Mapping[str, Found]) -> Iterator[str]:
     yield "![Errors with the best gains, by rate](model.png)"
     yield (
         "[theorem.csv](theorem.csv) and [orders.csv](orders.csv) are of the [theorem](../../docs/"
-        "model-hold.md), by `python -m studies.model_theorem`."
+        "model-hold.md), by `python -m studies.model_theorem`; [growth.csv](growth.csv) has growth "
+        "rates by the lifted map and of runs, by `python -m studies.model_growth`."
     )
 
 

@@ -21,6 +21,7 @@ from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
 from hapticlink.analysis.findings.tracking import (
     constraint_counts,
     count_constrained,
+    find_handle,
     find_users,
     of_block,
     of_port,
@@ -100,7 +101,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if of_port(results, POINT_POSE):
         if "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
-        if of_port(results, HANDLE_POSE):
+        if of_port(results, find_handle(results)):
             drawn_by["distance"] = partial(_distance, results)
     if forced:
         drawn_by["forces"] = partial(forces, results, devices)
@@ -159,7 +160,7 @@ def _finding(results: Results, marked: Sequence[Episode], port: UserPort | None)
     """The tracking error, how far the operational point moved, how often the number of constrained
     directions was unusual, and what the rendering generated."""
     parts = [f"motion of the operational point up to {short(_reach(results))} mm from its start"]
-    if of_port(results, HANDLE_POSE):
+    if of_port(results, find_handle(results)):
         time, apart, _ = pose_error(results)
         at = short(float(time[apart.argmax()]))
         parts.insert(0, f"tracking error up to {short(apart.max())} mm, at {at} s")
@@ -175,7 +176,7 @@ def _finding(results: Results, marked: Sequence[Episode], port: UserPort | None)
 
 def _reach(results: Results) -> float:
     """How far (mm) the operational point, or the handle without it, was from its start."""
-    signal = POINT_POSE if of_port(results, POINT_POSE) else HANDLE_POSE
+    signal = POINT_POSE if of_port(results, POINT_POSE) else find_handle(results)
     _, path = _place(results, signal)
     return float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0))
 
@@ -195,7 +196,7 @@ def _arrow(results: Results, axes: Axes) -> None:
 
 def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
     """The largest force of the hand (N), when (s), its components and where it acted (m)."""
-    force, handle = of_port(results, HAND_WRENCH), of_port(results, HANDLE_POSE)
+    force, handle = of_port(results, HAND_WRENCH), of_port(results, find_handle(results))
     handle = handle or of_port(results, POINT_POSE)
     if not (force and handle):
         return None
@@ -241,7 +242,7 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
         (label, style, curve(*_place(results, signal))[1])
         for signal, label, style in (
             (POINT_POSE, "operational point x_S", "-"),
-            (HANDLE_POSE, "handle x_D", "--"),
+            (find_handle(results), "handle x_D", "--"),
             *further,
         )
         if of_port(results, signal)
@@ -250,7 +251,7 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if of_port(results, HANDLE_POSE):
+    if of_port(results, find_handle(results)):
         apart = short(pose_error(results).distance_mm.max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:

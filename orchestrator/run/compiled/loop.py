@@ -64,12 +64,16 @@ class Events:
             if clock.name in sides:
                 self._clocks[i].fill(side=sides[clock.name].c)
 
-    def again(self) -> Events:
-        """The same events, from the first one on."""
-        events = Events(self._machine, self._timeline, self._block)
-        events._kinds = self._kinds
-        events.prepare(())
-        return events
+    def begin_again(self) -> None:
+        """Stand at the first event again, with the kinds of events that are known."""
+        c = self._c
+        c.fill(tick=0, events=0, kind=0)
+        c.at.op = -1
+        for i, clock in enumerate(self._clocks):
+            if self._given[i]:
+                self._given[i] = clock.at = 0
+                self._next_window(i)
+            clock.fill(at=0, next=0, last=0)
 
     @property
     def complete(self) -> int:
@@ -241,7 +245,7 @@ class CompiledLoop:
     def begin_again(self) -> None:
         """Stand at the first event, with the kinds of events that are known."""
         self._machine.begin_again()
-        self.events = self.events.again()
+        self.events.begin_again()
 
     def run(self, turn: Callable[[int], object], halts: Iterator[Halt] = NO_HALTS) -> None:
         """As `Events.run`."""

@@ -90,7 +90,7 @@ def fault_at(port: Port, kind: str, tick: int, monkeypatch: pytest.MonkeyPatch) 
     """Have a fault come at a tick; returns what is said of it."""
     if kind == "silence":
         port.silent_from = tick
-        return "has sent no answer within 20 ms: torques are zero"
+        return "has sent no answer within 50 ms: torques are zero"
     if kind == "lost bytes":
         port.garbled_at = tick
         return "bytes were lost|of 17 bytes"
@@ -248,3 +248,74 @@ def test_a_killed_process_leaves_a_message(killed: bool) -> None:
     os.close(writing)
     assert os.read(reading, 10) == (b"zero" if killed else b"")
     os.close(reading)
+
+
+def test_a_pause_leaves_no_torque(port):
+    """A paused run sends none, and goes on from there."""
+    paused: list[int] = []
+
+    def turn(live: hl.RealTime) -> None:
+        port_messages = port.firmware.messages
+        if not paused and port_messages > 10:
+            away(port)
+            live.pause()
+            paused.append(port_messages)
+        elif live.paused:
+            assert not any(port.torques[-1])
+            live.resume()
+
+    live = hl.RealTime("closed-loop", SCENE | {"device.driver.silence": 0.05})
+    run = live.run(turn, tables=False)
+    assert paused
+    assert run.fault is None, run.fault
+
+
+def moving(port: Port) -> None:
+    """A device whose handle is moved along a curve."""
+
+    def advance(seconds: float, torques: list[float]) -> list[float]:
+        way = 0.02 * math.sin(40 * seconds)
+        return [way, -way, 0.5 * way, 0.0]
+
+    port.firmware._plant.advance = advance  # type: ignore[method-assign,attr-defined]
+
+
+@pytest.mark.parametrize("late", [{}, {41 * MS: 5 * MS, 90 * MS: 8 * MS}])
+def test_a_log_replays_to_the_same_bits(port, tmp_path, late):
+    """Every number of every table, of observer, controller and mechanism; late ticks are skipped
+    again."""
+    moving(port)
+    scene = hl.scene("closed-loop", SCENE)
+    before = simulate(scene, tmp_path / "before", real_time=WallClock(late=late).run())
+    assert before.outcome.fault is None
+    told = port.firmware.messages
+    assert (before.run["real_time"]["skipped"] > 0) == bool(late)
+    after = hl.run(scene, out=tmp_path / "after", figures=False, arrivals=tmp_path / "before")
+    assert after.fault is None
+    assert port.firmware.messages == told  # no port is opened
+    for table in ("haptics.csv", "graphics.csv"):
+        one, two = ((tmp_path / run / table).read_bytes() for run in ("before", "after"))
+        assert one == two
+    again = after.run["real_time"]
+    assert again["skipped"] == before.run["real_time"]["skipped"]
+
+
+def test_a_log_without_what_the_board_measured(port, tmp_path):
+    options = SCENE | {"record.signals": ["observer"]}
+    simulate("closed-loop", tmp_path / "before", options, real_time=WallClock().run())
+    with pytest.raises(hl.InputFault, match=r"haptic_device.q was not recorded"):
+        hl.run("closed-loop", options, arrivals=tmp_path / "before")
+
+
+def test_what_is_said_of_a_board(port, tmp_path):
+    """Its handle is the measured one; no energy is told of a hand whose work is not known."""
+    moving(port)
+    run = hl.run("closed-loop", SCENE, out=tmp_path / "run", figures=False, real_time=True)
+    said = str(run)
+    assert "the handle is told where the observer sees it" in said
+    assert "not passive" not in said
+    point, seen = run["virtual_mechanism.x"], run["observer.x"]
+    apart = 1e3 * np.hypot(*(point - seen)[:, :2].T)
+    assert np.array_equal(run.tracking().distance_mm, apart)
+    simulated = hl.run("closed-loop", {"duration": 0.05, "device.observer.beside": True})
+    assert "where the observer sees it" not in str(simulated)

@@ -153,7 +153,7 @@ def test_run_json_counts_what_the_solver_did(tmp_path):
     equations_fmu(tmp_path)
     experiment, _ = run(tmp_path, ONE, "duration=1.0")
     calls = experiment.outcome.details.calls["one"]
-    assert calls["state_events"] == 2
+    assert calls["events"] == 2
     assert 0 < calls["solver_steps"] < calls["evaluations"]
 
 
