@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7044,
+    "components": 7043,
     "fmus": 2987,
     "orchestrator": 16018,
     "programs": 1023,
-    "analysis": 8533,
+    "analysis": 8537,
     "visualization": 3506,
     "api": 591,
     "commands": 1568,
