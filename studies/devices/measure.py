@@ -27,7 +27,7 @@ from hapticlink.orchestrator.system.build_system import build_system
 
 SCENE = "closed-loop-ideal"
 SECONDS, EARLY, LATE = 60.0, (0.25, 2.0), 5.0
-OFF = (2e-4, 0.0, 0.0)
+OFF = (1e-6, 0.0, 0.0)
 QUIET, MOST = 1e-7, 0.5
 BESIDE = (0.8, 1.25)
 """Factors on the margin, with which the verdicts are checked."""

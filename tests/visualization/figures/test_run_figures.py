@@ -161,3 +161,9 @@ def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
     )
     assert sweep_figure.axis("graphics.rate") == "graphics rate (Hz)"
     assert sweep_figure.axis("hold") == "hold"
+
+
+def test_a_run_that_is_in_memory_alone_has_the_figures_of_one_in_a_folder(tmp_path) -> None:
+    options = {"duration": 0.05}
+    kept = hl.run("single-body", options, out=tmp_path, figures=False)
+    assert hl.run("single-body", options).figures().keys() == kept.figures().keys() != set()
