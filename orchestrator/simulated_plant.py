@@ -3,8 +3,8 @@ of a scene, which go on with the clock of this computer.
 
     python -m hapticlink.orchestrator.simulated_plant SCENE.json LOG WATCHDOG
 
-It prints the name of its terminal, and ends when its standard input does. Until the first torques
-come the hand keeps the device where the scene starts. LOG gets a row for each change of torques:
+It prints the name of its terminal, and ends when its standard input does. Until a run
+begins the hand keeps the device where the scene starts. LOG gets a row for each change of torques:
 the time (s, of the monotonic clock) and the torques (N.m) of the connectors. WATCHDOG is 1 or 0.
 """
 
@@ -188,7 +188,7 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
             now = time.monotonic()
             if master in ready:
                 answer = board.take(os.read(master, 4096), now)
-                if board.messages:
+                if board.messages > 1:  # the first asks where the handle is
                     plant.begin(now)
                 if answer:
                     os.write(master, answer)

@@ -31,13 +31,13 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 
 CODE_LINES = {
     "components": 7043,
-    "fmus": 2987,
-    "orchestrator": 16018,
+    "fmus": 2989,
+    "orchestrator": 16084,
     "programs": 1023,
-    "analysis": 8537,
-    "visualization": 3506,
+    "analysis": 8831,
+    "visualization": 3509,
     "api": 591,
-    "commands": 1568,
+    "commands": 1599,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -235,8 +235,8 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from _lacking(results)
     if find_handle(results) != HANDLE_POSE:
         yield (
-            "the handle is told where the observer sees it, a tick late: where a board's is, and "
-            "the work of the hand on it, nobody knows"
+            "the handle is told where the observer sees it: where a board's is, and the work of "
+            "the hand on it, nobody knows"
         )
     yield from describe_unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
@@ -273,6 +273,7 @@ def _steps(record: RunRecord) -> Iterator[str]:
             yield f"{fmu} has logged messages, {' and '.join(told)}: they are in fmus.log"
     if record.real_time:
         yield from _real_time(record.real_time)
+    yield from model_premises.describe_computing_times(record)
     for fmu, exchange in record.network.items():
         yield from _network(fmu, exchange)
     if (counts := record.iterations) and counts.unconverged:

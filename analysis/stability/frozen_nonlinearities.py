@@ -91,6 +91,8 @@ def describe_switches(system: System) -> list[str]:
             lines.append(f"{fmu.name}: {', and '.join(stops)}")
         if block == "virtual_wall":
             lines.append(f"{fmu.name}: contact, if the wall is unilateral")
+        if description.equations:
+            lines.append(f"{fmu.name}: discrete states of the FMU for model exchange")
         if description.port("contact_gap", "output"):
             lines.append(f"{fmu.name}: which places touch")
         if any(s.port.rpartition(".")[2] == "n_constraints" for s in description.outputs):
