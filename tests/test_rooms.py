@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7457,
+    "components": 7455,
     "fmus": 2991,
     "orchestrator": 16206,
     "programs": 1023,
-    "analysis": 8875,
-    "visualization": 3600,
+    "analysis": 8879,
+    "visualization": 3601,
     "api": 591,
     "commands": 1600,
 }

@@ -18,7 +18,7 @@ from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints
 from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.components.port_space import PLANE
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
+from hapticlink.components.specs.hand import ConstantHand, Hand, HoldingHand
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
@@ -90,7 +90,7 @@ class Pose:
     def leaves(self, read: Scene, hand: Hand | None) -> bool:
         """Whether the run of a scene from this pose on, in a hand that stands still next to it,
         comes further away than NEAR; one that fails does."""
-        if not isinstance(hand, ArmHand | SpringHand):
+        if not isinstance(hand, HoldingHand):
             return True
         held = {"hand": standing(hand, np.add(self.point, OFF))}
         changes = {**self.started, **held, "duration": LEAVING, "stop_when": ""}

@@ -97,19 +97,30 @@ def _wrench(
     return _hand(block, kind, "sampled", F, signals)
 
 
-def _arm(spec: ArmHand, rendered: RenderedDirections) -> Component:
+GRIP = {"grip_stiffness": "pulp_stiffness", "grip_damping": "pulp_damping"}
+"""What of an arm's grip is the pulp of a finger."""
+
+
+def _arm(spec: ArmHand | FingertipHand, rendered: RenderedDirections) -> Component:
     """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, with the grip's
     F = K_gr (x_a - x) + B_gr (x_a' - v), in the directions in which it acts."""
     space = rendered.space
+    is_finger = isinstance(spec, FingertipHand)
+    rows = {
+        "mass": (space.mass, "mass of the arm"),
+        "stiffness": (space.stiffness, "arm to target path"),
+        "damping": (space.damping, "arm to target path"),
+        "grip_stiffness": (space.stiffness, "arm to handle"),
+        "grip_damping": (space.damping, "arm to handle"),
+    }
+    parameters = []
+    for name, (entries, text) in rows.items():
+        own = GRIP.get(name, name) if is_finger else name
+        shape, unit = ((), entries.units[0]) if is_finger else entries
+        parameters.append(Variable(own, shape, unit, getattr(spec, own), text))
     block = Block(
         inputs=[_pose(space), _velocity(space)],
-        parameters=[
-            Variable("mass", *space.mass, spec.mass, "mass of the arm"),
-            Variable("stiffness", *space.stiffness, spec.stiffness, "arm to target path"),
-            Variable("damping", *space.damping, spec.damping, "arm to target path"),
-            Variable("grip_stiffness", *space.stiffness, spec.grip_stiffness, "arm to handle"),
-            Variable("grip_damping", *space.damping, spec.grip_damping, "arm to handle"),
-        ],
+        parameters=parameters,
         states=[
             Variable("x_arm", *_of(rendered, space.pose), description="pose of the arm"),
             Variable("v_arm", *_of(rendered, space.twist), description="velocity of the arm"),
@@ -118,8 +129,9 @@ def _arm(spec: ArmHand, rendered: RenderedDirections) -> Component:
         outputs=[_wrench_output(space)],
     )
     x, u, t = block.x, block.u, block.t
-    p = {name: rendered.pick_diagonal(block.p[name]) for name in block.p}
-    pick = rendered.pick
+    given_p = [block.p[v.name] for v in parameters]
+    along = given_p if is_finger else [rendered.pick_diagonal(value) for value in given_p]
+    p, pick = dict(zip(rows, along, strict=True)), rendered.pick
     signals = [signal(spec.target, spec.interpolation, "hand.target")]
     over = ca.SX.sym("over", time_signals.size_over(signals))
     target, target_rate = ca.vertsplit(time_signals.within(signals, over, t), space.size)
@@ -135,7 +147,7 @@ def _arm(spec: ArmHand, rendered: RenderedDirections) -> Component:
     initial |= _first_turns(rendered, u["x"], signals[0].value(ca.SX(0)))
     k = range(rendered.size)
     step = integrators.step("rk4", ode, x.vector, given, block.p.vector, t, block.h, k)
-    kind = "an arm behind a grip"
+    kind = "a fingertip" if is_finger else "an arm behind a grip"
     F = rendered.put(F)
     return _hand(block, kind, spec.timing, F, signals, initial=initial, step=step)
 
@@ -197,25 +209,6 @@ def _spring(spec: SpringHand, rendered: RenderedDirections) -> Component:
     return _hand(block, kind, spec.timing, F, signals, initial=initial, step=kept)
 
 
-def _fingertip(spec: FingertipHand, space: PortSpace) -> ArmHand:
-    """The arm that a fingertip is: a finger behind its pulp, with forces alone."""
-
-    def of_lengths(value: float, about: float = 0.0) -> tuple[float, float, float]:
-        x, y, z = (about if turns else value for turns in space.turns)
-        return x, y, z
-
-    return ArmHand(
-        mass=of_lengths(spec.mass, 1.0),
-        stiffness=of_lengths(spec.stiffness),
-        damping=of_lengths(spec.damping),
-        grip_stiffness=of_lengths(spec.pulp_stiffness),
-        grip_damping=of_lengths(spec.pulp_damping),
-        target=spec.target,
-        interpolation=spec.interpolation,
-        timing=spec.timing,
-    )
-
-
 def hand(
     spec: Hand, space: PortSpace = PLANE, *, clutch: bool = False, handle: Handle | None = None
 ) -> Component:
@@ -225,7 +218,7 @@ def hand(
     rendered = rendered_directions(handle, space)
     if isinstance(spec, FingertipHand):
         point = rendered_directions(Handle(body="", angle="free"))
-        return _arm(_fingertip(spec, space), point if rendered.has_moments else rendered)
+        return _arm(spec, point if rendered.has_moments else rendered)
     if isinstance(spec, ArmHand):
         return _arm(spec, rendered)
     if isinstance(spec, SpringHand):

@@ -31,6 +31,8 @@ START_SETTINGS = {
         "hand.damping": "damping",
         "hand.grip_stiffness": "grip_stiffness",
         "hand.grip_damping": "grip_damping",
+        "hand.pulp_stiffness": "pulp_stiffness",
+        "hand.pulp_damping": "pulp_damping",
     },
 }
 """By block, and by dotted key of its settings: the parameter that starts at the setting, entry by

@@ -6,7 +6,6 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import cycle, product
 from textwrap import fill
@@ -86,7 +85,8 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if not results.last_time:
         return drawn_by
     with_rows = {name: table for name, table in results.tables.items() if len(table.rows)}
-    results = with_record(replace(results, tables=with_rows), results.record)
+    whole_run = Results(results.folder, results.run, with_rows)
+    results = with_record(whole_run, results.record)
     whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
     counted = count_constrained(results)
     # an SSP has the block, but not its description
