@@ -36,8 +36,8 @@ CODE_LINES = {
     "programs": 1023,
     "analysis": 8797,
     "visualization": 3503,
-    "api": 591,
-    "commands": 1599,
+    "api": 635,
+    "commands": 1605,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
