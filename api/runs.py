@@ -88,10 +88,10 @@ def run(
     asked about every 20 ms whether the run in real time is to end, and `ready` is told what to do
     with the handle of a board that has a `home`, and returns when it is done. `remote` has the
     addresses HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on other
-    computers, and `key` is the file of the key of both (docs/two-computers.md). `save`: when the state of the
-    run is saved to `out`, at times (s), at its "end", or every so many seconds, "every=0.5"
-    (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is a scene
-    itself.
+    computers, and `key` is the file of the key of both (docs/two-computers.md). `save`: when the
+    state of the run is saved to `out`, at times (s), at its "end", or every so many seconds,
+    "every=0.5" (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is
+    a scene itself.
 
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
