@@ -112,7 +112,7 @@ def page(rows: list[Row], command: str) -> str:
         f"{_equal(row for row in compared if row not in exchange)}. {_count(not_run)} others are "
         "not run; the second table says why.",
         "",
-        f"{_count(exchange)} of them run by model exchange, "
+        f"By model exchange {_count(exchange)} of the FMUs run, "
         f"{_count(row for row in exchange if _comparison(row).events)} of these with events, and "
         f"{_count(row for row in exchange if row['settings'])} also with a parameter that makes "
         f"them stiff: {_equal(exchange)}, but for the last row of an FMU that ends by an event.",

@@ -153,7 +153,7 @@ def get_or_build(
     entry = root / key(key_material)
     if cached_file := _whole_file(entry):
         return cached_file
-    with _exclusively(entry, str(key_material.get("block", "the same FMU")), poll):
+    with exclusively(entry, str(key_material.get("block", "the same FMU")), poll):
         return _whole_file(entry) or _build(build_function, build_folder, root, entry)
 
 
@@ -182,7 +182,7 @@ _held: set[Path] = set()
 
 
 @contextmanager
-def _exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
+def exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
     """No other thread or process of this machine builds for `entry` within the context."""
     warned = False
 

@@ -365,13 +365,14 @@ def simulate_together(
     compiles: whether to compile the steps of several instances that the cache lacks. Raises
     Interrupted.
     """
-    begin = perf_counter()
+    begin, alike = perf_counter(), False  # whether scenes have differed in start values alone
     ready: list[Prepared | None] = []
     with ExitStack() as stack:
         for scene in scenes:
             ready.append(None)
             with suppress(InputFault):
-                every = build_again(scene) if any(ready) else None
+                every = build_again(scene) if alike else None
+                alike = every is not None or len(ready) == 1
                 every = every or stack.enter_context(build_system(scene))
                 made = _prepare_once(scene, every)
                 if not (scene.fmu or scene.resume) and _fits_in_memory(made.system, made.tables):

@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6981,
-    "fmus": 2987,
-    "orchestrator": 16000,
+    "components": 7044,
+    "fmus": 2989,
+    "orchestrator": 16084,
     "programs": 1023,
-    "analysis": 8797,
-    "visualization": 3503,
+    "analysis": 8827,
+    "visualization": 3508,
     "api": 635,
     "commands": 1605,
 }

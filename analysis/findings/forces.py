@@ -25,6 +25,7 @@ from hapticlink.orchestrator.base.signal_names import (
     TOPOLOGY_WRENCH,
 )
 from hapticlink.orchestrator.results.read_results import Results, Vector
+from hapticlink.orchestrator.results.recorded_scene import described_devices
 
 WRENCHES = {
     HAND_WRENCH: "hand, F_hand",
@@ -74,7 +75,7 @@ def torques(
 
     if device is None:
         return None
-    if user.device in find_replaced(results):
+    if user.name not in described_devices(results):
         given = of_any_shape(results, user.applied)
         if given is None or not len(given["time"]):
             return None
@@ -108,12 +109,7 @@ def motor_loads(
 def torque_limits(results: Results, device: Device, user: UserSignals) -> Vector | None:
     """The limits (N.m) of a user's motors, (m,): those of [device]; of an FMU from elsewhere those
     that its output `torque_limit` has at the start."""
-    if user.device not in find_replaced(results):
+    if user.name in described_devices(results):
         return np.array([motor.torque_limit for motor in device.motors])
     table = of_any_shape(results, user.limits)
     return None if table is None or not len(table["time"]) else np.atleast_1d(table[user.limits][0])
-
-
-def find_replaced(results: Results) -> set[str]:
-    """The blocks in whose place a run had an FMU from elsewhere."""
-    return {fmu["replaces"] for fmu in results.record.scene.get("fmu", ()) if fmu.get("replaces")}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby, islice
 from typing import Any, NamedTuple
@@ -26,7 +25,6 @@ from hapticlink.analysis.findings.tracking import (
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
-from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
@@ -275,6 +273,7 @@ def _steps(record: RunRecord) -> Iterator[str]:
             yield f"{fmu} has logged messages, {' and '.join(told)}: they are in fmus.log"
     if record.real_time:
         yield from _real_time(record.real_time)
+    yield from model_premises.describe_computing_times(record)
     for fmu, exchange in record.network.items():
         yield from _network(fmu, exchange)
     if (counts := record.iterations) and counts.unconverged:
@@ -503,8 +502,8 @@ def _start(results: Results) -> Iterator[str]:
 
 
 def _start_apart(results: Results) -> Iterator[str]:
-    """Lines for a handle that starts elsewhere than what it holds: the operational point, as a
-    device of others may, or a hand's target, by whole turns."""
+    """A line for a handle that starts elsewhere than the operational point, as a device of others
+    may."""
     handle, point = of_port(results, HANDLE_POSE), of_port(results, POINT_POSE)
     if handle and point and len(handle["time"]) and len(point["time"]):
         x, S = handle[HANDLE_POSE][0], point[POINT_POSE][0]
@@ -514,27 +513,6 @@ def _start_apart(results: Results) -> Iterator[str]:
                 f"warning: the handle starts {short(1e3 * far)} mm and {short(turned)} rad from "
                 "the operational point: errors contain that"
             )
-    hand = results.record.scene["hand"] or {}
-    if handle and hand.get("target") and hand["stiffness"][2] and len(handle["time"]):
-        angle, start = _first_angle(hand["target"]), float(handle[HANDLE_POSE][0][2])
-        if turns := round((angle - start) / math.tau):
-            away = "a whole turn" if abs(turns) == 1 else f"{abs(turns)} whole turns"
-            yield (
-                f"warning: hand.target begins {away} from the handle's angle, {short(start)} rad, "
-                f"and pulls it there: {short(angle - math.tau * turns)} rad is the same direction"
-            )
-
-
-def _first_angle(target: Sequence[Sequence[float]] | Mapping[str, Any]) -> float:
-    """The angle (rad) of a hand's target at t = 0: of its first row, or of a sine."""
-    if not isinstance(target, Mapping):
-        return float(target[0][3])
-    from casadi import SX, evalf  # slow to load
-
-    from hapticlink.components.paths import TimeSine
-
-    pose = evalf(TimeSine(PoseSine(**target), "hand.target").value(SX(0)))
-    return float(pose[2])
 
 
 def describe_assembly(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:

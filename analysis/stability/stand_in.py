@@ -26,6 +26,8 @@ from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.system import Fmu, System
 
+FINE = 1e-12
+"""Relative tolerance of the solver of an FMU for model exchange."""
 LONG = 1e4
 """Stop time (s) that an FMU is told while it is identified."""
 Known = dict[tuple[Any, ...], IdentifiedSystem]
@@ -66,12 +68,24 @@ def record_stand_ins(found: Sequence[StandIn]) -> dict[str, Any]:
 def with_stand_ins(system: System, known: Known) -> System:
     """The system with linear ones in the place of FMUs whose state cannot be read. Raises
     InputFault for one whose response tells none."""
+    system = replace(system, fmus=tuple(map(_with_declared_states, system.fmus)))
     unread = [fmu.name for fmu in system.fmus if not has_layout(fmu)]
     if not unread:
         return system
     start = _read_start(system)
     fmus = (_identified(system, u, start, known) if u.name in unread else u for u in system.fmus)
     return replace(system, fmus=tuple(fmus))
+
+
+def _with_declared_states(fmu: Fmu) -> Fmu:
+    """One for model exchange with the states that it declares, which can be set, and a solver whose
+    error is far below the differences by which slopes are found. Its discrete states stay."""
+    about = fmu.description
+    if about.equations is None or has_layout(fmu):
+        return fmu
+    states = tuple(f"state {name}" for name in about.equations.states)
+    flags = about.flags | {STATE[about.fmi]}
+    return replace(fmu, description=replace(about, states=states, flags=flags, tolerance=FINE))
 
 
 def _read_start(system: System) -> Callable[[Fmu], Vector]:

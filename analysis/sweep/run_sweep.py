@@ -7,6 +7,7 @@ a stability map.
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -156,7 +157,7 @@ def tabulate(
     each_time: bool = False,
 ) -> list[Row]:
     """The rows of `jobs`, in their order, each with its point, behind those `before`; `tell` is
-    called with the number of finished jobs.
+    called with the number of finished jobs. together: does several of them in one go.
 
     A row is stored in `folder`/rows when its job ends and is reused by a later call, unless that
     failed for a reason other than its scene. The table `name` is written at the end, or `each_time`
@@ -180,7 +181,8 @@ def tabulate(
             table.write(folder / name, found)
             return found
 
-        tell(len(done()))
+        tell(finished := len(done()))
+        points = Counter(j.key for j in jobs if j.scene)
         try:
             for job, row in _finished(missing, folder, processes, scheduler, judge, together):
                 if row["end"] == INTERRUPTED:  # a signal reached the worker too
@@ -188,17 +190,18 @@ def tabulate(
                 if row["end"] != DIED:  # the next sweep repeats those
                     stored.keep(job.key, row)
                 rows[job.key] = row
-                tell(len(done()))
+                finished += points[job.key]
+                tell(finished)
                 if each_time:
                     write()
         except Interrupted:
             pass
-        finished = write()
+        made = write()
     except OSError as error:
         raise Fault(f"{folder}: {error}") from error
-    if len(done()) < len(jobs):
-        raise Unfinished(len(done()), len(jobs), folder, name)
-    return finished
+    if finished < len(jobs):
+        raise Unfinished(finished, len(jobs), folder, name)
+    return made
 
 
 def _finished(

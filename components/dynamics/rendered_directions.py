@@ -102,6 +102,12 @@ class RenderedDirections:
         """E A E', (k, k), of A (3, 3)."""
         return matrix if self.whole else self.E @ matrix @ self.E.T
 
+    def pick_diagonal(self, diagonal: Any) -> Any:
+        """That of E diag(d) E', (k,), of stiffnesses or masses d (3,)."""
+        import casadi as ca
+
+        return diagonal if self.whole else ca.diag(self.pick_matrix(ca.diag(diagonal)))
+
     def reduction(self, Lambda_inv: ca.SX) -> Any:
         """R, (k, 3)."""
         import casadi as ca

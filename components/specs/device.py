@@ -25,6 +25,9 @@ from hapticlink.components.specs.quantities import (
     Quantity,
 )
 
+LIGHT = 0.2
+"""Mass (kg) below which a device is light."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Observer:
@@ -275,6 +278,12 @@ class Device:
         return tuple(
             SensedJoint(j, self._of(j.encoder, self.encoder, "resolution") or 0.0) for j in sensed
         )
+
+    @property
+    def is_light(self) -> bool:
+        """Whether its bodies weigh less in all than a device that a mechanism is felt through as it
+        is."""
+        return sum(body.mass for body in self.body) < LIGHT
 
     @property
     def torque_limit(self) -> float:

@@ -7,6 +7,7 @@ import ctypes
 import hashlib
 import logging
 import re
+import sys
 import tempfile
 import zipfile
 from functools import lru_cache
@@ -35,13 +36,23 @@ _CHOICE = re.compile(r"\((a\d+)\?(a\d+):0\)")
 
 def step_of_lanes(fmu: Path, compiles: bool) -> Any:
     """The function `step_lanes` for a native FMU, or None: where it is neither there nor to be
-    compiled, where nothing is cached, without a compiler, and for an FMU whose functions vectors do
-    not take (they are in pieces, or look up tables), or with the interface of FMI 3."""
-    if (library := _library(fmu, fmu.stat().st_mtime_ns)) is None:
+    compiled, where nothing is cached, without a compiler, for an FMU whose functions vectors do not
+    take (they are in pieces, or look up tables), or with the interface of FMI 3, and on Windows,
+    where it was not tried."""
+    if sys.platform == "win32":
         return None
-    if not library.exists() and not (compiles and compile_steps(fmu, library)):
-        return None
-    return load_steps(library)
+    return _find(fmu, fmu.stat().st_mtime_ns, cache.folder(), compiles)
+
+
+@lru_cache(64)
+def _find(fmu: Path, changed_ns: int, root: Path | None, compiles: bool) -> Any:
+    """The same, looked for once as long as the file does not change."""
+    library = _library(fmu) if root and root in fmu.parents else None
+    if library and compiles and not library.exists():
+        with cache.exclusively(library, f"steps of several {fmu.stem}", lambda: None):
+            if not library.exists():
+                compile_steps(fmu, library)
+    return load_steps(library) if library and library.exists() else None
 
 
 def load_steps(library: Path) -> Any:
@@ -52,12 +63,8 @@ def load_steps(library: Path) -> Any:
     return step
 
 
-@lru_cache(64)
-def _library(fmu: Path, changed_ns: int) -> Path | None:
+def _library(fmu: Path) -> Path | None:
     """Where the library of an FMU is kept; None where it cannot be made."""
-    root = cache.folder()
-    if root is None or root not in fmu.parents:
-        return None
     with zipfile.ZipFile(fmu) as archive:
         names = {name.removeprefix("sources/") for name in archive.namelist()}
         if not {*NEEDED} <= names or any(re.match(r"fmi3|piece\d", name) for name in names):

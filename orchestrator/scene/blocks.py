@@ -8,7 +8,7 @@ from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
-from hapticlink.components.specs.device import Handle
+from hapticlink.components.specs.device import Device, Handle
 from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.linkage import GraphicsCopy
 from hapticlink.orchestrator.base.signal_names import (
@@ -223,6 +223,17 @@ def impedance(scene: Scene) -> bool:
 
 def topology(scene: Scene) -> bool:
     return any(controller.topology is not False for controller in scene.all_controllers.values())
+
+
+def described_devices(scene: Scene) -> dict[str, Device]:
+    """The devices that are as [device] says, by user: not those in whose place an FMU from
+    elsewhere is, except where the observer beside it goes by [device]."""
+    replaced = {fmu.replaces for fmu in scene.fmu}
+    return {
+        user: device
+        for user, device in scene.all_devices.items()
+        if device.observer.beside or block_of_user(DEVICE, user) not in replaced
+    }
 
 
 def observed_beside(scene: Scene) -> list[str]:

@@ -35,9 +35,8 @@ def parameters_of(name: Any) -> Any:
 
 @cache
 def _record(kind: Any) -> Any:
-    shipped = isinstance(kind, HoldRow)
-    arguments = [] if shipped else [*inspect.signature(kind.__init__).parameters.values()]
-    named = argument_fields(arguments[2:])
+    own = [] if isinstance(kind, HoldRow) else [*inspect.signature(kind).parameters.values()]
+    named = argument_fields(own[1:])  # behind the context
     record = make_dataclass("HoldParameters", [("type", str), *named], kw_only=True)
     record.__module__ = getattr(kind, "__module__", __name__)
     return record

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -250,10 +251,19 @@ class System:
         return frozenset(c.source for c in self.connections if c.needs == "step")
 
     def into(self, name: str) -> tuple[Connection, ...]:
-        return tuple(c for c in self.connections if c.target == name and not c.initial)
+        return self._by_end[0].get(name, ())
 
     def out_of(self, name: str) -> tuple[Connection, ...]:
-        return tuple(c for c in self.connections if c.source == name and not c.initial)
+        return self._by_end[1].get(name, ())
+
+    @cached_property
+    def _by_end(self) -> tuple[Mapping[str, tuple[Connection, ...]], ...]:
+        """The connections by their targets, and by their sources, without initial ones."""
+        lasting = [c for c in self.connections if not c.initial]
+        return tuple(
+            {end: tuple(c for c in lasting if of(c) == end) for end in {*map(of, lasting)}}
+            for of in (attrgetter("target"), attrgetter("source"))
+        )
 
 
 _NO_TIME = Timeline(Fraction(1), 0, (), {})

@@ -143,13 +143,13 @@ def test_what_vectors_do_not_take_is_stepped_one_by_one(tmp_path: Path, monkeypa
     assert lane_library.step_of_lanes(plain, False) is None
     with monkeypatch.context() as patch:
         patch.setattr(lane_library, "OPTIONS", ("-no-such-option",))
-        lane_library._library.cache_clear()
+        lane_library._find.cache_clear()
         assert lane_library.step_of_lanes(plain, True) is None
-    lane_library._library.cache_clear()
+    lane_library._find.cache_clear()
     assert lane_library.step_of_lanes(plain, True) is not None
     assert lane_library.step_of_lanes(plain, False) is not None
     monkeypatch.setenv("HAPTICLINK_CACHE", "off")
-    lane_library._library.cache_clear()
+    lane_library._find.cache_clear()
     assert lane_library.step_of_lanes(plain, True) is None
     with zipfile.ZipFile(plain) as archive:
         assert {*lane_library.NEEDED} <= {

@@ -110,12 +110,6 @@ def holding(x: float, y: float, theta: float) -> dict[str, Any]:
     [
         ("closed-loop-ideal", holding(0.08, *START[1:]), holding(*START), "begins with a pull of"),
         (
-            "closed-loop-ideal",
-            holding(*START[:2], START[2] + math.tau),
-            holding(*START),
-            "begins a whole turn from the handle's angle",
-        ),
-        (
             "obstacles",
             {"contacts.stiffness": 1e8},
             {"contacts.stiffness": 1e8, "mechanism.integrator": "linearly-implicit"},

@@ -40,7 +40,7 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
-from hapticlink.orchestrator.results.recorded_scene import all_devices, scene_part
+from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import (
@@ -90,7 +90,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
     counted = count_constrained(results)
     # an SSP has the block, but not its description
-    linkage, devices = scene_part(results, "linkage", Linkage), all_devices(results)
+    linkage, devices = scene_part(results, "linkage", Linkage), described_devices(results)
     size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
     if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
         q = table[JOINT_COORDINATES]
@@ -127,7 +127,7 @@ def files(results: Results, formats: Sequence[str]) -> Iterator[tuple[str, bytes
 def _mechanism(results: Results, linkage: Linkage, q: Vector, port: UserPort | None) -> Figure:
     marked = episodes(results)
     figure, axes = titled_axes(results, _finding(results, marked, port), "x (mm)", "y (mm)")
-    contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
+    contacts, devices = scene_part(results, "contacts", Contacts), described_devices(results)
     starts: list[Vector] = []
     ends: list[Vector] = []
     for (label, style, path), colour in zip(_paths(results), cycle(CURVES)):

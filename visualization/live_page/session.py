@@ -15,7 +15,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
-from hapticlink.orchestrator.scene.blocks import driver_of
+from hapticlink.orchestrator.scene.blocks import described_devices, driver_of
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.visualization.live_and_standalone import first_messages
@@ -77,7 +77,7 @@ class LiveSession:
         """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has
         ended, which raises Fault."""
         scene = self._scene
-        drawing = (scene.linkage, scene.all_devices, scene.contacts)
+        drawing = (scene.linkage, described_devices(scene), scene.contacts)
         self._say("opening", title=scene.title, picture=drawing)
         with self._before:  # it ends where the first run begins
             took = self._before.enter_context(record_duration(f"{scene.title}: FMUs of its page"))

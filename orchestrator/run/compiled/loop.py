@@ -194,6 +194,7 @@ class Events:
     def prepare(self, kinds: Iterable[Event]) -> None:
         """Add the operations of kinds of events, those of `coming` before they occur."""
         self._kinds |= {kind: self._block(kind) for kind in kinds}
+        self._machine.publish()
         keys = [key_of(self._timeline, kind) for kind in self._kinds]
         blocks = np.array([*self._kinds.values()], np.int64)
         self._c.fill(keys=np.array(keys, np.int64), kinds=blocks, n_kinds=len(keys))

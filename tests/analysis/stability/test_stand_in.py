@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.stability.frozen_nonlinearities import describe_switches
 from hapticlink.analysis.stability.identified_response import NotIdentified, identify
+from hapticlink.analysis.stability.smooth_scene import linearisable
 from tests.analysis.stability.own_hand import own_hand
 from tests.little_fmus import entries, slave
+from tests.orchestrator.c_fmus import equations_fmu
 
 T = 0.05
 K, B = 100.0, 2.0
@@ -126,6 +129,28 @@ def test_the_verdict_says_what_stands_for_the_fmu_and_how_exact_it_is(tmp_path: 
     assert (each["fmu"], each["order"]) == ("hand", 0)
     assert each["error"] < 1e-9
     assert "hand: its state cannot be read; a linear system of order 0 stands" in str(verdict)
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_states_of_an_fmu_for_model_exchange_are_those_that_it_declares(
+    tmp_path: Path, fmi: str
+) -> None:
+    """A mass x'' = - K z (F_drift acts with -) and z' = k (x - z), each with the other's value held
+    over a step."""
+    path, k = equations_fmu(tmp_path, fmi), 4.0
+    lag = {"name": "lag", "path": str(path), "start": {"k": k, "level": -9.0, "x": 0.0}}
+    ends = [("virtual_mechanism.x[1]", "lag.u", 1.0), ("lag.x", "virtual_mechanism.F_drift[1]", K)]
+    wires = [{"from": a, "to": b, "factor": by, "convert": False} for a, b, by in ends]
+    hand = {"type": "constant", "wrench": [0.0, 0.0, 0.0]}
+    options = {"fmu": [lag], "connection": wires, "hand": hand, "linkage.start": {"rail": 0.0}}
+    found = own_hand("sampled-spring", {**options, "coupling": "jacobi"})
+    decay = np.exp(-k * T)
+    A = np.array([[1, T, -K * T**2 / 2], [0, 1, -K * T], [1 - decay, 0, decay]])
+    growth_ = np.log(np.abs(np.linalg.eigvals(A)).max()) / T
+    assert found.growth == pytest.approx(growth_, rel=2e-5)  # differences of a solver
+    with linearisable("sampled-spring", options) as (_, system, _):
+        (line,) = describe_switches(system)
+    assert "lag: discrete states of the FMU for model exchange, as at the equilibrium" in line
 
 
 def test_one_that_is_not_sampled_is_refused(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from fmpy import simulate_fmu
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi import event_mode
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.programs.foreign import read_foreign
@@ -129,6 +130,14 @@ def test_what_cannot_be_integrated_is_a_fault_with_all_rows_before_it(tmp_path, 
     assert re.search(message, found), found
     assert "at t = 0.09375 s" in found
     assert results.haptics["time"][-1] == 0.09375
+
+
+def test_one_that_chatters_is_a_fault(tmp_path, monkeypatch):
+    monkeypatch.setattr(event_mode, "MOST_PARTS", 50)
+    equations_fmu(tmp_path)
+    experiment, _ = run(tmp_path, ONE + started(top=0.5 + 1e-6), "duration=1.0")
+    found = str(experiment.outcome.fault)
+    assert "one: it has 50 events within one step: it switches on and off all the time" in found
 
 
 def test_a_restored_state_goes_on_as_before(tmp_path):

@@ -67,8 +67,16 @@ def test_points_with_other_events_run_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     counts = count_steps(monkeypatch)
-    options = [*WRENCHES[:2], "graphics.rate=20", "hold=foh", "linkage.start.shoulder1=0.8"]
+    options = [*WRENCHES[:2], "graphics.rate=20", "hold=foh"]
     compare("closed-loop-ideal", [(*BASE, option) for option in options], tmp_path)
+    assert counts == [2, 2]
+
+
+@pytest.mark.slow
+def test_start_poses_side_by_side(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    counts = count_steps(monkeypatch)
+    poses = [f"linkage.start.shoulder1={angle}" for angle in (0.75, 0.8, 0.85)]
+    compare("closed-loop-ideal", [(*BASE, pose) for pose in poses], tmp_path)
     assert counts == [3, 3]
 
 
