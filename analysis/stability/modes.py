@@ -146,25 +146,28 @@ def modes(linear: Linearisation, period: float) -> list[Mode]:
     A, E = linear.A * scale / scale[:, None], np.abs(linear.E * scale / scale[:, None])
     E = np.maximum(E, FLOOR * np.abs(A))
     values, left, right = eig(A, left=True, right=True)
-    found = []
-    for i, z in enumerate(values):
-        if z.imag < 0.0:
-            continue
-        v, w = right[:, i], left[:, i].conj()
-        overlap = abs(w @ v)
-        shares = np.abs((linear.V @ (v * scale)) * (linear.V @ (w / scale)))[linear.taken]
-        uncertainty = float(np.abs(w) @ E @ np.abs(v)) / overlap if overlap else np.inf
-        s = np.log(z) / period if z else complex(-np.inf)
-        found.append(
-            Mode(
-                complex(z),
-                uncertainty,
-                float(s.real),
-                float(s.imag),
-                shares / shares.sum() if shares.any() else shares,
-                linear.V @ (v * scale),
-            )
+    upper = values.imag >= 0.0
+    z, v, w = values[upper], right[:, upper], left[:, upper].conj()
+    overlap = np.abs((w * v).sum(axis=0))
+    apart = ((np.abs(w).T @ E).T * np.abs(v)).sum(axis=0)
+    uncertainty = np.divide(apart, overlap, out=np.full(len(z), np.inf), where=overlap > 0.0)
+    vectors = linear.V @ (scale[:, None] * v)
+    shares = np.abs(vectors * (linear.V @ (w / scale[:, None])))[linear.taken]
+    total = shares.sum(axis=0)
+    shares /= np.where(total > 0.0, total, 1.0)
+    with np.errstate(divide="ignore"):
+        s = np.log(z) / period
+    found = [
+        Mode(
+            complex(z[i]),
+            float(uncertainty[i]),
+            float(s[i].real),
+            float(s[i].imag),
+            shares[:, i],
+            vectors[:, i],
         )
+        for i in range(len(z))
+    ]
     return sorted(found, key=lambda mode: -abs(mode.z))
 
 
