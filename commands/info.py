@@ -88,13 +88,14 @@ def info(
 def _starts(scene: Any, start: dict[str, float]) -> None:
     """Where the handle starts, who holds it, and what can be touched."""
     from hapticlink.analysis.findings import summary, workspace
+    from hapticlink.orchestrator.scene.blocks import described_devices
 
     if scene.linkage and start:
         for line in summary.describe_assembly(asdict(scene.linkage), coordinates(start)):
             say(f"  {line}")
-    if scene.device:
+    if device := described_devices(scene).get(""):
         say("\ndevice's workspace")
-        for line in workspace.lines(scene.device, _pose(start)):
+        for line in workspace.lines(device, _pose(start)):
             say(f"  {line}")
     elif start:
         say(f"\nthe operational point starts at {workspace.write_pose(_pose(start))}")
@@ -116,23 +117,23 @@ def _starts(scene: Any, start: dict[str, float]) -> None:
 
 def _pose(start: dict[str, float]) -> list[float]:
     """Of the operational point at the start."""
-    from hapticlink.components.port_space import PLANE
-
-    return [start.get(f"x[{i}]", 0.0) for i in range(1, 1 + PLANE.size)]
+    return [value for name, value in start.items() if name.startswith("x[")]
 
 
 def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
     from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.scene.blocks import described_devices
     from hapticlink.visualization import figure_files
     from hapticlink.visualization.figures import block_diagram, schematic
     from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
     figures = {"blocks": block_diagram.figure(system, f"Blocks of: {scene.title}")}
-    if q := coordinates(start):
+    q = coordinates(start)
+    if q and scene.linkage.dimension == 2:
         figures["start"] = drawing.figure(scene, q)
-    if scene.device:
+    if device := described_devices(scene).get(""):
         title = f"Device and its workspace: {scene.title}"
-        figures["workspace"] = workspace_drawing.draw(scene.device, _pose(start), title)
+        figures["workspace"] = workspace_drawing.draw(device, _pose(start), title)
     figures |= schematic.figures(scene, system)
     for name in figure_files.save(figures, folders.ensure(out)):
         say(f"  {out / name}")

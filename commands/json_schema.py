@@ -14,6 +14,7 @@ from typing import Any
 
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.scene import key_descriptions, types_of_keys
+from hapticlink.orchestrator.scene.hold_tables import HoldTable
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import ForeignFmu
 from hapticlink.orchestrator.scene.toml_keys import NAMED
@@ -76,7 +77,7 @@ class _Definitions:
             "type": "object",
             "description": key_descriptions.about(record),
             "properties": properties,
-            "additionalProperties": False,
+            "additionalProperties": record is HoldTable,  # parameters, which a plugin defines
         }
         return {**table, "required": required} if entry and required else table
 

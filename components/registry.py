@@ -47,6 +47,10 @@ class Registry(dict[str, Part]):
         self[name] = part
         self.origins[name] = module
 
+    def base_name(self, name: str) -> str:
+        """The name under which a part is listed."""
+        return name
+
     def __missing__(self, name: str) -> Part:
         raise ValueError(self.unknown(name))
 
@@ -94,7 +98,7 @@ class Names(Generic[Part]):
 
     def checked(self, name: str) -> str:
         """Returns `name`. Raises ValueError if it is none of these."""
-        if name not in tuple(self):
+        if self.registry.base_name(name) not in tuple(self):
             raise ValueError(self.registry.unknown(name, self))
         return name
 

@@ -56,6 +56,7 @@ BUILDINGS = {
         "transparency",
         "advise",
         "fit",
+        "trials",
     ),
     "visualization": (
         ".",

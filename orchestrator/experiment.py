@@ -299,6 +299,7 @@ def simulate(
         try:
             every = stack.enter_context(build_system(read))
             if real_time:
+                every = real_time.with_recordings(every)
                 every = stack.enter_context(simulated_plant.attach(read, every))
         except Interrupted:
             raise Interrupted(when="before the run") from None
@@ -333,7 +334,12 @@ def simulate(
                 host_state.restore_interpreter(),
             ):
                 outcome = run(plan, results, progress, real_time, state, saving)
-            outcome.details = replace(outcome.details, logged=results.count_logged())
+            unsaved = [name for name in save.files if saving and name not in saving.saved]
+            before = replace(before, files=[f for f in before.files if f not in unsaved])
+            results.leave_out(unsaved)
+            outcome.details = replace(
+                outcome.details, logged=results.count_logged(), unsaved=unsaved
+            )
             try:
                 results.end(outcome.ending(build_time), tables)
             except OSError as error:

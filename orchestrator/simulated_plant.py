@@ -3,13 +3,14 @@ of a scene, which go on with the clock of this computer.
 
     python -m hapticlink.orchestrator.simulated_plant SCENE.json LOG WATCHDOG
 
-It prints the name of its terminal, and ends when its standard input does. Until the first torques
-come the hand keeps the device where the scene starts. LOG gets a row for each change of torques:
+It prints the name of its terminal, and ends when its standard input does. Until a run
+begins the hand keeps the device where the scene starts. LOG gets a row for each change of torques:
 the time (s, of the monotonic clock) and the torques (N.m) of the connectors. WATCHDOG is 1 or 0.
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import select
@@ -134,7 +135,8 @@ def attach(
     """The system, whose device that asks for a simulated board gets the terminal of one that is a
     process within the context. log, watchdog: of the process. Raises InputFault where there can be
     none."""
-    asking = [u for u in system.fmus if u.driver and u.driver.port == SIMULATED_BOARD]
+    boards = [u for u in system.fmus if u.driver and not u.replayed]
+    asking = [u for u in boards if u.driver and u.driver.port == SIMULATED_BOARD]
     if not asking:
         yield system
         return
@@ -177,6 +179,7 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
         tty.setraw(slave)
         print(os.ttyname(slave), flush=True)
         told: list[float] = []
+        gc.disable()  # nothing below leaves cycles
         stack.enter_context(raise_priority())  # a board has a processor of its own
         while True:
             ready, _, _ = select.select([master, 0], [], [], 1 / RATE)
@@ -185,7 +188,7 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
             now = time.monotonic()
             if master in ready:
                 answer = board.take(os.read(master, 4096), now)
-                if board.messages:
+                if board.messages > 1:  # the first asks where the handle is
                     plant.begin(now)
                 if answer:
                     os.write(master, answer)

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6166,
-    "fmus": 2989,
-    "orchestrator": 15637,
+    "components": 7434,
+    "fmus": 2991,
+    "orchestrator": 16182,
     "programs": 1023,
-    "analysis": 7839,
-    "visualization": 3417,
-    "api": 488,
-    "commands": 1520,
+    "analysis": 8845,
+    "visualization": 3533,
+    "api": 591,
+    "commands": 1600,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

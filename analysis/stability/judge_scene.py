@@ -38,6 +38,7 @@ from hapticlink.analysis.stability.poses import (
     find_rest_poses,
     is_hand_replaced,
     presses,
+    require_planar_port,
     rest,
     simulate_scene,
 )
@@ -45,6 +46,7 @@ from hapticlink.analysis.stability.remedy_trial import Visited
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.short_hyperperiod import short
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
+from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.analysis.stability.told_steps import Progress, Steps
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.analysis.stability.verdict_record import Stability
@@ -100,6 +102,7 @@ def stability(
         return _judge_at_rest(read, bounds, progress)
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
+    require_planar_port(read)
     hands = hands_of(read.hand)
     read, rounded = short(with_quicker_fmus(read))
     with interrupt.defer_signals(), process_cache.keep_unpacked(), prefer_compiled():
@@ -247,4 +250,5 @@ def _judge(
         remedies=remedies,
         frozen=frozen,
         rounded=rounded,
+        stand_ins=find_stand_ins(work.responses),
     )

@@ -12,7 +12,9 @@ sigma is the growth rate (1/s). p is the participation of coordinate k, from
 the right and left eigenvectors v and w; it does not depend on the units of the coordinates
 (Perez-Arriaga, Verghese, Schweppe, IEEE Trans. Power Apparatus and Systems 101 (1982), 3117). An
 error E of A moves a simple eigenvalue by at most |w||E||v| / |w v| entry by entry, which is taken
-for its uncertainty.
+for its uncertainty. Of eigenvalues that coincide, as those of a closure error that is critically
+damped, w v is 0 and that says nothing: where it leaves open whether the leading mode grows, the
+distance is taken by which the errors with these signs, and with the opposite ones, really move it.
 
 The argument of z is known up to whole turns only: the phase of a number c that the mode moves,
 unwrapped over the events of the period, is omega P. It is exact as long as c turns by less than
@@ -122,6 +124,11 @@ class Mode:
         """Whether z is 1 within its uncertainty: a motion that neither grows nor decays."""
         return abs(self.z - 1.0) <= min(self.uncertainty, NEAR)
 
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether it is further from 1 than a neutral mode, and may grow or decay."""
+        return abs(self.z - 1.0) > NEAR and verdict(abs(self.z), self.uncertainty) == "marginal"
+
 
 def verdict(radius: float, uncertainty: float) -> str:
     """stable, unstable, or marginal where a spectral radius is 1 within its uncertainty. What grows
@@ -158,17 +165,34 @@ def modes(linear: Linearisation, period: float) -> list[Mode]:
     with np.errstate(divide="ignore"):
         s = np.log(z) / period
     found = [
-        Mode(
-            complex(z[i]),
-            float(uncertainty[i]),
-            float(s[i].real),
-            float(s[i].imag),
-            shares[:, i],
-            vectors[:, i],
+        (
+            Mode(
+                complex(z[i]),
+                float(uncertainty[i]),
+                float(s[i].real),
+                float(s[i].imag),
+                shares[:, i],
+                vectors[:, i],
+            ),
+            w[:, i],
+            v[:, i],
         )
         for i in range(len(z))
     ]
-    return sorted(found, key=lambda mode: -abs(mode.z))
+    found.sort(key=lambda each: -abs(each[0].z))
+    sorted_modes = [mode for mode, _, _ in found]
+    first = next((i for i, mode in enumerate(sorted_modes) if not mode.neutral), None)
+    if first is not None and sorted_modes[first].is_in_doubt:
+        mode, left_1, right_1 = found[first]
+        slope = np.outer(left_1, right_1) * np.conj(mode.z * (left_1 @ right_1))
+        moved = _distance(mode.z, A, np.sign(slope.real) * E)
+        sorted_modes[first] = replace(mode, uncertainty=min(mode.uncertainty, moved))
+    return sorted_modes
+
+
+def _distance(z: complex, A: Matrix, E: Matrix) -> float:
+    """How far an error of E or of -E moves the eigenvalue z of A."""
+    return float(max(np.abs(np.linalg.eigvals(A + e) - z).min() for e in (E, -E)))
 
 
 def with_turns(mode: Mode, path: Complex, period: float) -> Mode:

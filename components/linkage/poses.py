@@ -16,7 +16,10 @@ from hapticlink.components.specs.linkage import Linkage
 
 def pose_function(linkage: Linkage) -> tuple[list[str], ca.Function]:
     """The names of the bodies, "ground" among them, and their poses (x m, y m, theta rad), (3, k),
-    as a function of the joint coordinates, (n,). Raises ValueError as `LinkageModel` does."""
+    as a function of the joint coordinates, (n,). Raises ValueError as `LinkageModel` does, and for
+    a linkage in space."""
+    if linkage.dimension > 2:
+        raise ValueError("poses (x, y, theta) are those of a linkage in the plane")
     p = Signals("p", body_parameters(linkage))
     model = LinkageModel.symbolic(linkage, p)
     stacked = ca.horzcat(*(ca.vertcat(f.origin, f.angle) for f in model.frames.values()))

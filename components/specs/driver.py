@@ -50,7 +50,7 @@ class Driver:
     """Time over which the virtual coupling grows at the start, on both of its sides."""
     speed_limit: Annotated[float, Quantity("rad/s", gt=0)] = 60.0
     """Rate of an encoder above which its angle counts as a fault."""
-    silence: Annotated[float, Quantity("s", gt=0, le=0.05)] = 0.02
+    silence: Annotated[float, Quantity("s", gt=0, le=0.05)] = 0.05
     """Time without an answer that counts as a fault."""
 
     @property

@@ -1,9 +1,9 @@
 """A board with motors and encoders in the place of the simulated device.
 
-In the step from t_k on, the torques of t_k are sent; the board measures its encoders when they
-arrive, and its answer is read at the end of the step. So outputs describe the beginning of a step
-(timing "frame"): q and counts at t_k, tau_applied over the step before. Nobody waits for the
-answer, which is there long before the step ends.
+A board answers to torques alone, with the angles that it has when they arrive. So at t_k the
+torques of the step before are sent once more and the answer is waited for, some tenths of a
+millisecond: outputs are those of t_k, as those of the simulated device are. The torques of t_k
+follow as soon as they are computed; their answer, which nobody needs, is read at the next tick.
 
 Torque is zero before anything else happens at the end of a run, at a signal and at a fault: a
 torque that is not finite, a jump of an angle, an answer that is missing or makes no sense. A port
@@ -48,6 +48,8 @@ TRIES = 3
 is missing of another one, and every part of it as a torque below 1e-30 N.m."""
 
 
+SHORTEST = 5e-3
+"""Time (s) for whose way an encoder is given at least: behind a late answer the next comes soon."""
 FAR = 0.1
 """Angle (rad) of an encoder from that of the start, above which a run does not begin."""
 
@@ -66,7 +68,6 @@ def describe_board(description: Description) -> Description:
     return replace(
         description,
         scalars=(*kept, *times),
-        timing="frame",
         flags=frozenset({VARIABLE_STEP}),
         dependencies={s.name: frozenset() for s in (*kept, *times)},
         initial_dependencies={},
@@ -106,8 +107,8 @@ class Board(Instance):
         self.safe = SafeTorques(table.torque_limit, table.torque_rate, len(self._torques))
         self._driver: DeviceDriver | None = None
         self._sent_at = self._began = self._measured_at = 0.0
-        self._before = self._applied = self.safe.sent
-        self._awaited = self._rests = False
+        self._applied = self.safe.sent
+        self._stepped = self._rests = False
         self._stack = ExitStack()
 
     # --- before the run -------------------------------------------------------------------
@@ -131,13 +132,18 @@ class Board(Instance):
         return take
 
     def enter_initialization(self, stop_time: float) -> None:
-        pass
+        self._stop_time = stop_time
 
     def read(self) -> None:
         if self._driver is None:
             self._read_start()
-        elif self._awaited:
+        elif self._stepped:
+            self._stepped = False
+            self._answer()
+            self._send(self._applied)
             self._receive()
+        if self._driver and self.place.time >= self._stop_time:
+            self.rest()  # before what else there is to wait for at the end of a run
 
     def _read_start(self) -> None:
         """The outputs of the device's own FMU at the start."""
@@ -204,6 +210,7 @@ class Board(Instance):
         except ValueError as error:
             raise self._stopped(str(error)) from None
         self._send(torques)
+        self._stepped = True
         self.place.time = end
         self.place.steps += 1
 
@@ -217,23 +224,24 @@ class Board(Instance):
             self._driver.send(torques)
         except OSError as error:
             raise self._stopped(f"the board at {self._table.port} {_told(error)}") from None
-        self._before, self._applied = self._applied, [*torques]
-        self._awaited = True
+        self._applied = [*torques]
+
+    def _answer(self) -> Vector:
+        """The counts that the board answers to the oldest message. Raises FmuFault."""
+        assert self._driver
+        try:
+            return np.array(self._driver.receive(self._table.silence))
+        except (Silent, OSError) as error:
+            raise self._stopped(f"the board at {self._table.port} {_told(error)}") from None
 
     def _receive(self) -> None:
         """Take over the answer to what was sent last. Raises FmuFault."""
-        assert self._driver
-        try:
-            counts = np.array(self._driver.receive(self._table.silence))
-        except (Silent, OSError) as error:
-            raise self._stopped(f"the board at {self._table.port} {_told(error)}") from None
-        self._awaited = False
-        now = time.perf_counter()
+        counts, now = self._answer(), time.perf_counter()
         angles, elapsed = counts * self._turns, now - self._measured_at
         if self._measured_at:
             moved = np.abs(angles - self.outputs[self._places["q"]])
             # A count more: an encoder at rest may be between two.
-            most = self._table.speed_limit * elapsed + self._turns
+            most = self._table.speed_limit * max(elapsed, SHORTEST) + self._turns
             if (beyond := moved > most).any():
                 i = int(beyond.argmax())
                 raise self._stopped(
@@ -244,11 +252,12 @@ class Board(Instance):
         for name, value in (
             ("q", angles),
             ("counts", counts),
-            ("tau_applied", self._before),
+            ("tau_applied", self._applied),
             (SENT_AT, self._sent_at - self._began),
             (READ_AT, now - self._began),
         ):
-            self.outputs[self._places[name]] = value
+            if places := self._places[name]:  # it is recorded, or read
+                self.outputs[places] = value
 
     def _stopped(self, what: str) -> FmuFault:
         """The fault, with zero torque."""

@@ -17,19 +17,26 @@ _CODE = """
 import os, signal, sys
 for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
     signal.signal(number, signal.SIG_IGN)
+try:
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+except (AttributeError, OSError):
+    pass
 port, message = int(sys.argv[1]), bytes.fromhex(sys.argv[2])
 os.write(1, b"1")
 if not os.read(0, 1):
     os.write(port, message)
 """
+PRIORITY = 21
+"""Of that process, above that of the haptic loop, where the user may."""
 
 
 @contextmanager
 def write_if_killed(port: int, message: bytes) -> Iterator[None]:
     """Context in which a process stands by that writes `message` to the file descriptor `port` once
     this process has ended within the context. POSIX only."""
+    code = _CODE.replace("PRIORITY", str(PRIORITY))
     with subprocess.Popen(
-        [sys.executable, "-I", "-S", "-c", _CODE, str(port), message.hex()],
+        [sys.executable, "-I", "-S", "-c", code, str(port), message.hex()],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         pass_fds=(port,),

@@ -13,7 +13,7 @@ import struct
 from collections.abc import Sequence
 from typing import Protocol
 
-WATCHDOG = 0.05
+WATCHDOG = 0.04
 """Time (s) after the last torques, from which on there are none."""
 KIT_LIMIT = 0.123
 """Torque (N.m) at which the firmware clips, MAX_TORQUE: that of the kit's motors."""
@@ -44,7 +44,7 @@ class Firmware:
         self.torques = [0.0] * CONNECTORS
         self.angles = list(plant.advance(0.0, self.torques))
         self.messages = 0
-        """Messages of torques so far."""
+        """Messages of torques since the set-up."""
         self.tripped = 0
         """How often the watchdog took a torque away."""
 
@@ -114,7 +114,7 @@ class Firmware:
         at += 1 + message[at]
         self._motors = [connector for connector, _ in found[0]]
         self._reversed = {connector: turned == 1 for connector, turned in found[0]}
-        self._encoders = {}
+        self._encoders, self.messages = {}, 0
         for connector, direction in found[1]:
             offset, counts = struct.unpack_from("<ff", message, at)
             at += 8

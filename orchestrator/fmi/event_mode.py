@@ -40,6 +40,8 @@ from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 MOST = 1000
 """Event iterations at one instant, and doSteps that do not advance time, before the FMU counts as
 one that never settles."""
+MOST_PARTS = 10_000
+"""Parts of a step, each up to an event, before the FMU counts as one that chatters."""
 CHANGED = 2
 """The value of fmi3IntervalQualifier for a new interval."""
 
@@ -147,11 +149,14 @@ class WithEvents(InProcess):
     def _in_parts(self, do_step: Callable[[float, float], int], time: float, size: float) -> int:
         """The status of a step from `time` over `size` (s), in parts that end at events."""
         end, near, now = time + size, SHARE * size, time
-        status, stuck = 0, 0
+        status, stuck, parts = 0, 0, 0
         if (due := self._due(time, near)) and self.event(time, due):
             self._end(time)
             return status
         while now < end - near:
+            if (parts := parts + 1) > MOST_PARTS:
+                what = f"it has {MOST_PARTS} events within one step: it switches on and off"
+                raise self._fault(f"{what} all the time, which a hysteresis in it ends", now)
             until = self._until(now + near, end, near)
             status = do_step(now, size if (now, until) == (time, end) else until - now)
             if not succeeded(status):
@@ -364,8 +369,8 @@ class EventSetter:
         self._clocks = [(s.reference, p) for s, p in rows if s.type == "Clock"]
         self._clocked = [(s, p) for s, p in rows if s.clocks and s.type != "Clock"]
         others = [(s, p) for s, p in rows if not s.clocks and s.type != "Clock"]
-        self._continuous = self._of([row for row in others if _is_continuous(row[0])])
-        self._discrete = self._of([row for row in others if not _is_continuous(row[0])])
+        self._continuous = self._of([row for row in others if is_continuous(row[0])])
+        self._discrete = self._of([row for row in others if not is_continuous(row[0])])
         self._signals: Vector = np.zeros(0)
         self._setters: dict[frozenset[int], Setter] = {}
 
@@ -414,7 +419,7 @@ def _one(reference: int) -> Any:
     return (ctypes.c_uint * 1)(reference)
 
 
-def _is_continuous(scalar: Scalar) -> bool:
+def is_continuous(scalar: Scalar) -> bool:
     """Whether it may be set in step mode: an input that varies continuously, as those of floating
     point do by default (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)."""
     default = "continuous" if scalar.type in CONTINUOUS else "discrete"

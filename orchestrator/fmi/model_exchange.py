@@ -16,19 +16,23 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Collection
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from fmpy import fmi2, fmi3
 
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.cvode import Cvode, Unsolved
 from hapticlink.orchestrator.fmi.description import TOLERANCE
-from hapticlink.orchestrator.fmi.event_mode import WithEvents
+from hapticlink.orchestrator.fmi.event_mode import WithEvents, is_continuous
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.status import DISCARD, SHARE, succeeded
+from hapticlink.orchestrator.fmi.transfer import Transfer
+from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 LONGEST = 1 / 50
 """The longest step of CVODE, as a share of the run; FMPy's."""
@@ -55,7 +59,7 @@ class ModelExchange(WithEvents):
         self._failed: tuple[str, int] | None = None
         self._unfit = ""
         self._stop_time = math.inf
-        self._counts = dict.fromkeys(("solver_steps", "evaluations", "state_events"), 0)
+        self._counts = dict.fromkeys(("solver_steps", "evaluations", "events"), 0)
 
     @property
     def do_step(self) -> str:
@@ -63,12 +67,17 @@ class ModelExchange(WithEvents):
 
     @property
     def calls(self) -> dict[str, int]:
-        """Besides, of the solver: its steps, evaluations of the derivatives, and state events."""
+        """Besides, of the solver: its steps and evaluations of the derivatives; and how often there
+        was event mode."""
         return super().calls | (self._counts if self._counted else {})
 
     def enter_initialization(self, stop_time: float) -> None:
         self._stop_time = stop_time
         super().enter_initialization(stop_time)
+
+    def exit_initialization(self) -> None:
+        super().exit_initialization()
+        self._solver = self._open_solver()
 
     # --- the equations ----------------------------------------------------------------------
 
@@ -158,7 +167,6 @@ class ModelExchange(WithEvents):
                 reached, root = solver.advance(until, stop=stop, once=completes)
             except Unsolved as failure:
                 raise self._unsolved(failure, time) from failure
-            self._counts["state_events"] += root
             if status := self._tell(reached, solver.states):
                 assert self._failed
                 raise self.failed(*self._failed)
@@ -173,13 +181,11 @@ class ModelExchange(WithEvents):
 
     def _begin(self, time: float) -> None:
         """Have the solver begin at `time` (s) with the states that the FMU has."""
-        if self._solver is None:
-            self._solver = self._open_solver()
+        assert self._solver is not None
         n, nominals = self._x_size, np.ones(max(self._x_size, 1))
         if n:
             self._fmi("GetContinuousStates", self._solver.states, n)
-            as_pointer = nominals.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-            self._fmi("GetNominalsOfContinuousStates", as_pointer, n)
+            self._fmi("GetNominalsOfContinuousStates", _pointer(nominals), n)
             nominals[~(nominals > 0)] = 1.0  # as FMI has it of unknown ones
         self._solver.begin(time, nominals)
         self._begins = False
@@ -225,15 +231,55 @@ class ModelExchange(WithEvents):
             self._of_fmu = next_event
             self._fmi("SetTime", next_event)
         self._begins = True
+        self._counts["events"] += 1
+        if self.description.states is not None and self._counted:
+            raise self._fault("has an event where it is linearised, behind which nothing is", time)
         return super().event(time, active, settings)
 
     def rollback(self, slot: int = 0) -> None:
         super().rollback(slot)
         self._begins, self._of_fmu = True, self.time
 
+    def serialized(self) -> bytes:
+        """Where the description has a layout of it (`Description.states`), that of an FMU of this
+        project: the values of all variables by reference, and then the continuous states."""
+        if self.description.states is None:
+            return super().serialized()
+        values, reads, order = self._layout
+        self._carry_out(reads, "gets")
+        x = np.zeros(self._x_size)
+        if len(x):
+            self._fmi("GetContinuousStates", _pointer(x), len(x))
+        return np.concatenate([values[order], x]).tobytes()
+
     def deserialize(self, state: bytes) -> None:
-        super().deserialize(state)
-        self._begins, self._of_fmu = True, 0.0
+        self._begins, self._newest, self._of_fmu = True, None, 0.0
+        if self.description.states is None:
+            super().deserialize(state)
+            return
+        values, x = np.split(np.frombuffer(state).copy(), [len(self._by_reference)])
+        if self._x_size:
+            self._fmi("SetContinuousStates", _pointer(x), len(x))
+        scalars = self._by_reference
+        inputs = [i for i, s in enumerate(scalars) if is_continuous(s)]
+        *_, sets = self._setting([scalars[i] for i in inputs])
+        for transfer in sets:  # all of one type
+            transfer.values[:] = values[inputs]
+        self._carry_out(sets, "sets")
+
+    @cached_property
+    def _by_reference(self) -> list[Scalar]:
+        scalars = [s for s in self.description.scalars if s.causality != "independent"]
+        return sorted(scalars, key=lambda s: s.reference)
+
+    @cached_property
+    def _layout(self) -> tuple[Vector, list[Transfer], list[int]]:
+        """The values of all variables by type, what reads them, and their order by reference."""
+        by_type = sorted(self._by_reference, key=lambda s: TYPES.index(s.type))
+        values = np.zeros(len(by_type))
+        place = {s.name: i for i, s in enumerate(by_type)}
+        order = [place[s.name] for s in self._by_reference]
+        return values, self._transfers("Get", by_type, values), order
 
     def close(self) -> FmuFault | None:
         try:
@@ -243,6 +289,10 @@ class ModelExchange(WithEvents):
                 self._counts["solver_steps"] = self._solver.steps
                 self._solver.close()
                 self._solver = None
+
+
+def _pointer(values: Vector) -> Any:
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
 class ModelExchange2(ModelExchange):

@@ -4,7 +4,7 @@ one are on the disk."""
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -102,6 +102,10 @@ class RunFolder(RunResults):
         own = {RUN, *(name for recorder in recorders for name in recorder.files)}
         for name in self._earlier - own:
             (self.folder / name).unlink(missing_ok=True)
+
+    def leave_out(self, names: Collection[str]) -> None:
+        """Have the record list no such files."""
+        self._setup["files"] = [name for name in self._setup["files"] if name not in names]
 
     def end(self, ending: RunEnding, columns: Mapping[str, Iterable[str]]) -> None:
         """Record how the run ended in run.json. A run without rows, for which empty tables with

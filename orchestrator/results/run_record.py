@@ -217,6 +217,8 @@ class RunEnding:
     """What has integrated an FMU for model exchange."""
     logged: dict[str, dict[str, int]] = field(default_factory=dict)
     """The number of messages in fmus.log, by FMU and status."""
+    unsaved: list[str] = field(default_factory=list)
+    """The files of states that were asked for, and that the run ended before."""
     held_outputs: dict[str, int] = field(default_factory=dict)
     """How often outputs were held since they were not finite."""
     in_python: dict[str, str] = field(default_factory=dict)

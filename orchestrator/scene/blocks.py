@@ -8,6 +8,7 @@ from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
+from hapticlink.components.specs.device import Device, Handle
 from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.linkage import GraphicsCopy
 from hapticlink.orchestrator.base.signal_names import (
@@ -127,13 +128,17 @@ def _loop(scene: Scene, skip: bool) -> Iterator[BlockPlan]:
 
 
 def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
-    clutch = bool(scene.linkage and scene.linkage.choices)
+    clutch, partial = bool(scene.linkage and scene.linkage.choices), partial_handles(scene)
     for user, hand in scene.all_hands.items():
         if driver_of(scene, user):  # somebody's own hand holds the board
             continue
         settings: dict[str, Any] = {"hand": hand}
         if clutch and not user:
             settings["clutch"] = True
+        if user in partial:
+            settings["handle"] = partial[user]
+        if scene.linkage and scene.linkage.dimension > 2:
+            settings["space"] = "point"
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
     devices = {user: replace(d, driver=None) for user, d in scene.all_devices.items()}
     beside = {user: devices[user] for user in observed_beside(scene)}
@@ -147,6 +152,8 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
         }
         if clutch and not user:
             settings["clutch"] = True
+        if user in partial:
+            settings["handle"] = partial[user]
         yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
     for user, device in beside.items():
         yield BlockPlan(block_of_user(MOTOR_MAP, user), MOTOR_MAP, "haptics", {"device": device})
@@ -164,6 +171,8 @@ def _mechanism(scene: Scene) -> dict[str, Any]:
     felt = others(scene) and bool(scene.all_controllers)
     if scene.directions_from == "mechanism" or scene.mechanism.directions:
         settings["directions"] = scene.directions
+        if handles := partial_handles(scene):
+            settings["handles"] = handles
     if scene.contacts:
         settings["contacts"] = scene.contacts
     if scene.controller and felt:
@@ -191,9 +200,17 @@ def _environment(scene: Scene, wanted: FromGraphics) -> dict[str, Any]:
         "mobility": wanted.mobility,
         "local_model": wanted.local_model,
     }
+    if wanted.directions and (handles := partial_handles(scene)):
+        settings["handles"] = handles
     if holds_model(scene) and copied["sync"] != "operational":
         settings["predicted"] = True
     return settings | ({"users": tuple(scene.devices)} if scene.devices else {})
+
+
+def partial_handles(scene: Scene) -> dict[str, Handle]:
+    """The handles of devices that do not render all directions, by user."""
+    handles = {user: device.handle for user, device in scene.all_devices.items()}
+    return {user: handle for user, handle in handles.items() if handle.angle != "held"}
 
 
 def holds_model(scene: Scene) -> bool:
@@ -208,6 +225,17 @@ def impedance(scene: Scene) -> bool:
 
 def topology(scene: Scene) -> bool:
     return any(controller.topology is not False for controller in scene.all_controllers.values())
+
+
+def described_devices(scene: Scene) -> dict[str, Device]:
+    """The devices that are as [device] says, by user: not those in whose place an FMU from
+    elsewhere is, except where the observer beside it goes by [device]."""
+    replaced = {fmu.replaces for fmu in scene.fmu}
+    return {
+        user: device
+        for user, device in scene.all_devices.items()
+        if device.observer.beside or block_of_user(DEVICE, user) not in replaced
+    }
 
 
 def observed_beside(scene: Scene) -> list[str]:

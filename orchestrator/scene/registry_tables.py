@@ -1,19 +1,19 @@
 """Tables whose keys are defined by a part of a registry: `settings` of an [[fmu]] with a `block`,
-and the entries of [[linkage.force]]."""
+the entries of [[linkage.force]], and holds with parameters (`hold_tables`)."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field, fields, make_dataclass, replace
+from dataclasses import fields, make_dataclass, replace
 from functools import cache
 from typing import Any
 
 import pydantic
-from pydantic_core import to_json
 
 from hapticlink.components.blocks import BLOCKS
-from hapticlink.orchestrator.base.errors import InputFault, shorten
+from hapticlink.orchestrator.scene import hold_tables
+from hapticlink.orchestrator.scene.argument_records import argument_fields, read_strictly
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem, value
 
@@ -37,6 +37,8 @@ def record_of(path: Path, data: Any) -> Any:
     """The record that defines the table at `path` of a scene's `data`; None where the registry has
     no part of that name, and for any other table."""
     match path:
+        case ("hold",) | ("downsampling",) | ("holds", _) | ("connection", int(), "hold"):
+            return hold_tables.parameters_of(value(data, (*path, "type")))
         case ("fmu", int(), "settings"):
             name = value(data, (*path[:2], "block"))
             return _arguments(BLOCKS[name]) if name in tuple(BLOCKS) else None
@@ -50,17 +52,11 @@ def record_of(path: Path, data: Any) -> Any:
 @cache
 def _arguments(block: Callable[..., Any]) -> Any:
     """A record of a block's arguments."""
-    arguments = inspect.signature(block).parameters.values()
-    named = [(a.name, a.annotation, field(**_default(a))) for a in arguments]
+    named = argument_fields(inspect.signature(block).parameters.values())
     record = make_dataclass("Settings", named, kw_only=True)
     # Resolves annotations that are texts; from Python 3.12 on make_dataclass sets it by itself.
     record.__module__ = block.__module__
     return record
-
-
-def _default(argument: inspect.Parameter) -> dict[str, Any]:
-    given = argument.default
-    return {} if given is argument.empty else {"default_factory": lambda: given}
 
 
 def read_registry_tables(data: Any) -> tuple[dict[Path, Any], list[Any], list[Problem]]:
@@ -77,8 +73,7 @@ def read_registry_tables(data: Any) -> tuple[dict[Path, Any], list[Any], list[Pr
         if record is None:
             continue
         try:
-            text = to_json({"table": table}, inf_nan_mode="constants")
-            records[path] = _reader(record).validate_json(text).table
+            records[path] = read_strictly(record, table)
         except pydantic.ValidationError as error:
             found = error.errors(include_url=False)
             errors += [{**e, "loc": (*path, *e["loc"][1:])} for e in found]
@@ -101,22 +96,6 @@ def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
         yield (*path, "name"), f"{name!r} is taken: name each force once"
     if "name" in table:
         names.add(name)
-
-
-@cache
-def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
-    """A pydantic reader of a record with a scene's strictness: no unknown keys, no text for a
-    number."""
-    rules = {"__pydantic_config__": Scene.__pydantic_config__}
-    holder = make_dataclass("Holder", [("table", record)], namespace=rules)
-    try:
-        reader: pydantic.TypeAdapter[Any] = pydantic.TypeAdapter(holder)
-        reader.rebuild(raise_errors=True)
-        return reader
-    except (pydantic.errors.PydanticUserError, NameError) as error:
-        why = shorten(str(error).partition("\n")[0])
-        message = f"{record.__module__}: the annotations of {record.__name__} cannot be read: {why}"
-        raise InputFault(message) from error
 
 
 def put_registry_tables(scene: Scene, records: Mapping[Path, Any]) -> Scene:

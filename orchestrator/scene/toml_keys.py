@@ -130,6 +130,14 @@ def key_lines(text: str) -> dict[Path, int]:
     return lines
 
 
+def written_path(path: Path, moved: Mapping[int, int]) -> Path:
+    """Where a scene's file has what is at `path` of tables with an FMU for each connection from a
+    signal; `moved`: by the index of such an FMU that of its connection."""
+    if path[:1] == ("fmu",) and path[1:] and path[1] in moved:
+        return ("connection", moved[int(path[1])], "from", *path[3:])
+    return path
+
+
 def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
     """File and line of `path`, or of the nearest table around it; line 0 where there is none."""
     while path:
@@ -152,6 +160,8 @@ NAMED = ("holds", "delays", "kinds")
 """Tables whose keys are names of connections, which contain dots."""
 
 LATENCY = {f.name for f in fields(Latency)}
+LEAVES: dict[str, Set[str]] = {"delays": LATENCY, "holds": {"type"}}
+"""Of these tables, the keys by which a table of theirs is a value."""
 
 
 def flat(
@@ -171,7 +181,7 @@ def flatten(data: dict[str, Any]) -> None:
     """Replaces nested tables of `NAMED` in a scene's `data` by entries with dotted names."""
     for table in NAMED:
         if isinstance(data.get(table), dict):
-            data[table] = dict(flat(data[table], LATENCY if table == "delays" else frozenset()))
+            data[table] = dict(flat(data[table], LEAVES.get(table, frozenset())))
 
 
 def flatten_path(names: tuple[Any, ...]) -> tuple[Any, ...]:

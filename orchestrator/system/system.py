@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.boards.replayed_board import BoardRecording
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.start_values import Starts
@@ -47,6 +49,10 @@ class Fmu:
     """Where it runs, if that is on another computer."""
     driver: Driver | None = None
     """The board in its place."""
+    stand_in: Callable[..., Any] | None = None
+    """What makes the `Instance` that runs in its place, by the arguments of one."""
+    replayed: BoardRecording | None = field(default=None, compare=False)
+    """What is read in the board's place."""
 
     @property
     def sampled(self) -> bool:

@@ -1,6 +1,6 @@
-"""What is drawn of a frame: poses of the bodies and of the devices' arms, directions, forces in cut
-joints, and what happens in it. All are CasADi functions of the raw signals, so that a page without
-Python evaluates the same, as C."""
+"""What is drawn of a frame: poses of the bodies and of the devices' links, directions, forces in
+cut joints, and what happens in it. All are CasADi functions of the raw signals, so that a page
+without Python evaluates the same, as C."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ import numpy as np
 
 from hapticlink.analysis.findings.episodes import FULL_TORQUE
 from hapticlink.components.device.motors_and_encoders import torque_function
-from hapticlink.components.device.workspace import link_function
+from hapticlink.components.device.workspace import line_function
 from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.visualization.mechanism.marks import marks, point_of, state
 
 PORT = "user's port"
@@ -24,6 +25,15 @@ RAW = ("ghost", "q", "lambda", "P_c", "measured")
 """What frames have instead of what is drawn."""
 LEAST_SHARE = 0.05
 """Of a constrained direction in the plane, below which it is a mere turn."""
+
+
+def require_planar(linkage: Linkage, name: str) -> None:
+    """Raises InputFault for a linkage in space, which nothing draws."""
+    if linkage.dimension > 2:
+        raise InputFault(
+            f"{name}: its linkage is in space, and what is drawn is of the plane; `hapticlink run` "
+            "writes its tables and the path of its operational point"
+        )
 
 
 class Part(NamedTuple):
@@ -83,7 +93,7 @@ class Picture:
             self.parts.append(_state(user, "contacts", {"gap": gap, "F_env": force}, touching))
         for user, device in devices.items():
             self.parts.append(
-                Part(user, "arms", ("handle",), device.space.pose.shape, link_function(device))
+                Part(user, "arms", ("handle",), device.space.pose.shape, line_function(device))
             )
             self.parts.append(_is_saturated(user, device))
 
@@ -128,14 +138,14 @@ def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
 def _cut_joint_forces(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:
     """The force (N) in each joint that is cut, (2, k). It has two multipliers, a slot one; that of
     what slides is along the normal, and a moment has no arrow."""
-    rows = sum(loop.kind.rows for loop in linkage.loop)
+    rows = sum(loop.kind.rows() for loop in linkage.loop)
     along, q = ca.SX.sym("lambda", rows), ca.SX.sym("q", poses.size1_in(0))
     angles, forces, row = poses(q)[2, :], [], 0
     for loop in linkage.loop:
         normal = angles[names.index(loop.bodies[1])] + (loop.axis or 0.0)
         force = along[row] * ca.vertcat(-ca.sin(normal), ca.cos(normal))
         forces.append(force if loop.kind.has_axis else along[row : row + 2])
-        row += loop.kind.rows
+        row += loop.kind.rows()
     made = ca.Function("cut", [along, q], [ca.horzcat(*forces)])
     return Part("", "cut", ("lambda", "q"), (rows, q.numel()), made)
 
@@ -171,8 +181,6 @@ def _state(user: str, kind: str, needs: Mapping[str, ca.SX], holds: ca.SX) -> Pa
 def _is_saturated(user: str, device: Device) -> Part:
     """Whether a motor gives its largest torque."""
     force, pose = (ca.SX.sym(name, device.space.size) for name in ("F_motor", "measured"))
-    torques = torque_function(device)(force, pose)
-    most = FULL_TORQUE * device.torque_limit
-    return _state(
-        user, "saturated", {"F_motor": force, "measured": pose}, ca.norm_inf(torques) >= most
-    )
+    limits = ca.DM([motor.torque_limit for motor in device.motors])
+    loads = ca.norm_inf(torque_function(device)(force, pose) / limits)
+    return _state(user, "saturated", {"F_motor": force, "measured": pose}, loads >= FULL_TORQUE)

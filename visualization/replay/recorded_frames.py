@@ -23,9 +23,9 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_POSE, by_user
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector, load
-from hapticlink.orchestrator.results.recorded_scene import scene_part
+from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization.mechanism.frame_signals import candidates
-from hapticlink.visualization.mechanism.picture import PORT, Picture
+from hapticlink.visualization.mechanism.picture import PORT, Picture, require_planar
 
 PLACES = ("q", "x", "handle")
 """What a frame cannot be drawn without, of each user."""
@@ -50,6 +50,7 @@ class Recorded:
         if linkage is None:
             message = f"there is nothing to draw; `hapticlink report {folder}` has its figures"
             raise InputFault(f"{folder}: the run has no [linkage]: {message}")
+        require_planar(linkage, folder)
         self.linkage = linkage
         device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
@@ -75,6 +76,8 @@ class Recorded:
         self.users = [user.name for user in find_users(results)[1:]]
         others = scene_part(results, "devices", Mapping[str, Device]) if self.users else {}
         devices = by_user(device if "handle" in self.signals else None, others or {})
+        described = described_devices(results)
+        devices = {user: own for user, own in devices.items() if user in described}
         self.picture = Picture(linkage, devices, self.contacts)
 
     @property

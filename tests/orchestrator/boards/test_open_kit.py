@@ -9,7 +9,7 @@ import pytest
 
 from hapticlink.orchestrator.boards.driver import Silent
 from hapticlink.orchestrator.boards.open_kit import OpenKit
-from hapticlink.orchestrator.boards.simulated_board import Firmware
+from hapticlink.orchestrator.boards.simulated_board import WATCHDOG, Firmware
 from tests.orchestrator.boards.kits import TWO_MOTORS, Port, Still, kit
 
 RESET = bytes.fromhex("00 05")
@@ -65,11 +65,12 @@ def test_the_firmware_clips_and_takes_no_nan() -> None:
 def test_the_watchdog_takes_the_torque_away(watchdog: bool) -> None:
     board = Firmware(Still(), watchdog)
     board.take(RESET + SET_UP + TORQUES, 1.0)
-    board.at(1.0499)
+    board.at(1.0 + WATCHDOG - 1e-4)
     assert any(board.torques)
-    board.at(1.0501)
+    board.at(1.0 + WATCHDOG + 1e-4)
     assert any(board.torques) != watchdog
     assert board.tripped == watchdog
+    assert WATCHDOG <= 0.05
 
 
 @pytest.mark.parametrize(

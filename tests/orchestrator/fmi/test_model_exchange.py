@@ -10,6 +10,7 @@ from fmpy import simulate_fmu
 
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi import event_mode
 from hapticlink.orchestrator.fmi.description import describe
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.programs.foreign import read_foreign
@@ -131,6 +132,14 @@ def test_what_cannot_be_integrated_is_a_fault_with_all_rows_before_it(tmp_path, 
     assert results.haptics["time"][-1] == 0.09375
 
 
+def test_one_that_chatters_is_a_fault(tmp_path, monkeypatch):
+    monkeypatch.setattr(event_mode, "MOST_PARTS", 50)
+    equations_fmu(tmp_path)
+    experiment, _ = run(tmp_path, ONE + started(top=0.5 + 1e-6), "duration=1.0")
+    found = str(experiment.outcome.fault)
+    assert "one: it has 50 events within one step: it switches on and off all the time" in found
+
+
 def test_a_restored_state_goes_on_as_before(tmp_path):
     description = describe(equations_fmu(tmp_path))
     outputs = np.zeros(len(description.outputs))
@@ -153,7 +162,7 @@ def test_run_json_counts_what_the_solver_did(tmp_path):
     equations_fmu(tmp_path)
     experiment, _ = run(tmp_path, ONE, "duration=1.0")
     calls = experiment.outcome.details.calls["one"]
-    assert calls["state_events"] == 2
+    assert calls["events"] == 2
     assert 0 < calls["solver_steps"] < calls["evaluations"]
 
 

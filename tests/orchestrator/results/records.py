@@ -18,7 +18,9 @@ def run_json(**changes: Any) -> dict[str, Any]:
     """The content of a run.json of which all that is not given is empty."""
     kinds = {"str": str, "list": list, "dict": dict}
     empty: dict[str, Any] = {
-        f.name: kinds[str(f.type).partition("[")[0]]() for f in fields(RunSetup)
+        f.name: kinds[str(f.type).partition("[")[0]]()
+        for f in fields(RunSetup)
+        if f.default is not None
     }
     record = RunSetup(**empty | {"scene": {"title": "", "linkage": None, "contacts": None}})
     return content(record) | {"end": {"reason": "running"}} | changes

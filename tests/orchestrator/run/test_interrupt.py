@@ -50,10 +50,10 @@ def _nothing_left_behind(own_temporary_folder):
 INTERRUPTED = """
 import os, signal, hapticlink.orchestrator.open_scene as s
 load = s.load
-def interrupted(*a):
+def interrupted(*a, **k):
     s.load = load
     os.kill(os.getpid(), signal.SIGINT)
-    return load(*a)
+    return load(*a, **k)
 s.load = interrupted
 from hapticlink.__main__ import main
 main()

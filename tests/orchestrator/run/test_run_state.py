@@ -17,7 +17,7 @@ from hapticlink.orchestrator.holds import HOLDS, Hold
 from hapticlink.orchestrator.results.recover import recover
 from hapticlink.orchestrator.scene.find_scene import list_shipped
 from tests.little_fmus import python_fmu
-from tests.orchestrator.c_fmus import event_fmu3
+from tests.orchestrator.c_fmus import equations_fmu, event_fmu3
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, scene, wire_table
 from tests.shared_fixtures import status
 
@@ -92,10 +92,22 @@ def test_to_save_changes_no_byte(tmp_path):
         hl.run("single-body", SMALL, out=tmp_path / name, figures=False, save=save)
     for table in ("haptics.csv", "graphics.csv"):
         assert len({(tmp_path / name / table).read_bytes() for name in ("saved", "plain")}) == 1
+    assert not hl.load(tmp_path / "saved").run["unsaved"]
     states = {path.name for path in (tmp_path / "saved").glob("*.state")}
     assert states == {"at-0.3.state", "last.state", "end.state"}
     hl.run("single-body", SMALL, out=tmp_path / "saved", figures=False)  # replaces them as well
     assert not [*(tmp_path / "saved").glob("*.state")]
+
+
+def test_a_run_that_ends_before_says_what_it_did_not_save(tmp_path):
+    options = SMALL | {"stop_when": "hand.F[2] > 0.05"}  # the profile's, after 0.25 s
+    found = hl.run("single-body", options, out=tmp_path, figures=False, save=[0.1, "end"])
+    assert found.run["end"]["reason"] == "stop_when"
+    assert found.run["end"]["time"] > 0.1
+    assert found.run["unsaved"] == ["end.state"]
+    assert "warning: end.state not saved: the run ended before" in found.run["warnings"]
+    assert {*found.run["files"]} >= {path.name for path in tmp_path.glob("*.state")}
+    assert "end.state" not in found.run["files"]
 
 
 @pytest.fixture(scope="module")
@@ -194,13 +206,16 @@ def test_a_run_does_not_replace_what_it_goes_on_from(small):
 def test_fmus_that_cannot_save_are_named_before_the_run(tmp_path):
     python_fmu(tmp_path, "Gives")
     event_fmu3(tmp_path)
+    equations_fmu(tmp_path)
     text = fmu_table("gives", "Gives") + fmu_table("also", "Gives")
-    text += fmu_table("one", "events", ISOLATED)
+    text += fmu_table("one", "events", ISOLATED) + fmu_table("solved", "equations")
     with pytest.raises(InputFault) as refused:
         hl.run(scene(tmp_path, text), out=tmp_path / "out", save=["end"])
     assert not (tmp_path / "out" / "run.json").exists()
     cannot = "cannot save its state (canGetAndSetFMUstate)"
-    for name, why in (("gives", cannot), ("also", cannot), ("one", "in a process of its own")):
+    reasons = {"gives": cannot, "also": cannot, "one": "in a process of its own"}
+    reasons["solved"] = "the history of its solver"
+    for name, why in reasons.items():
         assert f"{name} (" in str(refused.value)
         assert why in str(refused.value)
 

@@ -1,0 +1,47 @@
+"""Records of the arguments of functions that plugins write, read as strictly as a scene."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable
+from dataclasses import field, make_dataclass
+from functools import cache
+from typing import Any
+
+import pydantic
+from pydantic_core import to_json
+
+from hapticlink.orchestrator.base.errors import InputFault, shorten
+from hapticlink.orchestrator.scene.scene import Scene
+
+
+def argument_fields(arguments: Iterable[inspect.Parameter]) -> list[tuple[str, Any, Any]]:
+    """Name, annotation and field of each argument, for a record."""
+    return [(a.name, a.annotation, field(**_default(a))) for a in arguments]
+
+
+def _default(argument: inspect.Parameter) -> dict[str, Any]:
+    given = argument.default
+    return {} if given is argument.empty else {"default_factory": lambda: given}
+
+
+def read_strictly(record: Any, table: Any) -> Any:
+    """The record of a table. Raises pydantic.ValidationError, whose paths begin with "table"."""
+    text = to_json({"table": table}, inf_nan_mode="constants")
+    return _reader(record).validate_json(text).table
+
+
+@cache
+def _reader(record: Any) -> pydantic.TypeAdapter[Any]:
+    """A pydantic reader of a record with a scene's strictness: no unknown keys, no text for a
+    number."""
+    rules = {"__pydantic_config__": Scene.__pydantic_config__}
+    holder = make_dataclass("Holder", [("table", record)], namespace=rules)
+    try:
+        reader: pydantic.TypeAdapter[Any] = pydantic.TypeAdapter(holder)
+        reader.rebuild(raise_errors=True)
+        return reader
+    except (pydantic.errors.PydanticUserError, NameError) as error:
+        why = shorten(str(error).partition("\n")[0])
+        message = f"{record.__module__}: the annotations of {record.__name__} cannot be read: {why}"
+        raise InputFault(message) from error
