@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2991,
     "orchestrator": 16205,
     "programs": 1023,
-    "analysis": 8879,
+    "analysis": 8887,
     "visualization": 3601,
     "api": 635,
     "commands": 1606,

@@ -153,30 +153,38 @@ def modes(linear: Linearisation, period: float) -> list[Mode]:
     A, E = linear.A * scale / scale[:, None], np.abs(linear.E * scale / scale[:, None])
     E = np.maximum(E, FLOOR * np.abs(A))
     values, left, right = eig(A, left=True, right=True)
-    found: list[tuple[Mode, Complex, Complex]] = []
-    for i, z in enumerate(values):
-        if z.imag < 0.0:
-            continue
-        v, w = right[:, i], left[:, i].conj()
-        overlap = abs(w @ v)
-        shares = np.abs((linear.V @ (v * scale)) * (linear.V @ (w / scale)))[linear.taken]
-        uncertainty = float(np.abs(w) @ E @ np.abs(v)) / overlap if overlap else np.inf
-        s = np.log(z) / period if z else complex(-np.inf)
-        mode = Mode(
-            complex(z),
-            uncertainty,
-            float(s.real),
-            float(s.imag),
-            shares / shares.sum() if shares.any() else shares,
-            linear.V @ (v * scale),
+    upper = values.imag >= 0.0
+    z, v, w = values[upper], right[:, upper], left[:, upper].conj()
+    overlap = np.abs((w * v).sum(axis=0))
+    apart = ((np.abs(w).T @ E).T * np.abs(v)).sum(axis=0)
+    uncertainty = np.divide(apart, overlap, out=np.full(len(z), np.inf), where=overlap > 0.0)
+    vectors = linear.V @ (scale[:, None] * v)
+    shares = np.abs(vectors * (linear.V @ (w / scale[:, None])))[linear.taken]
+    total = shares.sum(axis=0)
+    shares /= np.where(total > 0.0, total, 1.0)
+    with np.errstate(divide="ignore"):
+        s = np.log(z) / period
+    found = [
+        (
+            Mode(
+                complex(z[i]),
+                float(uncertainty[i]),
+                float(s[i].real),
+                float(s[i].imag),
+                shares[:, i],
+                vectors[:, i],
+            ),
+            w[:, i],
+            v[:, i],
         )
-        found.append((mode, w, v))
+        for i in range(len(z))
+    ]
     found.sort(key=lambda each: -abs(each[0].z))
     sorted_modes = [mode for mode, _, _ in found]
     first = next((i for i, mode in enumerate(sorted_modes) if not mode.neutral), None)
     if first is not None and sorted_modes[first].is_in_doubt:
-        mode, w, v = found[first]
-        slope = np.outer(w, v) * np.conj(mode.z * (w @ v))
+        mode, left_1, right_1 = found[first]
+        slope = np.outer(left_1, right_1) * np.conj(mode.z * (left_1 @ right_1))
         moved = _distance(mode.z, A, np.sign(slope.real) * E)
         sorted_modes[first] = replace(mode, uncertainty=min(mode.uncertainty, moved))
     return sorted_modes
