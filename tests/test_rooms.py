@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 6143,
     "fmus": 2822,
-    "orchestrator": 14043,
+    "orchestrator": 14046,
     "programs": 1023,
     "analysis": 8079,
     "visualization": 3417,
