@@ -213,9 +213,14 @@ class ModelExchange(WithEvents):
     # --- what makes the solver begin anew ----------------------------------------------------
 
     def take_continuous(self, setter: Setter) -> None:
+        """Where they have changed, an FMU with event indicators is in event mode at this instant: a
+        relation that a jump has turned changes no sign afterwards."""
         newest = setter, setter.values.tobytes()
-        self._begins = self._begins or newest != self._newest
-        self._newest = newest
+        if newest == self._newest:
+            return
+        self._begins, self._newest = True, newest
+        if self._size()[1] and self.description.states is None:
+            self.place.ended = self.event(self.time)
 
     def event(
         self,

@@ -74,6 +74,7 @@ def test_stiff_equations_and_inputs_that_change(tmp_path, k):
         x.append(held + (x[-1] - held) * np.exp(-k / 64))
     np.testing.assert_allclose(found["one.x"], x, rtol=0, atol=1e-7)
     assert np.ptp(u) > 1
+    assert found["one.entered"][-1] == np.count_nonzero(np.diff(u[:-1])) + 1  # a jump is an event
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])
