@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7043,
-    "fmus": 2989,
-    "orchestrator": 16084,
+    "components": 7455,
+    "fmus": 2991,
+    "orchestrator": 16209,
     "programs": 1023,
-    "analysis": 8831,
-    "visualization": 3509,
+    "analysis": 8857,
+    "visualization": 3601,
     "api": 591,
-    "commands": 1599,
+    "commands": 1600,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

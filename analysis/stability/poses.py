@@ -110,6 +110,15 @@ class Pose:
         return {"hand": spring(self.point, self.press, FIRM), **hands}
 
 
+def require_planar_port(scene: Scene) -> None:
+    """Raises InputFault for a linkage in space, which hands from soft to firm do not hold."""
+    if scene.linkage and scene.linkage.dimension > 2:
+        raise InputFault(
+            "its port is judged in the plane: in space `hapticlink stability --equilibrium` judges "
+            "the scene's own hand, where it comes to rest"
+        )
+
+
 def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
     """A run of the scene. Raises InputFault where it has no row."""
     with temporary_folders.temporary_folder() as room:

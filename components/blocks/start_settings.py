@@ -81,7 +81,7 @@ def has_free_start(settings: Mapping[str, Any]) -> bool:
         and not (settings.get("contacts") or settings.get("local_model"))
         and not (linkage.start_velocity or linkage.choices or linkage.rubbing or linkage.force)
         and all(gear.offset is not None for gear in linkage.gear)
-        and all(body.mass and body.inertia for body in linkage.body)
+        and all(body.mass and body.moments[0] for body in linkage.body)
     )
 
 
