@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.analysis.findings import summary
+from hapticlink.api.board_start import start_at_handle
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -67,6 +68,7 @@ def run(
     arrivals: str | Path | None = None,
     device: str | None = None,
     stop: Callable[[], bool] | None = None,
+    ready: Callable[[str], object] | None = None,
     remote: Mapping[str, str] | None = None,
     key: str | Path | None = None,
     save: Sequence[float | str] = (),
@@ -83,12 +85,13 @@ def run(
     (docs/real-time.md), at `speed` times that of the clock, less than 1 for slow motion. `arrivals`
     is the folder of a run in real time, whose samples arrive here when they arrived there. `device`
     is the port of the board in the place of the simulated device (docs/your-device.md); `stop` is
-    asked about every 20 ms whether the run in real time is to end. `remote` has the addresses
-    HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on other computers,
-    and `key` is the file of the key of both (docs/two-computers.md). `save`: when the state of the
-    run is saved to `out`, at times (s), at its "end", or every so many seconds, "every=0.5"
-    (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is a scene
-    itself.
+    asked about every 20 ms whether the run in real time is to end, and `ready` is told what to do
+    with the handle of a board that has a `home`, and returns when it is done. `remote` has the
+    addresses HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on other
+    computers, and `key` is the file of the key of both (docs/two-computers.md). `save`: when the
+    state of the run is saved to `out`, at times (s), at its "end", or every so many seconds,
+    "every=0.5" (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is
+    a scene itself.
 
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
@@ -101,6 +104,8 @@ def run(
     read = open_scene.load(scene, options, resumes=True)
     if device is not None:
         read = open_scene.load(read, with_board(device))
+    if real_time:
+        read = start_at_handle(read, ready or (lambda what: None))
     if arrivals is not None and (real_time or remote):
         raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")
     if speed != 1.0 and not real_time:

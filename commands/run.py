@@ -20,7 +20,7 @@ from hapticlink.commands.options import (
     title,
 )
 from hapticlink.commands.progress import progress
-from hapticlink.commands.stop_key import stop_key
+from hapticlink.commands.stop_key import stop_key, wait_for_enter
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
 from hapticlink.orchestrator.scene.blocks import driver_of
@@ -168,6 +168,7 @@ def run(
                 arrivals=arrivals,
                 device=device,
                 stop=stop,
+                ready=wait_for_enter,
                 remote=dict(map(_place, remote or ())),
                 key=key,
                 save=save or (),

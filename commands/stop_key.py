@@ -1,4 +1,4 @@
-"""A key that ends a run, as the emergency stop of a board."""
+"""Keys of a run with a board: any of them ends it, and Enter says that the handle is in place."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+from hapticlink.orchestrator.base.terminal_output import say
 
 
 @contextmanager
@@ -29,3 +31,10 @@ def stop_key() -> Iterator[Callable[[], bool] | None]:
             yield lambda: bool(select.select([sys.stdin], [], [], 0)[0])
         finally:
             termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, before)
+
+
+def wait_for_enter(what: str) -> None:
+    """Say what to do, and wait until Enter says that it is done; without a terminal go on."""
+    if sys.stdin and sys.stdin.isatty():
+        say(f"{what}, then press Enter", file=sys.stderr)
+        sys.stdin.readline()

@@ -17,6 +17,7 @@ from hapticlink.commands import completion
 from hapticlink.commands.options import UNCHANGED, Out, SceneOptions, default_folder
 from hapticlink.commands.progress import waiting
 from hapticlink.commands.run import Device
+from hapticlink.commands.stop_key import wait_for_enter
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
@@ -122,12 +123,14 @@ def view(
     second_run = "hapticlink.commands.view_second_run", f"{root}-b"
     with _server(host, port, token, *second_run) as link:
         import hapticlink as hl
+        from hapticlink.api.board_start import start_at_handle
         from hapticlink.api.runs import with_board
         from hapticlink.orchestrator.scene.overrides import write_options
         from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 
         board = write_options(with_board(device)) if device else ()
         read = load_viewed_scene(scene, (*changes.options, *board))  # while the server starts
+        read = start_at_handle(read, wait_for_enter)
         served_port = _port(link, host, port)
         _show(read.title, host, served_port, token, browser)
         hand = "whoever holds the board is" if driver_of(read, "") else "the mouse is"

@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7455,
     "fmus": 2991,
-    "orchestrator": 16209,
+    "orchestrator": 16205,
     "programs": 1023,
-    "analysis": 8857,
+    "analysis": 8879,
     "visualization": 3601,
-    "api": 591,
-    "commands": 1600,
+    "api": 635,
+    "commands": 1606,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -16,6 +16,7 @@ from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints
+from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.hand import ConstantHand, Hand, HoldingHand
 from hapticlink.components.specs.linkage import Linkage
@@ -334,6 +335,8 @@ def at_equilibrium(
             at_rest.append(pressed)
             held_at[pose.name] = place
         tell(f"  {len(held_at)} poses with an equilibrium")
+        for each in find_stand_ins(work.responses):
+            tell(f"  {each}")
         if not held_at:
             raise InputFault("the scene has no equilibrium in any pose of its run, in a firm grip")
         yield at_rest, held_at

@@ -27,6 +27,7 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.boards.driver import DeviceDriver, Silent, Wiring
 
@@ -80,9 +81,8 @@ class OpenKit(DeviceDriver):
         try:
             from serial import Serial, SerialException
         except ModuleNotFoundError:
-            raise InputFault(
-                f"{self.port}: serial ports need pyserial: pip install 'hapticlink[board]'"
-            ) from None
+            remedy = install_command("board")
+            raise InputFault(f"{self.port}: serial ports need pyserial: {remedy}") from None
         try:
             self._serial = Serial(self.port, 115200, timeout=0, write_timeout=0.05)
         except (SerialException, ValueError) as error:

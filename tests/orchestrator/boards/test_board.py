@@ -11,12 +11,14 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
+import casadi as ca
 import numpy as np
 import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.fit.log import read_log
 from hapticlink.api.runs import with_board
+from hapticlink.components.device.models import device_model
 from hapticlink.orchestrator.boards import DRIVERS
 from hapticlink.orchestrator.boards.safe_torques import SafeTorques
 from hapticlink.orchestrator.boards.simulated_board import Firmware
@@ -331,3 +333,40 @@ def test_a_log_with_skipped_ticks_can_be_fitted(port, tmp_path):
     assert log.period == pytest.approx(1 / 512)
     assert 300 < len(log.pose) < 358
     assert log.hand is None
+
+
+def test_the_linkage_starts_at_the_handle(port, tmp_path):
+    """A board that is started in its home pose, and held elsewhere then."""
+    kit = SCENE | {"device.extends": "2diy", "controller.bias": "full"}
+    device = hl.scene("closed-loop", kit).device
+    model = device_model(device)
+    y = ca.SX.sym("y", 2)
+    angles = ca.Function("angles", [y], [model.angles(y, model.numbers)])
+    place = np.array([0.035, 0.02])
+    home, there = (np.array(angles(at)).ravel() for at in (model.start_place, place))
+    said: list[str] = []
+
+    def ready(what: str) -> None:
+        said.append(what)
+        if len(said) == 2:
+            port.firmware._plant.angles = [*(there - home), 0.0, 0.0]  # type: ignore[attr-defined]
+
+    options = kit | {"device.driver.home": home.tolist()}
+    run = hl.run("closed-loop", options, out=tmp_path, figures=False, real_time=True, ready=ready)
+    assert run.fault is None
+    assert len(said) == 2
+    assert run["virtual_mechanism.x"][0, :2] == pytest.approx(place, abs=1e-4)
+    assert run["observer.x"][0, :2] == pytest.approx(place, abs=1e-4)
+    assert not any(port.torques[-1])
+
+
+def test_a_handle_that_the_linkage_does_not_reach(port, tmp_path):
+    kit = SCENE | {"device.extends": "2diy"}
+    model = device_model(hl.scene("closed-loop", kit).device)
+    y = ca.SX.sym("y", 2)
+    angles = ca.Function("angles", [y], [model.angles(y, model.numbers)])
+    home = np.array(angles([0.0, 0.065])).ravel().tolist()
+    with pytest.raises(hl.InputFault, match=r"does not reach the handle at .* within"):
+        hl.run("closed-loop", kit | {"device.driver.home": home}, real_time=True)
+    assert not any(map(any, port.torques))
+    assert port.closed

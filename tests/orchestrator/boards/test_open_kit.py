@@ -4,9 +4,11 @@ the firmware's source (Haply_Arduino_Firmware 1.5.0, setup_device, write_states,
 from __future__ import annotations
 
 import math
+import sys
 
 import pytest
 
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.boards.driver import Silent
 from hapticlink.orchestrator.boards.open_kit import OpenKit
 from hapticlink.orchestrator.boards.simulated_board import WATCHDOG, Firmware
@@ -105,3 +107,13 @@ def test_a_board_that_lost_bytes_takes_three_messages_of_zero_as_no_torque() -> 
         board = Firmware(Still())
         board.take(RESET + SET_UP + TORQUES + TORQUES[cut:] + 3 * zero, 0.0)
         assert max(map(abs, board.torques)) < 1e-30, cut
+
+
+def test_a_port_that_is_not_there_and_a_missing_package(monkeypatch) -> None:
+    with pytest.raises(OSError, match="/dev/nothing"):
+        OpenKit("/dev/nothing", TWO_MOTORS).open()
+    monkeypatch.setitem(sys.modules, "serial", None)
+    with pytest.raises(
+        InputFault, match=r'serial ports need pyserial: pip install "hapticlink\[board\]"'
+    ):
+        OpenKit("/dev/nothing", TWO_MOTORS).open()
