@@ -9,7 +9,13 @@ import pytest
 from hapticlink.components.blocks.start_settings import START_SETTINGS, without_start_values
 from hapticlink.components.component import Component
 from hapticlink.components.specs.control import Controller, PassivityLaw, Teleoperation, Topology
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
+from hapticlink.components.specs.hand import (
+    ArmHand,
+    ConstantHand,
+    FingertipHand,
+    ProfileHand,
+    SpringHand,
+)
 from hapticlink.components.specs.linkage import Directions
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator import open_scene
@@ -22,6 +28,7 @@ HANDS = (
     ProfileHand(table=((0.0, 1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)), damping=THREE),
     ArmHand(target=((0.0, 0.1, 0.2, 0.3),), mass=(2.0, 3.0, 4.0), grip_damping=THREE),
     SpringHand(stiffness=THREE, damping=THREE),
+    FingertipHand(target=((0.0, 0.1, 0.2, 0.3),), mass=0.02, pulp_damping=1.5),
 )
 EVERY = Controller(
     damping=THREE,
