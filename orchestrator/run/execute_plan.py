@@ -138,7 +138,7 @@ def run(
                 plan = kept.plan
             else:
                 pace = real_time.pace if real_time else None
-                simulation = Simulation(plan.system, results, stack, opened, pace)
+                simulation = Simulation(plan.system, results, stack, opened, pace, goes_back=False)
                 if real_time:
                     stack.enter_context(real_time.of(plan, simulation))
                 loop = CompiledLoop(plan, simulation)
