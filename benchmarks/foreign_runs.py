@@ -19,7 +19,9 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -52,6 +54,8 @@ class Comparison:
     """Why it is not run, or how its run ended before its time, in hapticlink's own words."""
     fmpy: str = ""
     """Why FMPy does not run it, in FMPy's words."""
+    events: int = 0
+    """How often an FMU for model exchange was in event mode."""
     inputs: str = "none"
     """Whether inputs are "set", "untouched" since the FMU ends a run otherwise, or there are
     "none"."""
@@ -79,6 +83,16 @@ def _describe(path: Path) -> Any:
         return None
 
 
+def find_interfaces(path: Path) -> tuple[str, ...]:
+    """Of co-simulation and model exchange those that an FMU has."""
+    about = _describe(path)
+    has = {
+        "co-simulation": about and about.coSimulation,
+        "model-exchange": about and about.modelExchange,
+    }
+    return tuple(kind for kind, element in has.items() if element is not None)
+
+
 def choose_inputs(path: Path) -> dict[str, tuple[Any, Any]]:
     """By input that is a scalar number: its start value, and the value from half of the run on, one
     more (the other one of a Boolean), within its declared range."""
@@ -99,17 +113,31 @@ def choose_inputs(path: Path) -> dict[str, tuple[Any, Any]]:
 
 
 def compare(
-    path: Path, rate: int, duration: float, room: Path, libraries: Path | None = None
+    path: Path,
+    rate: int,
+    duration: float,
+    room: Path,
+    libraries: Path | None = None,
+    interface: str = "co-simulation",
+    start: Mapping[str, float] = MappingProxyType({}),
 ) -> Comparison:
     """Both runs, without setting inputs where the FMU ends a run in which they are set. libraries:
-    what Python FMUs import besides. Files are left in `room`."""
+    what Python FMUs import besides. start: values of parameters. Files are left in `room`."""
     inputs = choose_inputs(path)
-    found = _compare(path, rate, duration, inputs, room / "set", libraries)
+    how = _How(interface, start, libraries)
+    found = _compare(path, rate, duration, inputs, room / "set", how)
     if inputs and (found.hapticlink or found.fmpy) and (room / "set" / "run").exists():
-        untouched = _compare(path, rate, duration, {}, room / "untouched", libraries)
+        untouched = _compare(path, rate, duration, {}, room / "untouched", how)
         if untouched.outputs:
             return replace(untouched, inputs="untouched")
     return found
+
+
+@dataclass(frozen=True)
+class _How:
+    interface: str
+    start: Mapping[str, float]
+    libraries: Path | None
 
 
 def _compare(
@@ -118,22 +146,22 @@ def _compare(
     duration: float,
     inputs: Mapping[str, tuple[Any, Any]],
     room: Path,
-    libraries: Path | None,
+    how: _How,
 ) -> Comparison:
     room.mkdir()
     at = math.ceil(rate * duration / 2) / rate
     environment = dict(os.environ)
-    if libraries:
+    if how.libraries:
         old = environment.get("PYTHONPATH")
-        environment["PYTHONPATH"] = os.pathsep.join([str(libraries), *([old] if old else [])])
-    words = _run_hapticlink(path, rate, duration, inputs, at, room, environment)
+        environment["PYTHONPATH"] = os.pathsep.join([str(how.libraries), *([old] if old else [])])
+    words = _run_hapticlink(path, rate, duration, inputs, at, room, environment, how)
     table = room / "run" / "haptics.csv"
     ours = _read_table(table) if table.exists() else {}
     if len(ours.get("time", ())) < 2:
         return Comparison(hapticlink=words or "its run has no rows")
     asked = {
         "path": str(path), "rate": rate, "duration": duration, "inputs": inputs, "at": at,
-        "out": str(room / "fmpy.npz"),
+        "out": str(room / "fmpy.npz"), "interface": how.interface, "start": dict(how.start),
     }  # fmt: skip
     (room / "asked.json").write_text(json.dumps(asked))
     status, text = _call(["benchmarks.foreign_fmpy", str(room / "asked.json")], environment)
@@ -142,7 +170,9 @@ def _compare(
         return Comparison(len(ours["time"]), hapticlink=words, fmpy=text)
     with np.load(room / "fmpy.npz") as theirs:
         found = _compare_tables(ours, dict(theirs), at if inputs else math.inf, words)
-    return replace(found, inputs="set" if inputs else "none")
+    calls = json.loads((room / "run" / "run.json").read_text())["calls"].get("fmu", {})
+    events = calls.get("events", 0)
+    return replace(found, inputs="set" if inputs else "none", events=events)
 
 
 def _run_hapticlink(
@@ -153,16 +183,22 @@ def _run_hapticlink(
     at: float,
     room: Path,
     environment: Mapping[str, str],
+    how: _How,
 ) -> str:
     """What it says where it does not run the FMU to the end."""
-    start = ", ".join(f"{json.dumps(n)} = {json.dumps(v)}" for n, (v, _) in inputs.items())
+    values = {n: v for n, (v, _) in inputs.items()} | dict(how.start)
+    start = ", ".join(f"{json.dumps(n)} = {json.dumps(v)}" for n, v in values.items())
     then = ", ".join(f"{json.dumps(f'fmu.{n}')} = {json.dumps(v)}" for n, (_, v) in inputs.items())
     lines = [
         f"title = {json.dumps(path.stem)}", f"duration = {duration}", f"haptics.rate = {rate}",
         "[[fmu]]", 'name = "fmu"', f"path = {json.dumps(str(path))}",
     ]  # fmt: skip
+    if how.interface == "model-exchange":
+        lines.append(f"interface = {json.dumps(how.interface)}")
+    if values:
+        lines.append(f"start = {{ {start} }}")
     if inputs:
-        lines += [f"start = {{ {start} }}", "[[at]]", f"time = {at!r}", f"set = {{ {then} }}"]
+        lines += ["[[at]]", f"time = {at!r}", f"set = {{ {then} }}"]
     scene = room / "scene.toml"
     scene.write_text("\n".join(lines) + "\n")
     command = ["hapticlink", "run", str(scene), "--out", str(room / "run"), "--no-figures"]
@@ -232,9 +268,10 @@ def main(folders: list[str]) -> None:
     for folder in folders:
         for path in sorted(Path(folder).absolute().glob("*.fmu")):
             rates, duration = choose_experiment(path)
-            for rate in rates:
+            for kind, rate in product(find_interfaces(path), rates):
                 with tempfile.TemporaryDirectory() as room:
-                    print(path.name, rate, compare(path, rate, duration, Path(room)), flush=True)
+                    found = compare(path, rate, duration, Path(room), interface=kind)
+                    print(path.name, kind, rate, found, flush=True)
 
 
 if __name__ == "__main__":

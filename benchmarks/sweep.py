@@ -1,9 +1,11 @@
 """A point of a sweep beside the loop of its run, and beside FMPy.
 
-For each key, draws of its values in one process: as the points of a sweep, which keep what they
-share (`sweep`), and as runs of which each stands alone (`runs alone`), from the scene's tables to
-the row of measures. Native FMUs that the cache has, results in memory. `loop` is what both spend in
-the event loop. FMPy runs the scene as one FMU in the way of its own example of parameter studies:
+For each key, draws of its values in one process: as the points of a sweep (`sweep`), which keep
+what they share and, where they share their events, take steps of FMUs for eight runs at once; as
+such points one after the other (`one by one`); and as runs of which each stands alone (`runs
+alone`), from the scene's tables to the row of measures. Native FMUs that the cache has, with their
+steps of several instances, results in memory. The loop is what a point spends in the event loop one
+by one. FMPy runs the scene as one FMU in the way of its own example of parameter studies:
 unpacked and instantiated once, reset for each point, with start values, and the poses of which
 tracking is measured as outputs; of rates and holds such a FMU has one. Forms take turns; processor
 time of the process, whose median over rounds counts. OMSimulator is no part of it: its package on
@@ -17,6 +19,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from functools import partial
 from os import times
 from pathlib import Path
 from statistics import median
@@ -35,6 +38,8 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import process, temporary_folders
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.fmi import process_cache
+from hapticlink.orchestrator.run.compiled import lanes
+from hapticlink.orchestrator.run.compiled.lanes import MOST
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.programs.build import build_program
 
@@ -42,10 +47,11 @@ SCENE = "closed-loop-ideal"
 FIXED = ("packaging=native",)
 HOLDS = ("zoh", "foh", "lead", "delayed", "smooth")
 JOINTS = {"shoulder1": 0.785, "elbow1": -1.571, "shoulder2": -1.257, "elbow2": 1.571}
-WARM, POINTS, ROUNDS = 8, 40, 5
+WARM, POINTS, ROUNDS = MOST, 5 * MOST, 5
+"""Points of a round, behind twice as many as go side by side."""
 COLUMNS = ("key", "form", "point_ms", "loop_ms")
 Point = dict[str, str]
-Run = Callable[[Point], object]
+Run = Callable[[list[Point]], object]
 
 
 def _draw(key: str, draw: random.Random) -> Point:
@@ -68,6 +74,8 @@ def _draw(key: str, draw: random.Random) -> Point:
 
 
 KEYS = ("rates", "holds", "gains", "hand", "start")
+SIDE_BY_SIDE = ("gains", "hand", "start")
+"""Those of points that share their events."""
 PARAMETERS = {
     "controller.teleoperation.damping": "controller.B_pc",
     "hand.wrench": "hand.wrench",
@@ -79,7 +87,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     """Writes points.csv into `folder`."""
     (folder / "points.csv").unlink(missing_ok=True)
     rows = Rows(folder / "points.csv", COLUMNS, 2)
-    rounds, count = (1, 10) if quick else (ROUNDS, POINTS)
+    rounds, count = (1, 2 * MOST) if quick else (ROUNDS, POINTS)
     process.raise_gc_threshold()
     load = load_average()
     with ExitStack() as stack:
@@ -88,21 +96,24 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
         loop = _LoopTime(stack)
         source = open_scene.source_of(SCENE)
 
-        def ours(point: Point) -> object:
-            options = [*FIXED, *(f"{key}={value}" for key, value in point.items())]
-            row = run_sweep.work(job(source, options, point), room, run_sweep.run)
-            assert row["end"] == "duration", row
-            return row
+        def ours(points: list[Point]) -> None:
+            options = ([f"{key}={value}" for key, value in point.items()] for point in points)
+            jobs = [job(source, [*FIXED, *o], p) for o, p in zip(options, points, strict=True)]
+            together = partial(run_sweep.run_together, compiles=True)
+            for row in run_sweep.work_together(jobs, room, run_sweep.run, together):
+                assert row["end"] == "duration", row
 
-        def kept(points: list[Point]) -> tuple[float, float]:
+        def kept(points: list[Point], at_once: int) -> tuple[float, float]:
+            batches = [points[i : i + at_once] for i in range(0, len(points), at_once)]
             with process_cache.keep_unpacked():
-                for point in points[:WARM]:
-                    ours(point)
-                return loop.of(ours, points[WARM:])
+                for batch in batches[: 2 * WARM // at_once]:
+                    ours(batch)
+                return loop.of(ours, batches[2 * WARM // at_once :])
 
         forms: dict[str, Callable[[list[Point]], tuple[float, float]]] = {
-            "sweep": kept,
-            "runs alone": lambda points: loop.of(ours, points[WARM:]),
+            "sweep": partial(kept, at_once=MOST),
+            "one by one": partial(kept, at_once=1),
+            "runs alone": lambda points: loop.of(ours, [[p] for p in points[2 * WARM :]]),
             "FMPy": _fmpy(room, stack),
         }
         for i, key in enumerate(KEYS):
@@ -110,9 +121,9 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
             found: dict[str, list[tuple[float, float]]] = {form: [] for form in forms}
             for turn in range(rounds):
                 draw = random.Random(turn)
-                points = [_draw(key, draw) for _ in range(WARM + count)]
+                points = [_draw(key, draw) for _ in range(2 * WARM + count)]
                 for form, run in forms.items():
-                    if form != "FMPy" or key in ("gains", "hand", "start"):
+                    if form != "FMPy" or key in SIDE_BY_SIDE:
                         found[form].append(run(points))
             for form, each in found.items():
                 if each:
@@ -126,24 +137,28 @@ class _LoopTime:
     """Processor time of runs, and what of it their event loops take."""
 
     def __init__(self, stack: ExitStack) -> None:
-        self._inside, inner = 0.0, CompiledLoop.run
+        self._inside = 0.0
+        for owner, name in ((CompiledLoop, "run"), (lanes, "run_side_by_side")):
+            inner = getattr(owner, name)
+            stack.callback(setattr, owner, name, inner)
+            setattr(owner, name, self._timed(inner))
 
-        def timed(*given: Any) -> None:
+    def _timed(self, inner: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*given: Any) -> Any:
             begin = process_time()
             try:
-                inner(*given)
+                return inner(*given)
             finally:
                 self._inside += process_time() - begin
 
-        CompiledLoop.run = timed  # type: ignore[assignment, method-assign]
-        stack.callback(setattr, CompiledLoop, "run", inner)
+        return timed
 
-    def of(self, run: Run, points: list[Point]) -> tuple[float, float]:
+    def of(self, run: Run, batches: list[list[Point]]) -> tuple[float, float]:
         """Both (ms) for a point."""
         self._inside, begin = 0.0, process_time()
-        for point in points:
-            run(point)
-        each = 1e3 / len(points)
+        for batch in batches:
+            run(batch)
+        each = 1e3 / sum(map(len, batches))
         return each * (process_time() - begin), each * self._inside
 
 
@@ -172,9 +187,9 @@ def _fmpy(room: Path, stack: ExitStack) -> Callable[[list[Point]], tuple[float, 
 
     def timed(points: list[Point]) -> tuple[float, float]:
         begin = process_time()
-        for point in points[WARM:]:
+        for point in points[2 * WARM :]:
             run(point)
-        return 1e3 * (process_time() - begin) / len(points[WARM:]), 0.0
+        return 1e3 * (process_time() - begin) / len(points[2 * WARM :]), 0.0
 
     return timed
 
@@ -200,13 +215,15 @@ def _imports() -> float:
 
 def _page(rows: list[dict[str, str]], command: str, load: float) -> str:
     point = {(row["key"], row["form"]): float(row["point_ms"]) for row in rows}
-    loop = {row["key"]: float(row["loop_ms"]) for row in rows if row["form"] == "sweep"}
+    loop = {row["key"]: float(row["loop_ms"]) for row in rows if row["form"] == "one by one"}
     ratios = [point[key, "sweep"] / loop[key] for key in KEYS]
+    inside = {row["key"]: float(row["loop_ms"]) for row in rows if row["form"] == "sweep"}
+    beside = [loop[key] / inside[key] for key in SIDE_BY_SIDE]
     peer = [point[key, "FMPy"] / point[key, "sweep"] for key in KEYS if (key, "FMPy") in point]
     method = " ".join((__doc__ or "").partition("\n\n")[2].split())
     text = f"""# Points of sweeps
 
-A point of {SCENE} takes {min(ratios):.2f} to {max(ratios):.2f} times what its event loop takes, and FMPy takes {min(peer):.2f} to {max(peer):.2f} times as long for one; the imports of a worker take as long as {point["imports", "a worker"] / point["hand", "sweep"]:.0f} points.
+A point of {SCENE} takes {min(ratios):.2f} to {max(ratios):.2f} times what its event loop takes, which eight runs side by side go through {min(beside):.2f} to {max(beside):.2f} times as fast; FMPy takes {min(peer):.2f} to {max(peer):.2f} times as long for a point; the imports of a worker take as long as {point["imports", "a worker"] / point["hand", "sweep"]:.0f} points.
 
 Made by `{command}`. {method} On {system()}, with a load average of {load:.1f} before. All rows: [points.csv](points.csv).
 

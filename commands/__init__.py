@@ -45,6 +45,7 @@ COMMANDS: Registry[str | Callable[..., Any]] = Registry(
         "advise": "Find the hold and the gains that suit a scene.",
         "transparency": "Compare what the hand meets with the mechanism that it should meet.",
         "fit": "Fit a device, and the arm that holds it, to a log of encoders and forces.",
+        "trial": "Let somebody feel settings blindly, and find what can be told apart.",
         "tune": "Find gains up to a margin of stability, at the start pose and at a contact.",
         "sweep": "Run many variants of a scene in parallel: one table and figure.",
         "study": "Study which hold suits which rate: tables, figures and a page.",

@@ -32,6 +32,7 @@ Benchmark = Literal[
     "advise",
     "foreign",
     "waiting",
+    "board",
 ]
 """The function `bench` of the module of this name in benchmarks/, dashes as underscores: it
 measures, writes tables and figures into a folder, and returns the page."""
@@ -69,6 +70,7 @@ def bench(
     - network: the graphics on another computer: delay, jitter and loss against error and energy
     - advise: what `hapticlink advise` is worth on test scenes
     - foreign: FMUs of others, which packages of PyPI bring, beside FMPy
+    - board: a board in the loop: ticks missed, and torque after an end, a signal, a kill
     - waiting: what a user waits for: runs, verdicts, pages, and the floors beneath them
 
     Writes a page with tables and figures to OUT (default results/WHAT, for stress

@@ -9,7 +9,7 @@ from typing import Any
 
 from hapticlink.orchestrator.base.errors import InputFault
 
-COMPARED = {".py", ".toml", ".c", ".h"}
+COMPARED = {".py", ".toml", ".c", ".cpp", ".h"}
 """Endings of the files in which an installed package and a checkout have to be equal."""
 
 

@@ -7,12 +7,26 @@ from cyclopts import Parameter
 
 from hapticlink.commands.options import PRINTED, Output, Set, default_folder
 from hapticlink.commands.progress import waiting
+from hapticlink.orchestrator.base.errors import InputFault
 
 Log = Annotated[Path, Parameter(help="CSV or HDF5 file, or the folder of a run.")]
 OfScene = Annotated[str, Parameter(help="Scene whose device and hand are assumed.")]
 Fitted = Annotated[
     str | None,
-    Parameter(help="Keys of [device] to fit, name,name,...; by default handle and friction."),
+    Parameter(help="Keys of [device] to fit, key,key,...; by default of handle and friction."),
+]
+
+Kinematics = Annotated[
+    bool,
+    Parameter(
+        negative="",
+        help="Fit lengths, and offsets of encoders, to the angles of the log and, where it has "
+        "them, to known places of the handle.",
+    ),
+]
+Known = Annotated[
+    str | None,
+    Parameter(help="With --kinematics: parameters that are not searched, name,name,..."),
 ]
 
 
@@ -22,6 +36,8 @@ def fit(
     *,
     scene: OfScene = "closed-loop",
     device: Fitted = None,
+    kinematics: Kinematics = False,
+    known: Known = None,
     set: Set = None,
     output: Output = PRINTED,
 ) -> int:
@@ -33,14 +49,18 @@ def fit(
 
     For example:
 
-        hapticlink fit shaken.csv --device handle_mass,motor_friction
+        hapticlink fit runs/moved --kinematics --scene my-kit.toml --known left.at_parent
+        hapticlink fit shaken.csv --device body.crank.mass,motor.friction
     """
-    from hapticlink.analysis.fit.device_fit import FITTED
     from hapticlink.analysis.fit.fit import fit as fitted
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
 
-    names = tuple(device.split(",")) if device else FITTED
+    if kinematics:
+        return _fit_kinematics(log, scene, tuple(set or ()), known, output)
+    if known:
+        raise InputFault("--known: it is of --kinematics: give that, or leave it out")
+    names = tuple(device.split(",")) if device else ()
     with waiting(f"{log.name}: fitting, which takes seconds for each second of it", output.quiet):
         result = fitted(log, scene, tuple(set or ()), device=names)
     folder = folders.ensure(output.out or default_folder("fits", log.stem))
@@ -48,4 +68,24 @@ def fit(
     (folder / "fitted.toml").write_text(result.scene(), encoding="utf-8")
     lines = (*result.lines(), f"{folder}/: fitted.toml, fit.json")
     output.show(f"{log.name}:", lines, result.record())
+    return 0
+
+
+def _fit_kinematics(
+    log: Path, scene: str, options: tuple[str, ...], known: str | None, output: Output
+) -> int:
+    import hapticlink as hl
+    from hapticlink.analysis.fit.kinematics import fit_kinematics, read_angles
+    from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.results.write_files import write_json
+
+    device = hl.scene(scene, options).device
+    if device is None:
+        raise InputFault("fit: the scene has no [device]")
+    result = fit_kinematics(
+        device, *read_angles(log, device), known=known.split(",") if known else ()
+    )
+    folder = folders.ensure(output.out or default_folder("fits", log.stem))
+    write_json(folder / "fit.json", result.record())
+    output.show(f"{log.name}:", (*result.lines(), f"{folder}/: fit.json"), result.record())
     return 0

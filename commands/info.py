@@ -65,7 +65,8 @@ def info(
     for fmu in system.fmus:
         timing = fmu.description.timing
         every, some = (len(of.description.outputs) for of in (fmu, fetched[fmu.name]))
-        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {every} outputs, {some} fetched")
+        solved = f", {fmu.description.solver}" * bool(fmu.description.solver)
+        say(f"  {fmu.name}: {timing}, at {fmu.clock}, {every} outputs, {some} fetched{solved}")
     say("\nconnections (age of the newest sample when it is used, ms)")
     ages = {name: asdict(age) for name, age in sample_ages.delays(Plan(system)).items()}
     for connection in system.connections:
@@ -87,13 +88,14 @@ def info(
 def _starts(scene: Any, start: dict[str, float]) -> None:
     """Where the handle starts, who holds it, and what can be touched."""
     from hapticlink.analysis.findings import summary, workspace
+    from hapticlink.orchestrator.scene.blocks import described_devices
 
     if scene.linkage and start:
         for line in summary.describe_assembly(asdict(scene.linkage), coordinates(start)):
             say(f"  {line}")
-    if scene.device:
+    if device := described_devices(scene).get(""):
         say("\ndevice's workspace")
-        for line in workspace.lines(scene.device, _pose(start)):
+        for line in workspace.lines(device, _pose(start)):
             say(f"  {line}")
     elif start:
         say(f"\nthe operational point starts at {workspace.write_pose(_pose(start))}")
@@ -122,6 +124,7 @@ def _pose(start: dict[str, float]) -> list[float]:
 
 def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
     from hapticlink.orchestrator.results import folders
+    from hapticlink.orchestrator.scene.blocks import described_devices
     from hapticlink.visualization import figure_files
     from hapticlink.visualization.figures import block_diagram, schematic
     from hapticlink.visualization.mechanism import drawing, workspace_drawing
@@ -129,9 +132,9 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
     figures = {"blocks": block_diagram.figure(system, f"Blocks of: {scene.title}")}
     if q := coordinates(start):
         figures["start"] = drawing.figure(scene, q)
-    if scene.device:
+    if device := described_devices(scene).get(""):
         title = f"Device and its workspace: {scene.title}"
-        figures["workspace"] = workspace_drawing.draw(scene.device, _pose(start), title)
+        figures["workspace"] = workspace_drawing.draw(device, _pose(start), title)
     figures |= schematic.figures(scene, system)
     for name in figure_files.save(figures, folders.ensure(out)):
         say(f"  {out / name}")

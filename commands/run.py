@@ -20,8 +20,10 @@ from hapticlink.commands.options import (
     title,
 )
 from hapticlink.commands.progress import progress
+from hapticlink.commands.stop_key import stop_key
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.orchestrator.scene.blocks import driver_of
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 SetFile = Annotated[
@@ -48,6 +50,13 @@ Speed = Annotated[
     ),
 ]
 
+Device = Annotated[
+    str | None,
+    Parameter(
+        help="Port of the board in the place of the simulated device (/dev/ttyACM0, COM3), or "
+        "simulated-board."
+    ),
+]
 Remote = Annotated[
     list[str] | None,
     repeatable(
@@ -86,6 +95,7 @@ def run(
     explain: Explain = False,
     real_time: RealTime = False,
     speed: Speed = 1.0,
+    device: Device = None,
     remote: Remote = None,
     key: Key = None,
     arrivals: Arrivals = None,
@@ -107,6 +117,7 @@ def run(
         hapticlink run my-scene.toml --no-figures --json > result.json
         hapticlink run closed-loop --save 1 --save end
         hapticlink run --from runs/closed-loop/at-1.state --set controller.K_pc=[20,20,0.2]
+        hapticlink run closed-loop --real-time --device simulated-board
     """
     import hapticlink as hl
 
@@ -131,6 +142,9 @@ def run(
     try:
         read = hl.scene(scene, changes.options)
         with ExitStack() as shown:
+            stop = shown.enter_context(stop_key()) if real_time and not output.quiet else None
+            if stop and (device or driver_of(read, "")):
+                say("a key ends the run: motors are without torque then", file=sys.stderr)
             bar = progress(read.title, read.duration, hidden=output.quiet)
 
             def answer(result: hl.Run) -> None:
@@ -152,6 +166,8 @@ def run(
                 real_time=real_time,
                 speed=speed,
                 arrivals=arrivals,
+                device=device,
+                stop=stop,
                 remote=dict(map(_place, remote or ())),
                 key=key,
                 save=save or (),

@@ -16,10 +16,12 @@ from cyclopts import Parameter, validators
 from hapticlink.commands import completion
 from hapticlink.commands.options import UNCHANGED, Out, SceneOptions, default_folder
 from hapticlink.commands.progress import waiting
+from hapticlink.commands.run import Device
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.orchestrator.scene.blocks import driver_of
 
 if TYPE_CHECKING:
     from hapticlink.visualization.live_page.server_pipe import ChildProcess
@@ -76,6 +78,7 @@ def view(
     *,
     out: Out = None,
     changes: SceneOptions = UNCHANGED,
+    device: Device = None,
     host: Host = "127.0.0.1",
     port: Port = None,
     browser: Browser = True,
@@ -93,6 +96,7 @@ def view(
         hapticlink view
         hapticlink view closed-loop
         hapticlink view closed-loop --standalone demo.html
+        hapticlink view closed-loop --device /dev/ttyACM0
         hapticlink view runs/closed-loop
         hapticlink view runs/on runs/off --export on-and-off.gif
     """
@@ -117,13 +121,17 @@ def view(
     token = secrets.token_urlsafe(16)
     second_run = "hapticlink.commands.view_second_run", f"{root}-b"
     with _server(host, port, token, *second_run) as link:
+        import hapticlink as hl
+        from hapticlink.api.runs import with_board
+        from hapticlink.orchestrator.scene.overrides import write_options
         from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 
-        read = load_viewed_scene(scene, changes.options)  # while the server starts
+        board = write_options(with_board(device)) if device else ()
+        read = load_viewed_scene(scene, (*changes.options, *board))  # while the server starts
         served_port = _port(link, host, port)
         _show(read.title, host, served_port, token, browser)
-        say("  the mouse is the hand, in place of the scene's; Ctrl-C ends it")
-        import hapticlink as hl
+        hand = "whoever holds the board is" if driver_of(read, "") else "the mouse is"
+        say(f"  {hand} the hand, in place of the scene's; Ctrl-C ends it")
         from hapticlink.visualization.live_page.session import LiveSession
 
         session = LiveSession(read, link, root, partial(hl.RealTime, speed=speed))

@@ -34,6 +34,7 @@ BUILDINGS = {
         "base",
         "host",
         "fmi",
+        "boards",
         "holds",
         "scene",
         "system",
@@ -55,6 +56,7 @@ BUILDINGS = {
         "transparency",
         "advise",
         "fit",
+        "trials",
     ),
     "visualization": (
         ".",
@@ -82,7 +84,7 @@ PURPOSES = {
     "api": "import hapticlink",
     "commands": "the command line",
 }
-CODE = {".py", ".c", ".h", ".js", ".css", ".html"}
+CODE = {".py", ".c", ".cpp", ".h", ".js", ".css", ".html"}
 COLORS = ("#777777", "#997700", "#0077bb", "#009988", "#cc3311", "#ee7733", "#aa3377", "#333333")
 """Of the buildings and of the arrows that leave them."""
 WIDTH, LEFT, ROW, LETTER = 840, 250, 30, 7.6

@@ -59,15 +59,15 @@ def inside(scene: str, drawing: str, file: str) -> Path:
     return FIGURES / file
 
 
-def device(scene: str) -> Path:
+def device(scene: str, file: str = "device.png") -> Path:
     """Draws the device of a scene in its workspace, and returns the picture's path."""
     read = hl.scene(scene)
     with build_system(read) as system:
         start = mechanism_outputs(system)
     pose = [start[f"x[{i}]"] for i in (1, 2, 3)]
     figure = workspace_drawing.draw(read.device, pose, f"Device and its workspace: {read.title}")
-    figure.savefig(FIGURES / "device.png", dpi=90, **SAME)
-    return FIGURES / "device.png"
+    figure.savefig(FIGURES / file, dpi=90, **SAME)
+    return FIGURES / file
 
 
 def events(scene: str) -> Path:
@@ -83,6 +83,7 @@ if __name__ == "__main__":
         for scene in (*hl.shipped(), *examples(Path(folder))):
             print(draw(scene))
     print(device("closed-loop"))
+    print(device("closed-loop-2diy", file="device-2diy.png"))
     print(blocks("closed-loop-ideal", "blocks.png"))
     print(blocks("virtual-wall", "blocks-of-a-wall.png"))
     print(inside("closed-loop", "device", "inside-device.png"))

@@ -28,7 +28,7 @@ from hapticlink.fmus.versions import find_versions
 MAX_BUILD_TIME = 3600.0
 """Time (s) that no copy takes; unfinished files older than this were left by a killed process."""
 VERSIONS = ("hapticlink", "casadi", "pythonfmu")
-SOURCES = (".py", ".c", ".h", ".toml", ".png")
+SOURCES = (".py", ".c", ".cpp", ".h", ".toml", ".png")
 
 
 def folder() -> Path | None:
@@ -153,7 +153,7 @@ def get_or_build(
     entry = root / key(key_material)
     if cached_file := _whole_file(entry):
         return cached_file
-    with _exclusively(entry, str(key_material.get("block", "the same FMU")), poll):
+    with exclusively(entry, str(key_material.get("block", "the same FMU")), poll):
         return _whole_file(entry) or _build(build_function, build_folder, root, entry)
 
 
@@ -182,7 +182,7 @@ _held: set[Path] = set()
 
 
 @contextmanager
-def _exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
+def exclusively(entry: Path, name: str, poll: Callable[[], object]) -> Iterator[None]:
     """No other thread or process of this machine builds for `entry` within the context."""
     warned = False
 

@@ -23,11 +23,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 
 from hapticlink.components.component import Component
+from hapticlink.fmus.sine_cosine import with_own_sines
 
 _SHARED = {"cse": True}
 RARELY = 4
@@ -65,6 +67,17 @@ class OnePass:
 def one_pass(component: Component) -> OnePass:
     with _without_simplification():
         return _compose(component)
+
+
+def functions_of_fmu(component: Component) -> OnePass:
+    """Those of `one_pass` with sines and cosines of their own: what an FMU contains. Their slopes
+    are those of the former, which are shorter."""
+    parts = one_pass(component)
+    with _without_simplification():
+        own: dict[str, Any] = {
+            role: with_own_sines(f) for role, f in vars(parts).items() if isinstance(f, ca.Function)
+        }
+        return replace(parts, **own)
 
 
 GRAPHS = threading.RLock()

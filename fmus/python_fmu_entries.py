@@ -25,7 +25,7 @@ from hapticlink.fmus import model_description
 from hapticlink.fmus.description_common import describe_component
 from hapticlink.fmus.documentation import PAGE, documentation
 from hapticlink.fmus.errors import FmuError, UnsupportedPlatform
-from hapticlink.fmus.fmu_functions import RARELY, on_request, one_pass
+from hapticlink.fmus.fmu_functions import RARELY, functions_of_fmu, on_request
 from hapticlink.fmus.reference_run import reference_run
 from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.straight_line import program
@@ -63,7 +63,7 @@ def entries(component: Component, **experiment: float) -> dict[str, bytes]:
     """All files of the FMU; GUID and name of the slave contain a hash of them. experiment: as of
     `described`. Raises FmuError where the component's functions and variables do not fit."""
     check_functions(component)
-    parts = one_pass(component)
+    parts = functions_of_fmu(component)
     texts = {f.name(): f.serialize() for f in parts.functions}
     functions = {
         "resources/functions.casadi.json": json.dumps(texts).encode(),

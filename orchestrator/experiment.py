@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator import open_scene, simulated_plant
 from hapticlink.orchestrator.base import interrupt, shelf
 from hapticlink.orchestrator.base.errors import (
     Fault,
@@ -31,7 +31,6 @@ from hapticlink.orchestrator.results.read_results import (
     Results,
     Table,
     load,
-    with_record,
 )
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import (
@@ -44,9 +43,9 @@ from hapticlink.orchestrator.results.run_record import (
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.results.write_files import remove_rows
 from hapticlink.orchestrator.run import run_state
-from hapticlink.orchestrator.run.compiled import library
+from hapticlink.orchestrator.run.compiled import lanes, library
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, require_concurrent
-from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run
+from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run, run_side_by_side
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
 from hapticlink.orchestrator.run.open_fmus import find_isolated, refuse_hardware
 from hapticlink.orchestrator.run.real_time import RealTimeRun
@@ -56,7 +55,7 @@ from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.run.state_fits import require_fit
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_system
+from hapticlink.orchestrator.system.build_system import MAX_SYSTEMS, build_again, build_system
 from hapticlink.orchestrator.system.system import System
 
 
@@ -97,13 +96,29 @@ class Experiment:
                     raise self.outcome.fault or Fault(
                         f"the results are gone, or were changed while the run wrote them: {why}"
                     ) from None
-            return with_record(Results(None, self.run, self.memory.tables()), record)
+            return _ResultsInMemory(self, self.memory.tables(), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
         for clock in self.system.timeline.clocks:
             columns = ("time", *recorded.get(clock.name, ()))
             empty[clock.name] = Table(columns, np.zeros((0, len(columns))), empty)
         return Results(self.folder, self.run, empty)
+
+
+class _ResultsInMemory(Results):
+    """Those of an experiment whose rows are in no file; its run.json is made where it is asked
+    for."""
+
+    _experiment: Experiment
+
+    def __init__(
+        self, experiment: Experiment, tables: Mapping[str, Table], record: RunRecord
+    ) -> None:
+        vars(self).update(folder=None, tables=tables, record=record, _experiment=experiment)
+
+    @cached_property
+    def run(self) -> dict[str, Any]:
+        return self._experiment.run
 
 
 @dataclass(frozen=True)
@@ -120,6 +135,22 @@ class Prepared:
     @property
     def system(self) -> System:
         return self.plan.system
+
+    def differs_in_starts(self, every: System) -> bool:
+        """Whether a system differs in start values alone, as `build_system` makes it of one."""
+        mine = self.every
+        return mine.connections is every.connections and mine.timeline is every.timeline
+
+    def experiment(
+        self,
+        scene: Scene,
+        outcome: Outcome,
+        folder: Path,
+        build_time: float,
+        memory: RunResults | None = None,
+    ) -> Experiment:
+        ending = outcome.ending(build_time)
+        return Experiment(scene, self.system, outcome, folder, self.before, ending, memory)
 
 
 _PREPARED: shelf.Shelf[Prepared] = shelf.Shelf(MAX_SYSTEMS)
@@ -142,14 +173,17 @@ def _prepare(
     return Prepared(every, plan, tables, setup(scene, plan, tables, _find_left_out(every, system)))
 
 
+def _prepare_once(scene: Scene, every: System) -> Prepared:
+    """The same, and kept for systems that `build_system` makes of this one by other start values,
+    which shows in that they share all else."""
+    ready = _prepare_again(scene, every) or _prepare(scene, every, None, NOWHERE)
+    _PREPARED.put(ready)
+    return ready
+
+
 def _prepare_again(scene: Scene, every: System) -> Prepared | None:
-    """The same for a system that `build_system` has made of one before by other start values, which
-    shows in that they share all else; None where there is none."""
-    known = _PREPARED.take(
-        lambda item: (
-            item.every.connections is every.connections and item.every.timeline is every.timeline
-        )
-    )
+    """Made of what is kept; None where there is none."""
+    known = _PREPARED.take(lambda item: item.differs_in_starts(every))
     if known is None:
         return None
     fmus = (
@@ -264,14 +298,16 @@ def simulate(
             stack.enter_context(folder_lock.lock_folder(folder))
         try:
             every = stack.enter_context(build_system(read))
+            if real_time:
+                every = real_time.with_recordings(every)
+                every = stack.enter_context(simulated_plant.attach(read, every))
         except Interrupted:
             raise Interrupted(when="before the run") from None
-        kept = in_memory and remote is NOWHERE and not real_time
-        ready = kept and _prepare_again(read, every)
-        ready = ready or _prepare(read, every, real_time, remote)
+        if in_memory and remote is NOWHERE and not real_time:
+            ready = _prepare_once(read, every)
+        else:
+            ready = _prepare(read, every, real_time, remote)
         system, plan, tables, before = ready.system, ready.plan, ready.tables, ready.before
-        if kept:
-            _PREPARED.put(ready)
         state = _find_state(read, system, folder, real_time)
         saving = _find_saving(read, system, folder, real_time, save, state)
         before = replace(
@@ -279,6 +315,7 @@ def simulate(
             files=[*before.files, *save.files],
             resumed=Resumed(str(state.path), state.time) if state else None,
         )
+        ready = replace(ready, before=before)
         build_time = perf_counter() - begin
         alone = find_isolated(system.fmus)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
@@ -286,9 +323,7 @@ def simulate(
             memory = RunResults()
             with host_state.restore_interpreter():
                 outcome = run(plan, memory, progress, real_time, state)
-            return Experiment(
-                read, system, outcome, folder, before, outcome.ending(build_time), memory
-            )
+            return ready.experiment(read, outcome, folder, build_time, memory)
         if in_memory:
             stack.enter_context(folder_lock.lock_folder(folder))
         csv = csv and read.record.format == "csv"
@@ -313,7 +348,59 @@ def simulate(
                     outcome.reason = "fault"
                 results.end_in_place(outcome.ending(build_time))
             outcome.published = results.published
-    ended = Experiment(read, system, outcome, folder, before, outcome.ending(build_time))
+    ended = ready.experiment(read, outcome, folder, build_time)
     if not keep_rows:
         ended.remove_rows()
     return ended
+
+
+@interrupt.defer_signals()
+def simulate_together(
+    scenes: Sequence[Scene], folder: Path, compiles: bool
+) -> list[Experiment | None]:
+    """The runs of scenes with results in memory, the same ones as of `simulate`: those that differ
+    from the first in start values alone side by side, by vector instructions. None for a scene that
+    cannot be run so.
+
+    compiles: whether to compile the steps of several instances that the cache lacks. Raises
+    Interrupted.
+    """
+    begin, alike = perf_counter(), False  # whether scenes have differed in start values alone
+    ready: list[Prepared | None] = []
+    with ExitStack() as stack:
+        for scene in scenes:
+            ready.append(None)
+            with suppress(InputFault):
+                every = build_again(scene) if alike else None
+                alike = every is not None or len(ready) == 1
+                every = every or stack.enter_context(build_system(scene))
+                made = _prepare_once(scene, every)
+                if not (scene.fmu or scene.resume) and _fits_in_memory(made.system, made.tables):
+                    ready[-1] = made
+        build_time = (perf_counter() - begin) / len(scenes)
+        ended: list[Experiment | None] = []
+        together = _run_together(ready, compiles)
+        for scene, one, (outcome, memory) in zip(scenes, ready, together, strict=True):
+            ended.append(None)
+            if one and not outcome:
+                memory = RunResults()
+                outcome = run(one.plan, memory)
+            if one and outcome:
+                ended[-1] = one.experiment(scene, outcome, folder, build_time, memory)
+    return ended
+
+
+def _run_together(
+    ready: Sequence[Prepared | None], compiles: bool
+) -> list[tuple[Outcome | None, RunResults | None]]:
+    """The outcomes and results of those that differ from the first in start values alone; None of
+    the others, and of runs that did not last."""
+    first = next((one for one in ready if one), None)
+    beside = [
+        i for i, one in enumerate(ready) if one and first and one.differs_in_starts(first.every)
+    ]
+    steps = lanes.find_steps(first.system, compiles) if first and len(beside) > 1 else {}
+    plans = {i: (one.plan, RunResults()) for i in beside if steps and (one := ready[i])}
+    outcomes = iter(run_side_by_side([*plans.values()], steps) if plans else ())
+    none = (None, None)
+    return [(next(outcomes), plans[i][1]) if i in plans else none for i in range(len(ready))]

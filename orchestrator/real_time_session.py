@@ -29,6 +29,7 @@ from hapticlink.orchestrator.system.changes import (
     choices,
     number_of_point,
     require_other_rate,
+    require_result,
     settable,
 )
 from hapticlink.orchestrator.system.ports import names, scalars_of
@@ -170,8 +171,8 @@ class LiveRun:
         do in the scene, the first at least a haptic tick later. jitter: each ends up to half this
         share of a period early or late, uniformly, drawn by numpy's PCG64 with the seed. Raises
         InputFault where an FMU cannot vary its step or has a spring whose energy `pspm` limits, for
-        a rate that is not between 0 and the haptic one, and for a jitter that leaves no haptic tick
-        between two ends."""
+        a rate that is not between 0 and the haptic one, for steps shorter than `computing_time`,
+        and for a jitter that leaves no haptic tick between two ends."""
         timeline = self.system.timeline
         haptics, *others = timeline.clocks
         if require_name("clock", clock) not in [c.name for c in others]:
@@ -190,6 +191,7 @@ class LiveRun:
         most = float(1 - haptics.longest / period)
         if not 0 <= jitter <= most:
             raise InputFault(f"jitter of {clock} = {jitter}: at {rate:g} Hz give 0 to {most:.2g}")
+        require_result(self.system, clock, float(period * timeline.base) * (1 - jitter))
         self._loop.events.change_rate(clock, period, jitter, seed)
         drawn = f", jitter {jitter:g}, seed {seed}" if jitter else ""
         self._note(f"rate of {clock}: {rate:g} Hz{drawn}")
@@ -246,6 +248,9 @@ class LiveRun:
             return
         self._until = None
         self._called(self)
+        if self.paused:
+            for instance in simulation.instances.values():
+                instance.rest()
         while self.paused and self._until is None:
             pace.wait(pace.now() + self._every)
             interrupt.raise_if_interrupted(self.time)

@@ -33,6 +33,8 @@ from hapticlink.api.scenes import scene as scene
 from hapticlink.api.scenes import shipped as shipped
 from hapticlink.api.sweeps import Sweep as Sweep
 from hapticlink.api.sweeps import sweep as sweep
+from hapticlink.api.trials import Trials as Trials
+from hapticlink.api.trials import trial as trial
 from hapticlink.orchestrator.base.errors import Fault as Fault
 from hapticlink.orchestrator.base.errors import InputFault as InputFault
 from hapticlink.orchestrator.base.errors import SceneFault as SceneFault

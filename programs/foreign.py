@@ -102,6 +102,8 @@ def read_foreign(description: Description) -> Foreign:
     compiled into a program."""
     if description.fmi != "2":
         raise InputFault(f"it is of FMI {description.fmi}.0; only those of FMI 2.0 are compiled in")
+    if description.equations:
+        raise InputFault("it is run by model exchange, and a program has no solver")
     with open_archive(description.path, "FMU") as archive:
         tree = ElementTree.fromstring(read_xml(archive, "modelDescription.xml"))
         listed = [f.get("name", "") for f in tree.iterfind("./CoSimulation/SourceFiles/File")]

@@ -318,7 +318,7 @@ static int judge(Model *m, Fmu *f) {
     for (int64_t k = 0; k < f->n_outputs; k++) {
         if (!isfinite(f->outputs[k]) && f->good) f->outputs[k] = f->good[k];
         if (isfinite(f->outputs[k]) && fabs(f->outputs[k]) * f->inverse[k] <= 1.0) continue;
-        fail(m, fmi2Error, "output %s is %.17g at t = %.17g s: the run has diverged; take a higher "
+        fail(m, fmi2Error, "output %s is %.3g at t = %.6g s: the run has diverged; take a higher "
              "rate, a finer integrator, or weaker gains", signals[first + k], f->outputs[k],
              f->place->time);
         return 0;

@@ -11,7 +11,7 @@ from pathlib import Path
 from hapticlink.components.component import Component
 from hapticlink.fmus.cache import sha
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
-from hapticlink.fmus.native.native_fmu_entries import COMMON, WRAPPER
+from hapticlink.fmus.native.native_fmu_entries import INCLUDED, WRAPPER
 from hapticlink.fmus.native.source import component_source, number, table
 from hapticlink.fmus.reproducible_zip import guid_of
 from hapticlink.orchestrator.fmi.description import SERIALISED, STATE
@@ -23,8 +23,8 @@ from hapticlink.programs.resolve_scene import Resolved
 
 HERE = Path(__file__).parent
 OWN = ("program.c", "prepared_changes.h", "platform.c")
-REPLACED = ("platform.c", "process_state.c")
-"""Files of the loop in whose place a program has its own platform.c."""
+LEFT_OUT = ("platform.c", "process_state.c", "lanes.c")
+"""Files of the loop in whose place a program has its own platform.c, and that for several runs."""
 
 
 def write_sources(
@@ -32,8 +32,8 @@ def write_sources(
 ) -> dict[str, str]:
     """All C files by name; scene.h lacks the GUID. components: of the members that are blocks of
     this project."""
-    files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in REPLACED}
-    files[COMMON.name] = COMMON.read_text()
+    files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in LEFT_OUT}
+    files |= {path.name: path.read_text() for path in INCLUDED}
     files["hold_table.h"] = loop.HOLD_TABLE
     files |= {name: (HERE / name).read_text() for name in OWN}
     files |= {name: (HEADERS / name).read_text(errors="replace") for name in FMI2_HEADERS}

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6145,
-    "fmus": 2822,
-    "orchestrator": 14464,
-    "programs": 1021,
-    "analysis": 7799,
-    "visualization": 3417,
-    "api": 477,
-    "commands": 1493,
+    "components": 7044,
+    "fmus": 2989,
+    "orchestrator": 16218,
+    "programs": 1023,
+    "analysis": 8827,
+    "visualization": 3508,
+    "api": 591,
+    "commands": 1599,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

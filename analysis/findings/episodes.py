@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.analysis.findings.forces import largest_torque, torques, touching
+from hapticlink.analysis.findings.forces import motor_loads, touching
 from hapticlink.analysis.findings.tracking import (
     COPY_BRANCH_OK,
     UserSignals,
@@ -97,7 +97,7 @@ def _states(results: Results) -> Iterator[State]:
 
 def _find_saturation(results: Results) -> Iterator[State]:
     for user, device in all_devices(results).items():
-        if driven := torques(results, device, UserSignals.of(user), largest_torque):
+        if driven := motor_loads(results, device, UserSignals.of(user)):
             said = f"{EPISODES['saturated']}: {user}" if user else ""
-            times, largest = driven
-            yield "saturated", times, largest >= FULL_TORQUE * device.torque_limit, said
+            times, loads = driven
+            yield "saturated", times, loads >= FULL_TORQUE, said

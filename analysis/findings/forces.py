@@ -11,6 +11,7 @@ from hapticlink.analysis.findings.tracking import (
     UserSignals,
     find_measured_handle,
     find_users,
+    of_any_shape,
     of_block,
     of_port,
 )
@@ -24,6 +25,7 @@ from hapticlink.orchestrator.base.signal_names import (
     TOPOLOGY_WRENCH,
 )
 from hapticlink.orchestrator.results.read_results import Results, Vector
+from hapticlink.orchestrator.results.recorded_scene import described_devices
 
 WRENCHES = {
     HAND_WRENCH: "hand, F_hand",
@@ -63,13 +65,23 @@ def torques(
     user: UserSignals,
     of_motors: Callable[[Vector], Vector] = np.transpose,
 ) -> tuple[Vector, Vector] | None:
-    """Times (s) and torques (N.m) of the four motors of a user's device, (4, n), or what a function
-    gives of those at a number of times, (n, 4); None without a device that is driven."""
+    """Times (s) and torques (N.m) of the motors of a user's device, (m, n), or what a function
+    gives of those at a number of times, (n, m); None without a device that is driven.
+
+    A device's FMU from elsewhere tells its torques itself, by an output `tau_applied`.
+    """
     # casadi, which the terminal's lines, of the same module, can do without
     from hapticlink.components.device.motors_and_encoders import motor_torques
 
+    if device is None:
+        return None
+    if user.name not in described_devices(results):
+        given = of_any_shape(results, user.applied)
+        if given is None or not len(given["time"]):
+            return None
+        return given["time"], given.by_row(of_motors, user.applied)
     table, handle = of_port(results, user.motors), find_measured_handle(results, user)
-    if device is None or table is None or handle is None or of_port(results, handle) is not table:
+    if table is None or handle is None or of_port(results, handle) is not table:
         return None
     if not len(table["time"]):
         return None
@@ -78,7 +90,26 @@ def torques(
     )
 
 
-def largest_torque(of_motors: Vector) -> Vector:
-    """Of the torques of motors, (n, 4), the largest of each time."""
-    largest: Vector = np.abs(of_motors).max(axis=1)
-    return largest
+def motor_loads(
+    results: Results, device: Device, user: UserSignals
+) -> tuple[Vector, Vector] | None:
+    """Times (s), and the largest torque of a user's motors by its limit; None where no torques or
+    no limits are known."""
+    limits = torque_limits(results, device, user)
+    if limits is None:
+        return None
+
+    def largest(of_motors: Vector) -> Vector:
+        loads: Vector = (np.abs(of_motors) / limits).max(axis=1)
+        return loads
+
+    return torques(results, device, user, largest)
+
+
+def torque_limits(results: Results, device: Device, user: UserSignals) -> Vector | None:
+    """The limits (N.m) of a user's motors, (m,): those of [device]; of an FMU from elsewhere those
+    that its output `torque_limit` has at the start."""
+    if user.name in described_devices(results):
+        return np.array([motor.torque_limit for motor in device.motors])
+    table = of_any_shape(results, user.limits)
+    return None if table is None or not len(table["time"]) else np.atleast_1d(table[user.limits][0])

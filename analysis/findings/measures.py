@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hapticlink.analysis.findings.episodes import Episode, saturations
-from hapticlink.analysis.findings.forces import largest_torque, torques, wrenches
+from hapticlink.analysis.findings.forces import motor_loads, wrenches
 from hapticlink.analysis.findings.noticed import noticed
 from hapticlink.analysis.findings.tracking import (
     UserSignals,
@@ -97,9 +97,8 @@ class Measures:
         """The largest motor torque of each user as a share of the torque limit."""
         found = {}
         for user, device in all_devices(self._results).items():
-            if driven := torques(self._results, device, UserSignals.of(user), largest_torque):
-                largest = self._within(*driven).max(initial=0.0)
-                found[user] = float(largest / device.torque_limit)
+            if driven := motor_loads(self._results, device, UserSignals.of(user)):
+                found[user] = float(self._within(*driven).max(initial=0.0))
         return found
 
     @cached_property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby, islice
 from typing import Any, NamedTuple
@@ -14,12 +13,18 @@ from hapticlink.analysis.findings.changes_of_point import describe_changes
 from hapticlink.analysis.findings.forces import WRENCHES
 from hapticlink.analysis.findings.measures import Measures, TrackingError
 from hapticlink.analysis.findings.noticed import describe_noticed
+from hapticlink.analysis.findings.rendered import describe_devices
 from hapticlink.analysis.findings.report_premises import describe_experiment
-from hapticlink.analysis.findings.tracking import UserSignals, of_block, of_port
+from hapticlink.analysis.findings.tracking import (
+    UserSignals,
+    compared_directions,
+    find_handle,
+    of_block,
+    of_port,
+)
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
-from hapticlink.components.specs.paths import PoseSine
 from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
@@ -122,8 +127,10 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
     loops. measures: those of the results, if they are there."""
     measures = measures or Measures(results)
     yield from describe_experiment(results.record.scene)
+    yield from describe_devices(results.record.scene)
     for user, error in measures.tracking.items():
-        yield _tracking(user, error)
+        turned = compared_directions(results, UserSignals.of(user))
+        yield _tracking(user, error, turns=turned is None or bool(turned[2, 2]))
         if user and _left(results, UserSignals.of(user).margin):
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
     if measures.forces:
@@ -150,15 +157,14 @@ def _left(results: Results, margin: str) -> bool:
     return table is not None and bool((table[margin] < 0).any())
 
 
-def _tracking(user: str, error: TrackingError) -> str:
+def _tracking(user: str, error: TrackingError, *, turns: bool) -> str:
+    """turns: whether the handle has an angle that is compared."""
+    turned = f"; turned from it by at most {short(error.max_rad)} rad" if turns else ""
     if user:
-        return (
-            f"handle of {user} at most {short(error.max_mm)} mm from its point; "
-            f"turned from it by at most {short(error.max_rad)} rad"
-        )
+        return f"handle of {user} at most {short(error.max_mm)} mm from its point{turned}"
     return (
         f"handle at most {short(error.max_mm)} mm from the operational point, "
-        f"{short(error.rms_mm)} mm RMS; turned from it by at most {short(error.max_rad)} rad"
+        f"{short(error.rms_mm)} mm RMS{turned}"
     )
 
 
@@ -227,6 +233,11 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from record.without_effect
     yield from describe_replacements(record.replaced)
     yield from _lacking(results)
+    if find_handle(results) != HANDLE_POSE:
+        yield (
+            "the handle is told where the observer sees it: where a board's is, and the work of "
+            "the hand on it, nobody knows"
+        )
     yield from describe_unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
         yield (
@@ -262,6 +273,7 @@ def _steps(record: RunRecord) -> Iterator[str]:
             yield f"{fmu} has logged messages, {' and '.join(told)}: they are in fmus.log"
     if record.real_time:
         yield from _real_time(record.real_time)
+    yield from model_premises.describe_computing_times(record)
     for fmu, exchange in record.network.items():
         yield from _network(fmu, exchange)
     if (counts := record.iterations) and counts.unconverged:
@@ -427,7 +439,7 @@ def _percent(how: str, share: float) -> str:
     """A share, which says nothing any more beyond LARGEST_PERCENT."""
     percent = 100 * share
     far = percent > LARGEST_PERCENT
-    return f"more than {LARGEST_PERCENT} %" if far else f"{how} {percent:.2g} %"
+    return f"more than {LARGEST_PERCENT} %" if far else f"{how} {float(f'{percent:.2g}'):g} %"
 
 
 def describe_replacements(replacements: Mapping[str, Replacement]) -> Iterator[str]:
@@ -490,8 +502,8 @@ def _start(results: Results) -> Iterator[str]:
 
 
 def _start_apart(results: Results) -> Iterator[str]:
-    """Lines for a handle that starts elsewhere than what it holds: the operational point, as a
-    device of others may, or a hand's target, by whole turns."""
+    """A line for a handle that starts elsewhere than the operational point, as a device of others
+    may."""
     handle, point = of_port(results, HANDLE_POSE), of_port(results, POINT_POSE)
     if handle and point and len(handle["time"]) and len(point["time"]):
         x, S = handle[HANDLE_POSE][0], point[POINT_POSE][0]
@@ -501,27 +513,6 @@ def _start_apart(results: Results) -> Iterator[str]:
                 f"warning: the handle starts {short(1e3 * far)} mm and {short(turned)} rad from "
                 "the operational point: errors contain that"
             )
-    hand = results.record.scene["hand"] or {}
-    if handle and hand.get("target") and hand["stiffness"][2] and len(handle["time"]):
-        angle, start = _first_angle(hand["target"]), float(handle[HANDLE_POSE][0][2])
-        if turns := round((angle - start) / math.tau):
-            away = "a whole turn" if abs(turns) == 1 else f"{abs(turns)} whole turns"
-            yield (
-                f"warning: hand.target begins {away} from the handle's angle, {short(start)} rad, "
-                f"and pulls it there: {short(angle - math.tau * turns)} rad is the same direction"
-            )
-
-
-def _first_angle(target: Sequence[Sequence[float]] | Mapping[str, Any]) -> float:
-    """The angle (rad) of a hand's target at t = 0: of its first row, or of a sine."""
-    if not isinstance(target, Mapping):
-        return float(target[0][3])
-    from casadi import SX, evalf  # slow to load
-
-    from hapticlink.components.paths import TimeSine
-
-    pose = evalf(TimeSine(PoseSine(**target), "hand.target").value(SX(0)))
-    return float(pose[2])
 
 
 def describe_assembly(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterator[str]:

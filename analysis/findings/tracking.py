@@ -9,8 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hapticlink.analysis.findings.rendered import recorded_handle
+from hapticlink.components.dynamics.rendered_directions import rendered_directions
 from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.base.signal_names import (
+    APPLIED_TORQUES,
+    BOARD_SENT_AT,
     CONSTRAINT_COUNTS,
     COPY_BRANCH_OK,
     DEVICE,
@@ -26,6 +30,7 @@ from hapticlink.orchestrator.base.signal_names import (
     POINT_PATH,
     POINT_POSE,
     TOPOLOGY_WRENCH,
+    TORQUE_LIMITS,
     WORKSPACE_MARGIN,
     signal_of_user,
     user_of_block,
@@ -76,6 +81,8 @@ class UserSignals:
     environment: str
     motors: str
     margin: str
+    applied: str
+    limits: str
     passivity_damping: str
     passivity_energy: str
 
@@ -88,6 +95,10 @@ class UserSignals:
     def controller(self) -> str:
         return self.motors.partition(".")[0]
 
+    @property
+    def device(self) -> str:
+        return self.handle.partition(".")[0]
+
 
 SIGNALS = (
     POINT_POSE,
@@ -98,6 +109,8 @@ SIGNALS = (
     ENVIRONMENT_WRENCH,
     MOTOR_WRENCH,
     WORKSPACE_MARGIN,
+    APPLIED_TORQUES,
+    TORQUE_LIMITS,
     PASSIVITY_DAMPING,
     PASSIVITY_ENERGY,
 )
@@ -114,7 +127,10 @@ def find_users(results: Results) -> list[UserSignals]:
 
 def table_of(results: Results, signal: str) -> Table | None:
     """The table that contains `signal`, whose rate depends on the scene; None if there is none."""
-    return next((t for t in results.tables.values() if signal in t), None)
+    for table in results.tables.values():
+        if signal in table:
+            return table
+    return None
 
 
 def of_block(results: Results, signal: str, *shape: int) -> Table | None:
@@ -147,20 +163,28 @@ def have_one_shape(results: Results, *signals: str) -> bool:
 
 def has_tracking(results: Results, user: UserSignals = FIRST) -> bool:
     """Whether there are the poses of a user's point and handle."""
-    return all(of_port(results, signal) for signal in (user.point, user.handle))
+    return all(of_port(results, s) for s in (user.point, find_handle(results, user)))
+
+
+def find_handle(results: Results, user: UserSignals = FIRST) -> str:
+    """The signal of the pose of a user's handle: the true one, of a board the measured one, as
+    nobody knows another."""
+    if of_any_shape(results, signal_of_user(BOARD_SENT_AT, user.name)):
+        return find_measured_handle(results, user) or user.handle
+    return user.handle
 
 
 def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
     """Tracking error of a user at the mechanism's samples up to the device's last one at which the
     hand holds a point; the handle's pose is interpolated linearly where its clock differs. Raises
     KeyError without these signals."""
-    point, handle = user.point, user.handle
+    point, handle = user.point, find_handle(results, user)
     mechanism, device = of_port(results, point), of_port(results, handle)
     if mechanism is None or device is None:
         raise KeyError(f"tracking needs the signals {point} and {handle}")
     if not len(device["time"]):  # a fault before the first row
         return Tracking(*np.zeros((3, 0)))
-    times, known = device["time"], device[handle]
+    times, known, common = device["time"], device[handle], compared_directions(results, user)
 
     def error(time: Vector, place: Vector) -> Vector:
         if mechanism is device and len(time) == len(times):
@@ -168,6 +192,7 @@ def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
         else:
             held = np.column_stack([np.interp(time, times, entry) for entry in known.T])
         apart = PLANE.difference(place, held)
+        apart = apart if common is None else apart @ common
         return np.stack([PLANE.distance(apart) * 1e3, PLANE.angle(apart)])
 
     rows = rows_until(mechanism, times[-1])
@@ -176,6 +201,13 @@ def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
     if user == FIRST and of_block(results, HELD_POINT) is mechanism:
         found = [each[mechanism[HELD_POINT][rows] > 0] for each in found]
     return Tracking(*found)
+
+
+def compared_directions(results: Results, user: UserSignals = FIRST) -> Vector | None:
+    """The projector (3, 3) on the directions in which a user's point and handle are compared: those
+    that belong to both; None where all do."""
+    rendered = rendered_directions(recorded_handle(results.record.scene, user.name))
+    return None if rendered.whole else rendered.compared
 
 
 def path_of_point(results: Results, user: UserSignals) -> str:

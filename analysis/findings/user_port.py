@@ -27,6 +27,7 @@ from hapticlink.analysis.findings.port_blocks import by_block, find_motor_port, 
 from hapticlink.analysis.findings.tracking import (
     FIRST,
     UserSignals,
+    compared_directions,
     find_users,
     have_one_shape,
     of_any_shape,
@@ -168,10 +169,11 @@ def user_port(results: Results) -> UserPort | None:
 
 def find_other_pushes(results: Results) -> list[str]:
     """The connections to handles from other sources than the hands of their users."""
+    users = find_users(results)
     return [
         name
         for name in results.record.connections
-        for user in find_users(results)
+        for user in users
         if name.endswith(f" -> {user.handle.partition('.')[0]}.F_hand")
         and not name.startswith(f"{user.hand} ")
     ]
@@ -206,6 +208,8 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
     where it is not held, or not by zoh, or the mechanism's own is not put out."""
     held, own = (of_block(results, signal, *PLANE.mobility.shape) for signal in MOBILITIES)
     crossing = f"{MOBILITIES[0]} -> {CONTROLLER}.Lambda_inv"
+    if (compared := compared_directions(results)) is not None and compared[2, 2]:
+        return None  # of an angle that is fixed the mobility is another one
     if not held or own is not device or results.record.holds.get(crossing) != "zoh":
         return None
     inertias = (signal for signal in HANDLE_INERTIAS if of_any_shape(results, signal) is device)

@@ -157,7 +157,7 @@ class Works:
     and position."""
 
     def __init__(self, results: Results, times: Vector) -> None:
-        self._results, self._times = results, times
+        self._results, self._times, self._meters = results, times, results.record.meters
         self._last: dict[tuple[str, str], float] = {}
 
     def of(
@@ -170,7 +170,7 @@ class Works:
         table, moved = table_of(results, signal), table_of(results, position)
         if not (table and moved):
             raise KeyError(f"work needs the signals {signal} and {position}")
-        meters, start = results.record.meters, f"{signal} -> {position.partition('.')[0]}."
+        meters, start = self._meters, f"{signal} -> {position.partition('.')[0]}."
         name = connection or next((each for each in meters if each.startswith(start)), None)
         known = arrivals(results.record, name, table, table is moved) if name else table["time"]
 

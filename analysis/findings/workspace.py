@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hapticlink.components.device.workspace import Range, margin, workspace
+from hapticlink.analysis.findings.rendered import describe_rendered
+from hapticlink.components.device.workspace import Range, extent_along, margin, workspace
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 
@@ -16,19 +17,31 @@ Pose = Sequence[float]
 
 
 def lines(device: Device, start: Pose) -> Iterator[str]:
-    """The extent of the workspace, and whether the start pose of a scene is inside it."""
-    space = workspace(device)
-    for which, field in (("some", space.some), ("every", space.every)):
-        extent = space.extent(field)
-        where = f"x {_range(extent[0])} m, y {_range(extent[1])} m" if extent else "nowhere"
-        yield f"at {which} theta: {where}"
-    turns = space.turns
-    yield f"theta: {'any' if turns == [_TURN] else ', '.join(map(_range, turns)) + ' rad'}"
+    """The extent of the workspace, what the device renders, and whether the start pose of a scene
+    is inside it."""
+    if device.handle.along is not None:
+        yield f"along {write_pose(device.handle.along)}: {_range(extent_along(device))} m"
+    else:
+        yield from _extents(device)
+    if rendered := describe_rendered(device.handle):
+        yield rendered
     distance = float(margin(device, np.array([start]))[0])
     if distance < 0:
         yield f"warning: {describe_start_outside(start, distance)}"
     else:
         yield f"the handle starts at {write_pose(start)}, {distance:.3g} m from the nearest stop"
+
+
+def _extents(device: Device) -> Iterator[str]:
+    space = workspace(device)
+    fields = {"at some theta: ": space.some, "at every theta: ": space.every}
+    for which, field in fields.items() if len(space.theta) > 1 else [("", space.some)]:
+        extent = space.extent(field)
+        where = f"x {_range(extent[0])} m, y {_range(extent[1])} m" if extent else "nowhere"
+        yield f"{which}{where}"
+    if len(space.theta) > 1:
+        turns = space.turns
+        yield f"theta: {'any' if turns == [_TURN] else ', '.join(map(_range, turns)) + ' rad'}"
 
 
 def write_pose(pose: Pose) -> str:

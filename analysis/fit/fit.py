@@ -9,7 +9,7 @@ from typing import Any
 
 from hapticlink.analysis.fit import log as logs
 from hapticlink.analysis.fit.arm_fit import NAMES, fit_arm
-from hapticlink.analysis.fit.device_fit import FITTED, fit_device
+from hapticlink.analysis.fit.device_fit import fit_device
 from hapticlink.analysis.fit.estimate import Estimate
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
@@ -100,7 +100,7 @@ def fit(
     scene: str | Path | Scene = "closed-loop",
     options: Options = (),
     *,
-    device: Sequence[str] = FITTED,
+    device: Sequence[str] = (),
 ) -> Fitted:
     """Fits parameters of a device, by their keys in [device], and of the arm that holds it, to a
     log of its handle; all others are those of the scene, from whose values the search begins.

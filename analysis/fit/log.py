@@ -15,6 +15,7 @@ from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import (
+    BOARD_SENT_AT,
     HAND_WRENCH,
     MEASURED_HANDLE_POSES,
     MOTOR_WRENCH,
@@ -80,6 +81,8 @@ def read_log(path: Path | str) -> Log:
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
             raise InputFault(f"{path}: {name} is not finite in row {row + 1}")
+    if BOARD_SENT_AT in table:
+        signals = _longest_whole(signals)
     steps = np.diff(signals["time"])
     if len(steps) < LEAST:
         raise InputFault(f"{path}: {len(steps) + 1} samples; {LEAST + 1} are needed")
@@ -99,6 +102,15 @@ def read_log(path: Path | str) -> Log:
         held=of_run,
         hand_type=_hand_type(run) if of_run else "",
     )
+
+
+def _longest_whole(signals: dict[str, Matrix]) -> dict[str, Matrix]:
+    """The longest stretch in which a run with a board has skipped no tick."""
+    steps = np.diff(signals["time"])
+    ends = np.flatnonzero(steps > 1.5 * np.median(steps)) + 1
+    bounds = np.array([0, *ends, len(signals["time"])])
+    k = int(np.diff(bounds).argmax())
+    return {name: values[bounds[k] : bounds[k + 1]] for name, values in signals.items()}
 
 
 def _require_rate(path: Path, period: float) -> None:

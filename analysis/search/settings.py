@@ -7,21 +7,21 @@ any mass.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from hapticlink.orchestrator.base.signal_names import CONTROLLER
+from hapticlink.orchestrator.base.signal_names import CONTROLLER, user_of_block
 from hapticlink.orchestrator.base.ticks import write_exact
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.system.system import System
+from hapticlink.orchestrator.system.system import Fmu, System
 
 LAWS = {
-    "drift": ("controller.teleoperation", "K_pc", "B_pc"),
-    "topology": ("controller.topology", "k_j", "b_j"),
+    "drift": ("teleoperation", "K_pc", "B_pc"),
+    "topology": ("topology", "k_j", "b_j"),
 }
-"""By law: the table of a scene that has its `stiffness` and `damping`, and the controller's
-parameters of both."""
+"""By law: the table of a controller that has its `stiffness` and `damping`, and the parameters of
+both."""
 Scales = Mapping[str, float]
 """The scale s of each law, by name; 1 where it is missing."""
 _PASSIVE = tuple(f"holds.virtual_mechanism.{w}=passive" for w in ("F_hand", "F_drift"))
@@ -70,9 +70,10 @@ def set_rate(clock: str, rate: Fraction) -> str:
 
 @dataclass(frozen=True)
 class Gain:
-    """A parameter of a law, as the scene sets it: its key there, the power of s by which it is
-    scaled, and its entries."""
+    """A parameter of a law, as the scene sets it: the controller's FMU, its key in the scene, the
+    power of s by which it is scaled, and its entries."""
 
+    fmu: str
     law: str
     key: str
     power: float
@@ -83,46 +84,59 @@ class Gain:
 
 
 class Gains:
-    """The tunable gains of a system, and the names of the `laws` that have any."""
+    """The tunable gains of all controllers of a system, and the names of the `laws` that have any.
+    apart: the users whose controllers have a table of their own in the scene; the others have
+    those of [controller]."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, apart: Collection[str] = ()) -> None:
         self._gains: list[Gain] = []
-        for law, (table, *ports) in LAWS.items():
-            both = [
-                Gain(law, f"{table}.{quantity}", power, tuple(_entries(system, port)))
-                for port, (quantity, power) in zip(
-                    ports, {"stiffness": 1.0, "damping": 0.5}.items(), strict=True
-                )
-            ]
-            if all(gain.entries for gain in both):
-                self._gains += both
+        self._followers: set[str] = set()
+        for fmu in system.fmus:
+            if (user := user_of_block(fmu.name, CONTROLLER)) is None:
+                continue
+            if user and user not in apart:
+                self._followers.add(fmu.name)
+            table = f"controllers.{user}" if user else CONTROLLER
+            for law, (part, *ports) in LAWS.items():
+                both = [
+                    Gain(fmu.name, law, f"{table}.{part}.{quantity}", power, _entries(fmu, port))
+                    for port, (quantity, power) in zip(
+                        ports, {"stiffness": 1.0, "damping": 0.5}.items(), strict=True
+                    )
+                ]
+                if all(gain.entries for gain in both):
+                    self._gains += both
         self.laws = list(dict.fromkeys(gain.law for gain in self._gains))
 
     def parameters(self, scales: Scales) -> Iterator[tuple[str, Scalar, float]]:
         """The parameters of the FMUs for the given scales."""
         for gain in self._gains:
             for (scalar, _), value in zip(gain.entries, gain.scaled(scales), strict=True):
-                yield CONTROLLER, scalar, value
+                yield gain.fmu, scalar, value
 
     def applied(self, system: System, scales: Scales) -> System:
         """The system that starts with the given scales."""
-        scaled = tuple((scalar, value) for _, scalar, value in self.parameters(scales))
-        fmus = (fmu.starting(scaled) if fmu.name == CONTROLLER else fmu for fmu in system.fmus)
+        starts: dict[str, list[tuple[Scalar, float]]] = {}
+        for name, scalar, value in self.parameters(scales):
+            starts.setdefault(name, []).append((scalar, value))
+        fmus = (fmu.starting(tuple(starts.get(fmu.name, ()))) for fmu in system.fmus)
         return replace(system, fmus=tuple(fmus))
 
     def options(self, scales: Scales) -> dict[str, float | list[float]]:
         """The options of a scene with the given scales, to four digits."""
         found: dict[str, float | list[float]] = {}
         for gain in self._gains:
+            if gain.fmu in self._followers:
+                continue
             values = [float(f"{value:.4g}") for value in gain.scaled(scales)]
             found[gain.key] = values if len(values) > 1 else values[0]
         return found
 
 
-def _entries(system: System, port: str) -> Iterator[tuple[Scalar, float]]:
-    if CONTROLLER not in system.fmu:
-        return
-    given = {scalar.name: value for scalar, value in system.fmu[CONTROLLER].starts}
-    for s in system.fmu[CONTROLLER].description.scalars:
-        if s.causality == "parameter" and s.port == port and s.variability == "tunable":
-            yield s, float(given.get(s.name, s.start or 0.0))
+def _entries(fmu: Fmu, port: str) -> tuple[tuple[Scalar, float], ...]:
+    given = {scalar.name: value for scalar, value in fmu.starts}
+    return tuple(
+        (s, float(given.get(s.name, s.start or 0.0)))
+        for s in fmu.description.scalars
+        if s.causality == "parameter" and s.port == port and s.variability == "tunable"
+    )

@@ -36,6 +36,7 @@ from hapticlink.analysis.stability.polynomial_holds import (
     is_ageless,
     is_linear,
     is_polynomial,
+    read_by,
     sample_arrives,
     slopes_of_powers,
 )
@@ -111,6 +112,7 @@ Key = tuple[Instruction, Since]
 """An operation, and what beside the numbers its slopes depend on."""
 POWERS = " in powers"
 """Behind the name of a hold: what its polynomial has beside its value."""
+ARRIVED = "arrived"
 
 
 class ForwardSensitivity:
@@ -234,39 +236,64 @@ class ForwardSensitivity:
             J = advanced_powers(hold, float(since))[np.ix_(order, order)]
             E = np.zeros_like(J)
             return Applied(operation, (powers,), (further,), (further,), held, held, J, E)
-        if hold.link:  # in which samples arrive
-            arrived = self._of_any(tick, operation, call, reach)
-            J = arrived.J[: arrived.after[0], : arrived.before[0]]
-        else:
-            call(tick)
-            J = np.eye(reach.state.sizes()[name])
+        J = self._arrived(tick, operation, call, reach, since)
         after, before = J.shape
-        J = np.vstack([J, self._powers(tick, operation, since)[order] @ J])
+        by = self._powers(tick, operation, since)[order]
+        reads = read_by(hold)
+        J = np.block([[J, np.zeros((after, len(reads)))], [by[:, :after] @ J, by[:, after:]]])
         return Applied(
             operation,
             (name, powers),
             (before, 0),
             (after, further),
-            np.zeros(0, np.intp),
+            reads,
             held,
             J,
             np.zeros_like(J),
         )
 
+    def _arrived(
+        self, tick: int, operation: Evaluate, call: Call, reach: Reach, since: Since
+    ) -> Matrix:
+        """The slopes of the state of a hold by itself, where samples in transit may arrive before
+        it is evaluated."""
+        name = operation.connection
+        hold, size = self._simulation.holds[name], reach.state.sizes()[name]
+        if not hold.link:
+            call(tick)
+            return np.eye(size)
+        about = hold.row, hold.parts.matrix, (*hold.parts.turns.items(),), size
+        known = self.work.slopes.setdefault((ARRIVED, *about, since), [])
+        if known and not hold.parts.matrix:  # samples are copied
+            call(tick)
+            return known[0].J
+        made = self._of_any(tick, operation, call, reach)
+        J = made.J[: made.after[0], : made.before[0]]
+        known[:] = [Slopes(np.zeros(0), J, np.zeros_like(J))]
+        return J
+
     def _powers(self, tick: int, operation: Evaluate, since: Since) -> Matrix:
-        """The slopes of c_0 to c_d by the numbers of the state of a hold."""
+        """The slopes of c_0 to c_d by the numbers of the state of a hold, and by what it reads
+        beside its samples."""
         hold, block = (
             self._simulation.holds[operation.connection],
             self._blocks[operation.connection],
         )
-        at, base = block.save().numbers, self._simulation.system.timeline.base
-        about = hold.row, hold.parts.matrix, hold.c.n, len(at), operation.ahead, base
+        board, parts = self._simulation.signals.values, hold.parts
+        at = np.concatenate([block.save().numbers, board[read_by(hold)]])
+        beside = b""
+        if parts.beside:
+            order, signs = np.argsort(np.argsort(parts.beside.where)), parts.beside.factor
+            beside = order.tobytes() + (b"" if signs is None else signs.tobytes())
+        base = self._simulation.system.timeline.base
+        law = hold.row, parts.relation, parts.matrix, hold.c.n, beside
+        about = *law, len(at), operation.ahead, base
         known = self.work.slopes.setdefault((POWERS, *about, since), [])
         wide = SAME * np.maximum(1.0, np.abs(at))
         for slopes in known:
             if is_linear(hold) or (np.abs(at - slopes.at) <= wide).all():
                 return slopes.J
-        J = slopes_of_powers(hold, block, tick, float(operation.ahead))
+        J = slopes_of_powers(hold, block, board, tick, float(operation.ahead))
         known.insert(0, Slopes(at, J, np.zeros_like(J)))
         return J
 
@@ -279,8 +306,9 @@ class ForwardSensitivity:
 
     def _copies(self, operation: Instruction) -> bool:
         """Whether it only passes numbers on, so that its slopes are the same at all."""
-        if isinstance(operation, Push) and operation.connection in self._polynomials:
-            return is_linear(self._simulation.holds[operation.connection])
+        if isinstance(operation, Push):
+            hold = self._simulation.holds[operation.connection]
+            return self._is_smooth(operation.connection) and not (hold.own or hold.parts.matrix)
         return isinstance(operation, Set)
 
     def _is_smooth(self, connection: str) -> bool:

@@ -24,6 +24,7 @@ TAKEN_OUT, AS_AT_REST = "taken out", "as at the equilibrium"
 """What becomes of a nonlinearity, at the end of its line."""
 DISCRETE = {
     ("fmu", "n_constrained"),
+    ("fmu", "turns"),
     ("fmu", "deflection"),
     ("fmu", "contact_deflection"),
     ("hold", "beta"),
@@ -68,7 +69,7 @@ def _find_removed(system: System, fmu: Fmu) -> Iterator[tuple[Scalar, float, str
     for scalar in fmu.description.scalars:
         if scalar.causality != "parameter":
             continue
-        if (block, scalar.name) == (DEVICE, "encoder_resolution"):
+        if block == DEVICE and scalar.name.partition("[")[0] == "encoder_resolution":
             yield scalar, 0.0, "quantisation of the encoders"
         elif (block, scalar.name) == ("virtual_wall", "quantum"):
             yield scalar, 0.0, "quantisation of the encoder"
@@ -90,6 +91,8 @@ def describe_switches(system: System) -> list[str]:
             lines.append(f"{fmu.name}: {', and '.join(stops)}")
         if block == "virtual_wall":
             lines.append(f"{fmu.name}: contact, if the wall is unilateral")
+        if description.equations:
+            lines.append(f"{fmu.name}: discrete states of the FMU for model exchange")
         if description.port("contact_gap", "output"):
             lines.append(f"{fmu.name}: which places touch")
         if any(s.port.rpartition(".")[2] == "n_constraints" for s in description.outputs):

@@ -73,10 +73,13 @@ class Case:
         return self.verdict == "unstable" and self.kind == "drift"
 
     @property
-    def rank(self) -> tuple[bool, bool]:
-        """What is worse is larger whatever its growth rate: fast rather than drifting, in a hand
-        rather than free."""
-        return self.verdict == "unstable" and not self.drifts, not self.free
+    def rank(self) -> tuple[bool, ...]:
+        """What is worse is larger whatever its growth rate, in the order of the verdicts: what
+        grows in a hand, fast rather than drifting; what grows fast in free air; what is marginal in
+        a hand."""
+        grows = self.verdict == "unstable"
+        held = not self.free
+        return grows and held, grows and not self.drifts, held, self.verdict == "marginal"
 
     def record(self) -> dict[str, Any]:
         return {
@@ -127,14 +130,16 @@ def hardest_first(cases: Iterable[Case]) -> list[str]:
 
 class InHands:
     """A scene at rest in a pose, with the gains multiplied by `scales` and every input of the
-    controller delayed by `late` of its steps; for the hand None the scene's own stays. Raises
+    controllers delayed by `late` of their steps; for the hand None the scene's own stays. Raises
     InputFault or FmuFault where it has no equilibrium."""
 
     def __init__(self, place: RestingScene, scales: Scales | None = None, late: int = 0) -> None:
         period = place.period(scales or {})
-        period = period.delayed(CONTROLLER, late) if late else period
+        names = [f.name for f in place.map.system.fmus]
+        for name in names if late else ():
+            if user_of_block(name, CONTROLLER) is not None:
+                period = period.delayed(name, late)
         self._T, self._seconds = place.T, place.map.period
-        names = (f.name for f in place.map.system.fmus)
         self._users = [name for name in names if user_of_block(name, HAND) is not None]
         self._period = period.fused(self._users)
 

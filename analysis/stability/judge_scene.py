@@ -45,6 +45,7 @@ from hapticlink.analysis.stability.remedy_trial import Visited
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.short_hyperperiod import short
 from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicker_fmus
+from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.analysis.stability.told_steps import Progress, Steps
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.analysis.stability.verdict_record import Stability
@@ -247,4 +248,5 @@ def _judge(
         remedies=remedies,
         frozen=frozen,
         rounded=rounded,
+        stand_ins=find_stand_ins(work.responses),
     )

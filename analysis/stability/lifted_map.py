@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity, Key
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
 from hapticlink.analysis.stability.shared_work import SharedWork
+from hapticlink.analysis.stability.stand_in import with_stand_ins
 from hapticlink.analysis.stability.state_vector import StateEntry, StateVector
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
@@ -286,8 +287,8 @@ def open_lifted_map(
     """The lifted map of `system`, with its FMUs loaded; the state is perturbed within the loop
     closures of `scene`. work: what it shares with other maps of the same linkage.
 
-    Raises InputFault where there is none: rates and latencies that vary, an
-    FMU whose state cannot be read.
+    Raises InputFault where there is none: rates and latencies that vary, an FMU whose state cannot
+    be read and whose response tells no linear system that could stand for it.
     """
     for c in system.connections:
         if c.latency and (c.latency.loss or c.latency.max not in (None, c.latency.min)):
@@ -298,10 +299,12 @@ def open_lifted_map(
     tolerance = min(system.coupling.iteration.tolerance, CONVERGED)
     exactly = replace(system.coupling.iteration, method="newton", tolerance=tolerance)
     system = replace(system, coupling=replace(system.coupling, iteration=exactly))
+    work = work or SharedWork()
+    system = with_stand_ins(system, work.responses)
     with ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
         simulation = Simulation(system, RunResults(), stack)
         simulation.step_checks.clear()
         simulation.start()
         without_friction(simulation.holds.values())
-        sensitivity = ForwardSensitivity(simulation, scene, work or SharedWork())
+        sensitivity = ForwardSensitivity(simulation, scene, work)
         yield LiftedMap(Plan(system), simulation, sensitivity, Machine(simulation))

@@ -23,7 +23,13 @@ from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose, at_pose
-from hapticlink.analysis.stability.remedy_trial import Remedy, Trial, Visited, find_best
+from hapticlink.analysis.stability.remedy_trial import (
+    Remedy,
+    Trial,
+    Visited,
+    find_best,
+    those_that_help,
+)
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames
@@ -59,7 +65,7 @@ class Margin:
     """The factor on all stiffnesses, dampings by its root, up to which it is stable, to FINE of its
     logarithm; 0 where it is unstable with all that were tried."""
     delay: float | None
-    """The further delay (s) of all that the controller reads, in whole haptic periods: with one
+    """The further delay (s) of all that the controllers read, in whole haptic periods: with one
     more it is unstable. None, too, where it is unstable with none."""
     rate: float | None
     """The lowest graphics rate (Hz) down to which it is stable with frames of whole haptic periods:
@@ -82,9 +88,9 @@ def improvements(
     work: SharedWork | None = None,
     steps: Steps | None = None,
 ) -> tuple[Margin, tuple[Remedy, ...]]:
-    """The margin in the `worst` pose, and what ends its instability, as `remedies`; nothing where
-    it is stable. visited: gives the poses in which the scene with other options is judged, those
-    that are named in `hardest` first."""
+    """The margin in the `worst` pose, and what ends its instability or grows less, as `remedies`;
+    nothing where it is stable. visited: gives the poses in which the scene with other options is
+    judged, those that are named in `hardest` first."""
     pose = next(pose for pose in poses if pose.name == worst.pose)
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
@@ -94,7 +100,8 @@ def improvements(
         margin = search.margin(place)
         softer = search.softer(place, margin)
         candidates = () if stable else [*search.candidates(place, margin, softer)]
-    return margin, search.remedies(candidates, softer, visited, hardest)
+    found = search.remedies(candidates, softer, visited, hardest)
+    return margin, those_that_help(found, worst.growth)
 
 
 class _Search:
@@ -174,7 +181,7 @@ class _Search:
         return largest_count(holds, own, SLOWEST)
 
     def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
-        """Whether all hands are stable with gains scaled, and all that the controller reads some
+        """Whether all hands are stable with gains scaled, and all that the controllers read some
         haptic periods later."""
         self._steps.tell(
             f"margin of delay: {late} haptic periods"
@@ -225,11 +232,12 @@ class _Search:
                 yield (f"hold={hold}",)
         if softer:
             yield softer
-        table, _, _ = LAWS["drift"]
+        part, _, _ = LAWS["drift"]
         for factor in DAMPINGS:
-            for key, value in gains.options({"drift": factor**2}).items():
-                if key == f"{table}.damping":
-                    yield tuple(overrides.write_options({key: value}))
+            options = gains.options({"drift": factor**2})
+            damping = {k: v for k, v in options.items() if k.endswith(f".{part}.damping")}
+            if damping:
+                yield tuple(overrides.write_options(damping))
         if read.graphics is not None:
             assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
             rate = exact(read.graphics.rate)
@@ -293,7 +301,7 @@ class _Search:
         found = [find_best([*trials.values()])] if trials else []
         if softer in trials and softer not in (remedy.options for remedy in found):
             found += [remedy] if (remedy := trials[softer].judge()).growth < 0.0 else []
-        return tuple(remedy for remedy in found if remedy.growth < float("inf"))
+        return tuple(found)
 
 
 def _name(change: tuple[str, ...], softer: tuple[str, ...]) -> str:

@@ -12,7 +12,9 @@ sigma is the growth rate (1/s). p is the participation of coordinate k, from
 the right and left eigenvectors v and w; it does not depend on the units of the coordinates
 (Perez-Arriaga, Verghese, Schweppe, IEEE Trans. Power Apparatus and Systems 101 (1982), 3117). An
 error E of A moves a simple eigenvalue by at most |w||E||v| / |w v| entry by entry, which is taken
-for its uncertainty.
+for its uncertainty. Of eigenvalues that coincide, as those of a closure error that is critically
+damped, w v is 0 and that says nothing: where it leaves open whether the leading mode grows, the
+distance is taken by which the errors with these signs, and with the opposite ones, really move it.
 
 The argument of z is known up to whole turns only: the phase of a number c that the mode moves,
 unwrapped over the events of the period, is omega P. It is exact as long as c turns by less than
@@ -122,6 +124,11 @@ class Mode:
         """Whether z is 1 within its uncertainty: a motion that neither grows nor decays."""
         return abs(self.z - 1.0) <= min(self.uncertainty, NEAR)
 
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether it is further from 1 than a neutral mode, and may grow or decay."""
+        return abs(self.z - 1.0) > NEAR and verdict(abs(self.z), self.uncertainty) == "marginal"
+
 
 def verdict(radius: float, uncertainty: float) -> str:
     """stable, unstable, or marginal where a spectral radius is 1 within its uncertainty. What grows
@@ -146,7 +153,7 @@ def modes(linear: Linearisation, period: float) -> list[Mode]:
     A, E = linear.A * scale / scale[:, None], np.abs(linear.E * scale / scale[:, None])
     E = np.maximum(E, FLOOR * np.abs(A))
     values, left, right = eig(A, left=True, right=True)
-    found = []
+    found: list[tuple[Mode, Complex, Complex]] = []
     for i, z in enumerate(values):
         if z.imag < 0.0:
             continue
@@ -155,17 +162,29 @@ def modes(linear: Linearisation, period: float) -> list[Mode]:
         shares = np.abs((linear.V @ (v * scale)) * (linear.V @ (w / scale)))[linear.taken]
         uncertainty = float(np.abs(w) @ E @ np.abs(v)) / overlap if overlap else np.inf
         s = np.log(z) / period if z else complex(-np.inf)
-        found.append(
-            Mode(
-                complex(z),
-                uncertainty,
-                float(s.real),
-                float(s.imag),
-                shares / shares.sum() if shares.any() else shares,
-                linear.V @ (v * scale),
-            )
+        mode = Mode(
+            complex(z),
+            uncertainty,
+            float(s.real),
+            float(s.imag),
+            shares / shares.sum() if shares.any() else shares,
+            linear.V @ (v * scale),
         )
-    return sorted(found, key=lambda mode: -abs(mode.z))
+        found.append((mode, w, v))
+    found.sort(key=lambda each: -abs(each[0].z))
+    sorted_modes = [mode for mode, _, _ in found]
+    first = next((i for i, mode in enumerate(sorted_modes) if not mode.neutral), None)
+    if first is not None and sorted_modes[first].is_in_doubt:
+        mode, w, v = found[first]
+        slope = np.outer(w, v) * np.conj(mode.z * (w @ v))
+        moved = _distance(mode.z, A, np.sign(slope.real) * E)
+        sorted_modes[first] = replace(mode, uncertainty=min(mode.uncertainty, moved))
+    return sorted_modes
+
+
+def _distance(z: complex, A: Matrix, E: Matrix) -> float:
+    """How far an error of E or of -E moves the eigenvalue z of A."""
+    return float(max(np.abs(np.linalg.eigvals(A + e) - z).min() for e in (E, -E)))
 
 
 def with_turns(mode: Mode, path: Complex, period: float) -> Mode:

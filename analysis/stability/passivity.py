@@ -51,6 +51,7 @@ from hapticlink.analysis.stability.port_response import (
 from hapticlink.analysis.stability.poses import in_own_hand
 from hapticlink.analysis.stability.short_hyperperiod import round_rate
 from hapticlink.analysis.stability.smooth_scene import linearisable
+from hapticlink.analysis.stability.stand_in import StandIn, find_stand_ins, record_stand_ins
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Vector
@@ -86,6 +87,8 @@ class Passivity:
     """The rendering between the hand and a virtual mechanism, None without one behind a device."""
     rounded: str = ""
     """Which rate is judged in place of one with which events hardly repeat; empty for none."""
+    stand_ins: tuple[StandIn, ...] = ()
+    """What stands for FMUs whose state cannot be read."""
 
     @property
     def passive(self) -> bool:
@@ -104,6 +107,7 @@ class Passivity:
             "damping_necessary_by_frequency": [list(pair) for pair in self.curve],
             "rounded": self.rounded,
             "two_port": self.two_port.record() if self.two_port else None,
+            **record_stand_ins(self.stand_ins),
         }
 
     def lines(self) -> Iterator[str]:
@@ -117,6 +121,8 @@ class Passivity:
         )
         if self.rounded:
             yield f"  {self.rounded}"
+        for each in self.stand_ins:
+            yield f"  {each}"
         yield (
             "  no hand can take energy out of it in small motions about this equilibrium"
             if self.passive
@@ -195,6 +201,7 @@ def of(
         frequency=frequency,
         curve=tuple(sorted(curve)),
         two_port=_between(period, hand, mechanism, port, angles) if mechanism else None,
+        stand_ins=find_stand_ins(period.map_.work.responses),
     )
 
 

@@ -7,7 +7,9 @@ With the value y and its powers c_k = y^(k)/k! (per tick^k) up to the degree d o
 whatever the age of the samples: all evaluations between two samples are one matrix. Only the first
 one behind a sample, and the first of a period, depends on the samples, with weights that follow
 from the hold itself at d + 1 instants: its values for samples that are 0 but for one entry of 1.
-Behind a manifold, where the value is not linear in the samples, they are slopes at these.
+Behind a manifold, where the value is not linear in the samples, they are slopes at these, and so
+are those by the efforts that `ahead` reads beside its samples. Its law changes where a sample
+describes the present: the instants are taken on the side on which it is asked.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ import ctypes
 from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hapticlink.orchestrator.base.arrays import Matrix
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold
 from hapticlink.orchestrator.run.compiled.state import StateBlock
 
@@ -25,18 +28,28 @@ STEP = 1e-6
 """Of differences, relative to max(1, |z|)."""
 OF_SAMPLES = ("samples", "lead")
 """What takes the samples of a hold that keeps nothing else."""
+LESS = {"WITH_RATE": 0, "WITH_POSE": 1, "ALONE": 2}
+"""By how much a cubic, its slope and a line are of less than degree 3, of `ahead`."""
 
 
 def is_polynomial(hold: CompiledHold) -> bool:
     """Whether the value of a hold is a polynomial in time through its samples."""
     row = hold.row
-    return row.push in OF_SAMPLES and row.degree is not None and not hold.parts.beside
+    alone = row.needs == "step" or not hold.parts.beside
+    return row.push in OF_SAMPLES and row.degree is not None and alone
+
+
+def read_by(hold: CompiledHold) -> NDArray[np.intp]:
+    """The indices of the signals that a hold reads beside its samples."""
+    beside = hold.parts.beside
+    return np.unique(beside.where) if beside else np.zeros(0, np.intp)
 
 
 def degree_of(hold: CompiledHold) -> int:
     """The degree d of a hold that is a polynomial."""
-    assert hold.row.degree is not None
-    return hold.row.degree
+    degree = hold.row.degree
+    assert degree is not None
+    return degree - LESS[hold.parts.relation] if hold.row.needs == "step" else degree
 
 
 def is_linear(hold: CompiledHold) -> bool:
@@ -57,26 +70,31 @@ def sample_arrives(hold: CompiledHold, tick: int) -> bool:
     )
 
 
-def slopes_of_powers(hold: CompiledHold, block: StateBlock, tick: int, ahead: float) -> Matrix:
+def slopes_of_powers(
+    hold: CompiledHold, block: StateBlock, board: Vector, tick: int, ahead: float
+) -> Matrix:
     """The slopes of (c_0, ..., c_d), n numbers each, of a hold at a tick and so much `ahead` of it,
-    by the numbers of its state, the `block`."""
+    by the numbers of its state, the `block`, and by what it reads beside these on the `board`."""
     state, degree, own = block.save(), degree_of(hold), hold.c
     spacing = own.stamps[own.count - 1] - own.stamps[own.count - 2] if own.count > 1 else 1
-    at = np.arange(degree + 1.0) * spacing
-    size = len(state.numbers)
-    z = np.zeros(size) if is_linear(hold) else state.numbers
-    steps = np.ones(size) if is_linear(hold) else STEP * np.maximum(1.0, np.abs(z))
+    between = tick + ahead < own.stamps[own.count - 1]  # samples, at which the law of `ahead` ends
+    at = np.arange(degree + 1.0) * (-spacing if between else spacing)
+    reads, size = read_by(hold), len(state.numbers)
+    z = np.concatenate([state.numbers, board[reads]])
+    known = np.zeros_like(z) if is_linear(hold) else z
+    steps = np.ones(len(z)) if is_linear(hold) else STEP * np.maximum(1.0, np.abs(z))
 
-    def values(numbers: Matrix) -> Matrix:
-        block.restore(state, numbers)
+    def values(numbers: Vector) -> Matrix:
+        block.restore(state, numbers[:size])
+        board[reads] = numbers[size:]
         return np.array([hold.value(tick, ahead + later) for later in at])
 
-    moved = np.array([values(z + step) - values(z - step) for step in np.diag(steps)]) / 2
-    block.restore(state, state.numbers)
+    moved = np.array([values(known + step) - values(known - step) for step in np.diag(steps)]) / 2
+    values(z)
     slopes = np.moveaxis(moved, 0, -1) / steps  # (instants, n, numbers)
     powers = np.linalg.inv(np.vander(np.arange(degree + 1.0), increasing=True))
-    scaled = powers / float(spacing) ** np.arange(degree + 1)[:, None]
-    result: Matrix = np.tensordot(scaled, slopes, 1).reshape(-1, size)
+    scaled = powers / float(at[min(1, degree)] or 1.0) ** np.arange(degree + 1)[:, None]
+    result: Matrix = np.tensordot(scaled, slopes, 1).reshape(-1, len(z))
     return result
 
 

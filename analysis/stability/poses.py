@@ -23,6 +23,7 @@ from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import Fault, FmuFault, InputFault
 from hapticlink.orchestrator.base.signal_names import (
+    CONTACT_GAP,
     ENVIRONMENT_WRENCH,
     HAND,
     HAND_WRENCH,
@@ -128,7 +129,7 @@ def choose_evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pos
     one if there was any. Raises InputFault where the poses are not recorded."""
     table = _read_poses(run)
     moments = [int(i * len(table["time"]) / count) for i in range(count)]
-    size = PLANE.distance(_force(table))
+    size = PLANE.distance(_contact_force(table, linkage))
     touching = np.flatnonzero(size)
     if len(touching):
         moments.append(int(touching[np.argsort(size[touching])[len(touching) // 2]]))
@@ -245,9 +246,14 @@ def _read_poses(run: Results) -> Table:
     raise InputFault(f"{POINT_POSE} and {JOINT_COORDINATES} are not recorded: no poses of a run")
 
 
-def _force(table: Table) -> Matrix:
-    force: Matrix = table[ENVIRONMENT_WRENCH] if ENVIRONMENT_WRENCH in table else np.zeros((1, 3))
-    return np.broadcast_to(force, (len(table["time"]), 3))
+def _contact_force(table: Table, linkage: Linkage) -> Matrix:
+    """F_env where a body touches something or a joint is at its limit. F_env alone does not tell:
+    it has other hands and efforts on joints, too."""
+    if ENVIRONMENT_WRENCH not in table:
+        return np.zeros((len(table["time"]), 3))
+    limited = any(j.limits for j in linkage.joint) or any(j.limits for j in linkage.loop)
+    touches = table[CONTACT_GAP] < 0.0 if CONTACT_GAP in table else np.zeros(1, bool)
+    return np.where((touches | limited)[:, None], table[ENVIRONMENT_WRENCH], 0.0)
 
 
 def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
@@ -257,7 +263,7 @@ def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
         float(table["time"][i]),
         by_joint(linkage, table[JOINT_COORDINATES][i]),
         tuple(table[POINT_POSE][i].tolist()),
-        tuple((0.0 - _force(table)[i]).tolist()),
+        tuple((0.0 - _contact_force(table, linkage)[i]).tolist()),
         {user: tuple(table[_point(user)][i].tolist()) for user in users},
     )
 

@@ -125,6 +125,12 @@ def find_best(trials: Sequence[Trial]) -> Remedy:
     return first.remedy
 
 
+def those_that_help(remedies: Sequence[Remedy], growth: float) -> tuple[Remedy, ...]:
+    """The remedies with which the worst case grows less than without them, at `growth` (1/s): in
+    the poses of its own run a change may do worse than in those of the scene."""
+    return tuple(remedy for remedy in remedies if remedy.growth < growth)
+
+
 def _worst(cases: Sequence[Case]) -> float:
     """The largest growth rate of the cases that do not only drift, and are not marginal."""
     rates = [case.growth for case in cases if case.verdict != "marginal" and not case.drifts]

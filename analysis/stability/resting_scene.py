@@ -153,7 +153,7 @@ def resting_system(
     """`resting` of a system that is built."""
     with ExitStack() as stack:
         system = long_enough(read, system)
-        gains, T = Gains(system), float(1 / exact(read.haptics.rate))
+        gains, T = Gains(system, read.controllers), float(1 / exact(read.haptics.rate))
 
         def rested(scale: float) -> RestingScene:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))

@@ -28,8 +28,10 @@ KnownSlopes = dict[tuple[Any, ...], list[Slopes]]
 class SharedWork:
     """slopes: of the blocks of the package (forward_sensitivity.py). keys: of the operations of
     each event of a period (lifted_map.py). counts: of "equilibria" that were searched, of
-    operations that were "differentiated", and of "products" of the matrices of events."""
+    operations that were "differentiated", and of "products" of the matrices of events. responses:
+    of FMUs whose state cannot be read (stand_in.py)."""
 
     slopes: KnownSlopes = field(default_factory=dict)
     keys: dict[Hashable, dict[int, Any]] = field(default_factory=dict)
     counts: Counter[str] = field(default_factory=Counter)
+    responses: dict[tuple[Any, ...], Any] = field(default_factory=dict)

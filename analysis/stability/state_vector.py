@@ -51,8 +51,7 @@ class Template:
 
 class StateVector:
     """Reads and writes the state of `simulation`, or of its FMUs `fmus` and its holds and energy
-    tanks `holds` alone. Raises InputFault for an FMU whose serialised state does not say where its
-    numbers are.
+    tanks `holds` alone. All its FMUs have a layout (`has_layout`).
 
     owners: the names of the FMUs, SIGNALS, and those of the holds, in the order of the numbers.
     """
@@ -69,7 +68,6 @@ class StateVector:
         self._fmus = [f for f in simulation.system.fmus if fmus is None or f.name in fmus]
         self._taken: dict[str, NDArray[np.intp]] = {}
         for fmu in self._fmus:
-            require_layout(fmu)
             self._taken[fmu.name] = np.array([i for i, *_ in _entries(fmu)], dtype=np.intp)
         self.owners = (*self._taken, SIGNALS, *self._holds)
 
@@ -187,9 +185,10 @@ def parameters_of(fmu: Fmu, state: bytes) -> Vector | None:
 
 def size(system: System) -> int:
     """The numbers of the state of a system, without the samples that holds keep. Raises InputFault
-    as StateVector does."""
+    for an FMU without a layout."""
     for fmu in system.fmus:
-        require_layout(fmu)
+        if not has_layout(fmu):
+            raise InputFault(f"{fmu.name}: {LAYOUT}")
     entries = [entry for fmu in system.fmus for entry in _entries(fmu)]
     return len(entries) + sum(len(fmu.description.outputs) for fmu in system.fmus)
 
@@ -200,14 +199,15 @@ def _signal(column: str) -> StateEntry:
     return StateEntry(fmu, variable, "signal")
 
 
-def require_layout(fmu: Fmu) -> None:
-    """Raises InputFault unless the FMU declares the layout of its serialised state."""
-    if fmu.description.states is None or not fmu.description.restores_state:
-        raise InputFault(
-            f"{fmu.name}: its FMU does not declare the layout of its serialised state, which the "
-            "map needs (`States` in its annotation: docs/fmus.md); an FMU that replaces a block "
-            "can be left out"
-        )
+LAYOUT = (
+    "its FMU does not declare the layout of its serialised state (`States` in its annotation: "
+    "docs/fmus.md)"
+)
+
+
+def has_layout(fmu: Fmu) -> bool:
+    """Whether the FMU declares the layout of its serialised state."""
+    return fmu.description.states is not None and fmu.description.restores_state
 
 
 def _entries(fmu: Fmu) -> Iterator[tuple[int, str, bool]]:

@@ -16,6 +16,7 @@ from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.poses import Pose
 from hapticlink.analysis.stability.remedy_trial import Remedy
+from hapticlink.analysis.stability.stand_in import StandIn, record_stand_ins
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene.overrides import as_command_line
@@ -42,6 +43,8 @@ class Stability:
     """Lines of text on what is removed or stays as at rest."""
     rounded: str = ""
     """At which rate it was judged instead of its own, and why."""
+    stand_ins: tuple[StandIn, ...] = ()
+    """What stands for FMUs whose state cannot be read."""
     run_fault: str = ""
     """How the scene's run, from which the poses are taken, failed; "" if it reached its end."""
 
@@ -95,6 +98,7 @@ class Stability:
             "cases": [case.record() for case in self.cases],
             "frozen": list(self.frozen),
             "rounded": self.rounded,
+            **record_stand_ins(self.stand_ins),
             "run_fault": self.run_fault or None,
         }
 
@@ -122,11 +126,12 @@ class Stability:
             slow = [case for case in self.cases if case.drifts and not case.free]
             some = f"{len({case.hand for case in slow})} of {hands}" if len(held) > 1 else hands
             near = f", and marginal in {len(edge)}" if edge else ""
-            return f"drifts slowly in {some}{near}, {in_poses}: {_name_case(worst_case(slow))}"
+            return f"drifts slowly in {some}{near}, {in_poses}: {_name_case(worst)}"
         if self.verdict == "not held":
             loose = worst_case(c for c in self.cases if c.free)
             if loose.verdict != "unstable":
-                return f"not held: in free air it does not grow, nor come to rest; {calm}"
+                slight = "neither grow nor decay" if loose.verdict == "marginal" else "do not grow"
+                return f"not held: in free air small motions {slight}; {calm}"
             does = "drifts" if loose.drifts else f"shows a growing {loose.kind}"
             ends = "small motions decay with no damping that was tried"
             if self.damping is not None and math.isfinite(self.damping):
@@ -199,6 +204,7 @@ class Stability:
             yield self.rounded
         for pose, why in self.without.items():
             yield f"pose at {pose} left out: {why}"
+        yield from map(str, self.stand_ins)
         apart = frozen_nonlinearities.name_by_end(self.frozen)
         if apart:
             yield f"judged for small motions; {apart}"

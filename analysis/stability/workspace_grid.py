@@ -23,6 +23,7 @@ from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.results.read_results import Results
+from hapticlink.orchestrator.scene.blocks import described_devices
 from hapticlink.orchestrator.scene.scene import Scene
 
 FROM, TRIED = 64, 4
@@ -67,7 +68,7 @@ def grid_poses(run: Results, read: Scene, linkage: Linkage, count: int) -> list[
 def _is_allowed(read: Scene, linkage: Linkage, reached: Reached) -> bool:
     """Whether the devices reach a pose, joints are within their limits, and nothing is inside an
     obstacle."""
-    for user, device in read.all_devices.items():
+    for user, device in described_devices(read).items():
         point = reached.further[user] if user else reached.point
         if margin(device, point[None])[0] < 0.0:
             return False

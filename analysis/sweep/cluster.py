@@ -6,18 +6,18 @@ since the Python FMUs of a process share one interpreter.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 
 from hapticlink.analysis.sweep.job import Job
-from hapticlink.analysis.sweep.pool import Done, Work
-from hapticlink.analysis.sweep.row import DIED, failed
+from hapticlink.analysis.sweep.pool import Done
+from hapticlink.analysis.sweep.row import DIED, Row, failed
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault
 
 
-def on_cluster(work: Work, jobs: Sequence[Job], address: str) -> Iterator[Done]:
+def on_cluster(work: Callable[[Job], Row], jobs: Sequence[Job], address: str) -> Iterator[Done]:
     """Each job with its row, as they finish. Raises InputFault without Dask, or if no scheduler
     answers at `address`."""
     try:

@@ -1,7 +1,7 @@
 """Runs jobs in a pool of processes: a crash fails one run, and Ctrl-C ends all processes.
 
-Each process has at most one job. When a process dies its pool breaks without saying which job was
-the cause: the jobs in progress are repeated one by one, and one that dies alone has failed.
+Each process has at most one batch of jobs. When a process dies its pool breaks without saying which
+job was the cause: the jobs in progress are repeated one by one, and one that dies alone has failed.
 """
 
 from __future__ import annotations
@@ -28,29 +28,31 @@ from hapticlink.analysis.sweep.row import DIED, Row, failed
 from hapticlink.orchestrator.base import interrupt, process, temporary_folders
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.fmi import process_cache
+from hapticlink.orchestrator.system.fmu_files import prefer_compiled
 
-Work = Callable[[Job], Row]
+Batch = Sequence[Job]
+Work = Callable[[Batch], Sequence[Row]]
 Done = tuple[Job, Row]
-RUNS = 200
-"""Runs of a process before it is replaced, since libraries of FMUs stay loaded."""
+BATCHES = 200
+"""Batches of a process before it is replaced, since libraries of FMUs stay loaded."""
 
 
-def in_processes(work: Work, jobs: Sequence[Job], count: int) -> Iterator[Done]:
+def in_processes(work: Work, batches: Sequence[Batch], count: int) -> Iterator[Done]:
     """Each job with its row, as they finish. Raises Interrupted after SIGINT or SIGTERM, when all
     processes have ended."""
-    queue = deque(jobs)
+    queue = deque(batches)
     while queue:
         suspects = yield from _run_in_processes(work, queue, count)
-        for job in suspects:
-            if (yield from _run_in_processes(work, deque([job]), 1)):
+        for job in (job for batch in suspects for job in batch):
+            if (yield from _run_in_processes(work, deque([[job]]), 1)):
                 yield job, failed(DIED, "the process of this run crashed")
 
 
 def _run_in_processes(
-    work: Work, queue: deque[Job], count: int
-) -> Generator[Done, None, list[Job]]:
-    """Runs jobs from `queue` until it is empty; if a process dies, returns the jobs in progress."""
-    in_progress: dict[Future[Row], Job] = {}
+    work: Work, queue: deque[Batch], count: int
+) -> Generator[Done, None, list[Batch]]:
+    """Runs jobs from `queue` until it is empty; if a process dies, returns those in progress."""
+    in_progress: dict[Future[Sequence[Row]], Batch] = {}
     with _executor(min(count, len(queue))) as pool:
         while queue or in_progress:
             try:
@@ -61,8 +63,8 @@ def _run_in_processes(
                 ready = wait(in_progress, timeout=0.2, return_when=FIRST_COMPLETED).done
                 interrupt.raise_if_interrupted()
                 for future in ready:
-                    row = future.result()
-                    yield in_progress.pop(future), row
+                    rows = future.result()
+                    yield from zip(in_progress.pop(future), rows, strict=True)
             except BrokenProcessPool:
                 return list(in_progress.values())
     return []
@@ -84,7 +86,7 @@ class _Worker(SpawnProcess):
     def run(self) -> None:
         process.raise_gc_threshold()
         process.freeze_gc()  # what is loaded by now
-        with process_cache.keep_unpacked(), one_blas_thread():
+        with process_cache.keep_unpacked(), one_blas_thread(), prefer_compiled():
             super().run()
         process.freeze_gc()
         process.leave_threads(0)
@@ -104,7 +106,7 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
     context = SpawnContext()  # FMUs hold threads and libraries: no fork
     context.Process = _Worker  # type: ignore[misc]
     pool = ProcessPoolExecutor(
-        count, mp_context=context, initializer=_follow, max_tasks_per_child=RUNS
+        count, mp_context=context, initializer=_follow, max_tasks_per_child=BATCHES
     )
     try:
         yield pool

@@ -7,6 +7,7 @@ a stability map.
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -18,15 +19,21 @@ from hapticlink.analysis.sweep.job import Job, key
 from hapticlink.analysis.sweep.row import DIED, INTERRUPTED, REFUSED, Row, failed, measure
 from hapticlink.orchestrator.base import interrupt, plugins, temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
-from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.experiment import Experiment, simulate, simulate_together
 from hapticlink.orchestrator.fmi import process_cache
+from hapticlink.orchestrator.run.compiled.lanes import MOST
 
 Measure = Callable[[Experiment], Row]
 """Of a run."""
 Judge = Callable[[Any, Path], Row]
 """Of a job, with a folder for what it writes meanwhile. It is called in other processes. The row of
 several points has them as `rows`."""
+Together = Callable[[Sequence[Job]], Sequence[Row | None]]
+"""Of jobs, the rows of those that are done in one go."""
 Tell = Callable[[int], None]
+MANY = 500
+"""Runs of a sweep from which on it compiles steps of several instances: a third as long as it takes
+to compile them is won by so many, and all of it by the next sweeps."""
 
 
 class Unfinished(Fault):
@@ -59,12 +66,42 @@ def work(job: Job, folder: Path | None, judge: Judge) -> Row:
             process_cache.trim()
 
 
+def work_together(
+    jobs: Sequence[Job], folder: Path | None, judge: Judge, together: Together | None = None
+) -> list[Row]:
+    """Does several jobs, `together` as far as that gives rows."""
+    rows: Sequence[Row | None] = [None] * len(jobs)
+    if together and len(jobs) > 1 and not any(job.plugins for job in jobs):
+        try:
+            rows = together(jobs)
+        except Interrupted as interrupted:
+            return [failed(INTERRUPTED, str(interrupted)) for _ in jobs]
+        except Exception:  # which the jobs tell one by one
+            process_cache.trim()
+    return [row or work(job, folder, judge) for job, row in zip(jobs, rows, strict=True)]
+
+
+def run_together(
+    jobs: Sequence[Job], compiles: bool, measure: Measure = measure
+) -> list[Row | None]:
+    """The rows of the runs of jobs, side by side where they share their events; None of a job whose
+    scene cannot be run so. compiles: as of `simulate_together`."""
+    scenes = [job.scene for job in jobs if job.scene]
+    if key(scenes[0]) != jobs[0].key:
+        return [None] * len(jobs)
+    made = simulate_together(scenes, Path(), compiles)
+    return [_row(experiment, measure) if experiment else None for experiment in made]
+
+
 def run(job: Job, results: Path, measure: Measure = measure) -> Row:
     """The row of a run of the scene of a job."""
     assert job.scene is not None
     if key(job.scene) != job.key:
         return failed(DIED, "this worker has another version of hapticlink or of what it uses")
-    experiment = simulate(job.scene, results, csv=False, in_memory=True)
+    return _row(simulate(job.scene, results, csv=False, in_memory=True), measure)
+
+
+def _row(experiment: Experiment, measure: Measure) -> Row:
     row, fault = measure(experiment), experiment.outcome.fault
     if fault is None or _of_scene(fault):
         return row
@@ -101,7 +138,8 @@ def sweep(
 ) -> list[Row]:
     """The rows of the runs of `jobs`, as `tabulate`."""
     judge = partial(run, measure=measure)
-    return tabulate(jobs, folder, judge, processes, scheduler=scheduler, tell=tell)
+    together = partial(run_together, compiles=len(jobs) >= MANY, measure=measure)
+    return tabulate(jobs, folder, judge, processes, together, scheduler=scheduler, tell=tell)
 
 
 @interrupt.defer_signals()
@@ -110,6 +148,7 @@ def tabulate(
     folder: Path,
     judge: Judge,
     processes: int,
+    together: Together | None = None,
     *,
     scheduler: str | None = None,
     tell: Tell = lambda done: None,
@@ -118,7 +157,7 @@ def tabulate(
     each_time: bool = False,
 ) -> list[Row]:
     """The rows of `jobs`, in their order, each with its point, behind those `before`; `tell` is
-    called with the number of finished jobs.
+    called with the number of finished jobs. together: does several of them in one go.
 
     A row is stored in `folder`/rows when its job ends and is reused by a later call, unless that
     failed for a reason other than its scene. The table `name` is written at the end, or `each_time`
@@ -142,29 +181,36 @@ def tabulate(
             table.write(folder / name, found)
             return found
 
-        tell(len(done()))
+        tell(finished := len(done()))
+        points = Counter(j.key for j in jobs if j.scene)
         try:
-            for job, row in _finished(missing, folder, processes, scheduler, judge):
+            for job, row in _finished(missing, folder, processes, scheduler, judge, together):
                 if row["end"] == INTERRUPTED:  # a signal reached the worker too
                     continue
                 if row["end"] != DIED:  # the next sweep repeats those
                     stored.keep(job.key, row)
                 rows[job.key] = row
-                tell(len(done()))
+                finished += points[job.key]
+                tell(finished)
                 if each_time:
                     write()
         except Interrupted:
             pass
-        finished = write()
+        made = write()
     except OSError as error:
         raise Fault(f"{folder}: {error}") from error
-    if len(done()) < len(jobs):
-        raise Unfinished(len(done()), len(jobs), folder, name)
-    return finished
+    if finished < len(jobs):
+        raise Unfinished(finished, len(jobs), folder, name)
+    return made
 
 
 def _finished(
-    jobs: Sequence[Job], folder: Path, processes: int, scheduler: str | None, judge: Judge
+    jobs: Sequence[Job],
+    folder: Path,
+    processes: int,
+    scheduler: str | None,
+    judge: Judge,
+    together: Together | None,
 ) -> Iterator[pool.Done]:
     """Each job with its row, as they finish."""
     if scheduler:
@@ -176,8 +222,10 @@ def _finished(
     running.mkdir(parents=True)
     interrupt.add(clear)
     try:
-        of_job = partial(work, folder=running, judge=judge)
-        yield from pool.in_processes(of_job, jobs, processes)
+        of_batch = partial(work_together, folder=running, judge=judge, together=together)
+        size = max(1, min(MOST, len(jobs) // (4 * processes))) if together else 1
+        batches = [jobs[i : i + size] for i in range(0, len(jobs), size)]
+        yield from pool.in_processes(of_batch, batches, processes)
     finally:
         interrupt.remove(clear)
         clear()

@@ -36,8 +36,14 @@ from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import Pose, choose_evenly_spaced, fault_of, simulate_scene
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.short_hyperperiod import whole_frames
+from hapticlink.analysis.stability.stand_in import StandIn, find_stand_ins, record_stand_ins
 from hapticlink.analysis.tune.felt_stiffness import CONSTRAINED, RIGID, mobility
 from hapticlink.analysis.tune.stability_limits import Judge
+from hapticlink.components.dynamics.rendered_directions import (
+    WHOLE,
+    RenderedDirections,
+    rendered_directions,
+)
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
@@ -90,7 +96,7 @@ class Constraint:
 class Transparency:
     """How a scene feels at a pose of its run. growing: the cases, of a handle that is let go and of
     the hands of `stability`, in which something grows by more than a drift; steady_in: the hands in
-    which nothing does."""
+    which nothing does. stand_ins: what stands for FMUs whose state cannot be read."""
 
     title: str
     pose: str
@@ -98,6 +104,7 @@ class Transparency:
     constrained: tuple[Constraint, ...]
     growing: tuple[Case, ...] = ()
     steady_in: tuple[str, ...] = ()
+    stand_ins: tuple[StandIn, ...] = ()
 
     @property
     def right_up_to(self) -> float:
@@ -115,6 +122,8 @@ class Transparency:
         """The result as text."""
         yield f"at {self.pose}:"
         yield from self._unstable()
+        for each in self.stand_ins:
+            yield f"  {each}"
         if self.growing and not self.steady_in:
             return
         for d in self.free:
@@ -153,6 +162,7 @@ class Transparency:
             "pose": self.pose,
             "unstable": [case.record() for case in self.growing],
             "steady_in": list(self.steady_in),
+            **record_stand_ins(self.stand_ins),
             "right_up_to": self.right_up_to,
             "frequencies": HERTZ.tolist(),
             "free": [
@@ -208,24 +218,36 @@ def _visit_poses(read: Scene, count: int) -> list[Pose]:
 def _measure_felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
     cut = response(place.period(scales), hand_port(place.map.system))
     X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
-    found = of(read.title, name, X, mobility(place), mean_link_length(_linkage(read)))
+    rendered = rendered_directions(read.device.handle if read.device else None)
+    length = mean_link_length(_linkage(read))
+    found = of(read.title, name, X, mobility(place), length, rendered)
     judged = InHands(place, scales)
     cases = judged.cases(name, {FREE: free(), **HANDS}, DRIFT)
     growing = tuple(case for case in cases if _grows(case))
     steady = tuple(case.hand for case in cases if not (case.free or case in growing))
-    return replace(found, growing=growing, steady_in=steady)
+    stand_ins = find_stand_ins(place.map.work.responses)
+    return replace(found, growing=growing, steady_in=steady, stand_ins=stand_ins)
 
 
 def _grows(case: Case) -> bool:
     return case.verdict == "unstable" and not case.drifts
 
 
-def of(title: str, pose: str, X: Complex, mobility: Matrix, length: float) -> Transparency:
+def of(
+    title: str,
+    pose: str,
+    X: Complex,
+    mobility: Matrix,
+    length: float,
+    rendered: RenderedDirections = WHOLE,
+) -> Transparency:
     """The transparency of a handle with the compliances X (k, 3, 3) at HERTZ, for a mechanism of a
-    mobility Lambda^-1 (3, 3) with links of a mean length (m)."""
+    mobility Lambda^-1 (3, 3) with links of a mean length (m), in the directions that a device
+    renders."""
     S, w = np.diag(np.array(PLANE.scaling(length), float)), 2 * np.pi * HERTZ
-    values, vectors = np.linalg.eigh(S @ mobility @ S)
-    moves = values > CONSTRAINED * values[-1]
+    felt = np.array(rendered.rows)
+    values, vectors = np.linalg.eigh(felt @ S @ rendered.felt_mobility(mobility) @ S @ felt.T)
+    moves, vectors = values > CONSTRAINED * values[-1], felt.T @ vectors
     E, P = vectors[:, moves], vectors[:, ~moves].T
     X = S @ X @ S
     solved = np.linalg.inv(E.T @ X @ E)

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from hapticlink.analysis.search.search import DOUBLINGS, FINE
 from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.resting_scene import RestingScene
+from hapticlink.components.dynamics.rendered_directions import WHOLE, RenderedDirections
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
@@ -48,16 +49,23 @@ class Feel:
         self._place, self.along, self.gains = place, along, place.gains
 
     @classmethod
-    def of(cls, place: RestingScene, linkage: Linkage) -> Feel:
-        """Raises InputFault where no direction is constrained and nothing touches."""
+    def of(
+        cls, place: RestingScene, linkage: Linkage, rendered: RenderedDirections = WHOLE
+    ) -> Feel:
+        """In the directions that a device renders. Raises InputFault where no direction is
+        constrained and nothing touches."""
         found = {}
         S: Matrix = np.diag(np.array(linkage.space.scaling(mean_link_length(linkage)), float))
-        values, vectors = np.linalg.eigh(S @ mobility(place) @ S)
+        felt = np.array(rendered.rows)
+        reduced = felt @ S @ rendered.felt_mobility(mobility(place)) @ S @ felt.T
+        values, vectors = np.linalg.eigh(reduced)
+        vectors = felt.T @ vectors
         null = [S @ vectors[:, i] for i in np.flatnonzero(values < CONSTRAINED * values[-1])]
         if null:
             n = max(null, key=lambda wrench: float(PLANE.distance(wrench)))
             found["constraint"] = n / PLANE.distance(n)
         F = place.signal(ENVIRONMENT_WRENCH)
+        F = F if rendered.whole or not len(F) else felt.T @ (felt @ F)
         if len(F) and (size := float(PLANE.distance(F))):
             found["contact"] = F / size
         if not found:

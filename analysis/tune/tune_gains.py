@@ -42,6 +42,7 @@ from hapticlink.analysis.sweep.row import Row
 from hapticlink.analysis.tune.felt_stiffness import Feel
 from hapticlink.analysis.tune.stability_limits import Judge
 from hapticlink.analysis.tune.tuning_result import Tuned as Tuned
+from hapticlink.components.dynamics.rendered_directions import rendered_directions
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
@@ -107,6 +108,7 @@ class _Tuning:
         self._read, self._margin, self._tell, self._keep = read, margin, tell, keep
         self._linkage, device = required(read)
         self._limits = AcceptanceLimits.of(device)
+        self._rendered = rendered_directions(device.handle)
 
     def search(self) -> Scales:
         """The scales of the largest gains with which margin and run hold, with frames of whole
@@ -124,7 +126,7 @@ class _Tuning:
             self._resting = resting
             self._states = {name: place.equilibrium for name, place in held.items()}
             felt_at = (pressed or resting[:1])[-1].name
-            judge, feel = Judge(held), Feel.of(held[felt_at], self._linkage)
+            judge, feel = Judge(held), Feel.of(held[felt_at], self._linkage, self._rendered)
             self._tell("the margin of the scene's own gains")
             own = judge.margin({}, COARSE)
             self._tell(f"  {own:.3g}")

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.continuous.device import Pantograph
+from benchmarks.continuous.device import AbsoluteDevice
 from benchmarks.continuous.hand import Hand
 from benchmarks.continuous.march import Guards
 from benchmarks.continuous.touching import Touching
@@ -39,7 +39,7 @@ class Absolute:
         assert linkage
         assert scene.device
         self.hand, self.first_mode = Hand(scene.hand), first_mode
-        self._bodies, self._device = Bodies(linkage), Pantograph(scene.device)
+        self._bodies, self._device = Bodies(linkage), AbsoluteDevice(scene.device)
         self._touching = Touching(linkage, scene.contacts, self._bodies)
         self._n = self._bodies.mechanism.n
         self._K, self._B = (

@@ -1,88 +1,107 @@
-"""The twin pantograph in absolute coordinates: nine bodies, pins and motors.
+"""A device of pins in absolute coordinates: all its bodies, and its motors.
 
 With the handle's rows of G moved to the right, G_p zd_p = -G_h v gives the velocities zd = N v of
 all bodies, and with them
 
-    M_d = N' m N,   c = N' m (Ndot v),   J_q: the rows of N of the links next to the motors
+    M_d = N' m N,   c = N' m (Ndot v),   J_q: the rates of the motors' joints
+
+The bodies are led to a pose of the handle by Newton's method, from the pose before it.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from benchmarks.maximal import Maximal
+from benchmarks.maximal import Maximal, turned
+from hapticlink.components.device.models import device_model
+from hapticlink.components.device.workspace import margin
+from hapticlink.components.linkage.poses import poses
 from hapticlink.components.specs.device import Device
 
+CLOSED, STEPS = 1e-14, 50
+"""Gap (m) of the pins, and steps of Newton's method."""
 
-class Pantograph:
-    """The device, without its stops; raises ValueError at a pose within them."""
+
+class AbsoluteDevice:
+    """The device, without its stops, whose handle is held in the middle of its body; raises
+    ValueError at a pose within the stops."""
 
     def __init__(self, spec: Device) -> None:
-        self._spec = d = spec
-        sides, planes = (-1, 1), ((d.base_y_a, -1.0), (d.base_y_b, 1.0))
-        self._bases = np.array(
-            [[d.base_x + s * d.base_half_width, y] for y, _ in planes for s in sides]
-        )
-        self._outward = np.array([s for _ in planes for s in sides], float)
-        self._ends = np.array([[e * d.crank / 2, 0.0] for _, e in planes for _ in sides])
-        proximal = [d.proximal_mass] * 2 + [d.proximal_inertia + d.rotor_inertia]
-        distal = [d.distal_mass] * 2 + [d.distal_inertia]
-        handle = [d.handle_mass] * 2 + [d.handle_inertia]
-        pins = []
-        for k, (base, end) in enumerate(zip(self._bases, self._ends, strict=True)):
-            near, far = 2 * k, 2 * k + 1
-            pins += [
-                ((-1, tuple(base)), (near, (-d.proximal_center, 0.0))),
-                (
-                    (near, (d.proximal_length - d.proximal_center, 0.0)),
-                    (far, (-d.distal_center, 0.0)),
-                ),
-                ((far, (d.distal_length - d.distal_center, 0.0)), (8, tuple(end))),
+        self._spec, names = spec, [body.name for body in spec.body]
+        self._handle = names.index(spec.handle.body)
+        centers = {body.name: np.array(body.center or (0.0, 0.0)) for body in spec.body}
+
+        def end(body: str, at: Any) -> tuple[int, tuple[float, float]]:
+            x, y = np.array(at or (0.0, 0.0)) - centers.get(body, 0.0)
+            return (names.index(body) if body in names else -1), (float(x), float(y))
+
+        joined: list[Any] = [((j.parent, j.at_parent), (j.child, j.at_child)) for j in spec.placed]
+        joined += [tuple(zip(c.bodies, c.at, strict=True)) for c in spec.placed_loops]
+        self._pins = [(end(*one), end(*other)) for one, other in joined]
+        mass = np.array([[body.mass, body.mass, body.inertia] for body in spec.body])
+        for motor in spec.motors:
+            if motor.joint.parent != "ground":
+                raise ValueError("the reference knows motors on the ground alone")
+            mass[names.index(motor.joint.child), 2] += motor.inertia
+        self._driven = [3 * names.index(motor.joint.child) + 2 for motor in spec.motors]
+        self._joined = Maximal(mass, self._pins)
+        start = poses(spec.linkage, [device_model(spec).start.tolist()])
+        z = [start[name][0] for name in names]
+        self._z = np.array(
+            [
+                [*(pose[:2] + turned(pose[2], centers[name])), pose[2]]
+                for name, pose in zip(names, z, strict=True)
             ]
-        self._joined = Maximal(np.array([*[proximal, distal] * 4, handle]), pins)
-        longest = d.proximal_length + d.distal_length
-        spare = (1 - d.reach_limit) * longest
-        self._reach = abs(d.proximal_length - d.distal_length) + spare, longest - spare
+        ).ravel()
 
     def motion(self, pose: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
-        """M_d (3, 3), c (3,) and J_q (4, 3) at a pose and velocity of the handle."""
-        z = self._placed(pose)
-        N = np.zeros((27, 3))
-        N[24:] = np.eye(3)
-        G, _ = self._joined.closures(z, np.zeros(27))
-        N[:24] = np.linalg.solve(G[:, :24], -G[:, 24:])
+        """M_d (3, 3), c (3,) and J_q (m, 3) at a pose and velocity of the handle."""
+        z, (held, others) = self._placed(pose), self._rows()
+        N = np.zeros((len(z), 3))
+        N[held] = np.eye(3)
+        G, _ = self._joined.closures(z, np.zeros(len(z)))
+        N[others] = np.linalg.solve(G[:, others], -G[:, held])
         _, gamma = self._joined.closures(z, N @ v)
-        bias = np.zeros(27)
-        bias[:24] = np.linalg.solve(G[:, :24], gamma)
+        bias = np.zeros(len(z))
+        bias[others] = np.linalg.solve(G[:, others], gamma)
         weighted = N.T * self._joined.mass
-        return weighted @ N, weighted @ bias, N[2:24:6]
+        return weighted @ N, weighted @ bias, N[self._driven]
 
     def torques(self, J_q: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-        """Motor torques (N.m, 4) of least norm, scaled to the limit."""
+        """Motor torques (N.m, m) of least norm, scaled to the limits."""
         tau = np.linalg.lstsq(J_q.T, wrench, rcond=None)[0]
-        return tau * (self._spec.torque_limit / max(self._spec.torque_limit, np.abs(tau).max()))
+        limits = np.array([motor.torque_limit for motor in self._spec.motors])
+        return tau / max(1.0, np.abs(tau / limits).max())
+
+    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """The entries of z of the handle's body, and the others."""
+        held = 3 * self._handle + np.arange(3)
+        return held, np.setdiff1d(np.arange(len(self._z)), held)
 
     def _placed(self, pose: np.ndarray) -> np.ndarray:
-        """All centres of mass and angles, elbows outward."""
-        d = self._spec
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        ends = pose[:2] + self._ends @ np.array([[c, s], [-s, c]])
-        span = ends - self._bases
-        reach = np.linalg.norm(span, axis=1)
-        if (reach < self._reach[0]).any() or (reach > self._reach[1]).any():
+        """All centres of mass and angles."""
+        if margin(self._spec, pose[None])[0] < 0.0:
             raise ValueError(f"the device meets its stops at {pose}, which the reference lacks")
-        along = (reach**2 + d.proximal_length**2 - d.distal_length**2) / (2 * reach)
-        aside = np.sqrt(d.proximal_length**2 - along**2)
-        u = span / reach[:, None]
-        n = np.column_stack([-u[:, 1], u[:, 0]])
-        n *= np.sign(self._outward * n[:, 0])[:, None]  # the elbow lies outward of base and end
-        elbow = along[:, None] * u + aside[:, None] * n
-        z = np.zeros((9, 3))
-        for rows, start, way, center in (
-            (slice(0, 8, 2), self._bases, elbow, d.proximal_center / d.proximal_length),
-            (slice(1, 8, 2), self._bases + elbow, span - elbow, d.distal_center / d.distal_length),
-        ):
-            z[rows, :2] = start + center * way
-            z[rows, 2] = np.arctan2(way[:, 1], way[:, 0])
-        z[8] = pose
-        return z.ravel()
+        z, (held, others) = self._z.copy(), self._rows()
+        z[held] = pose
+        for _ in range(STEPS):
+            gap = self._gap(z)
+            if np.abs(gap).max() < CLOSED:
+                break
+            G, _ = self._joined.closures(z, np.zeros(len(z)))
+            z[others] -= np.linalg.solve(G[:, others], gap)
+        self._z = z
+        return z
+
+    def _gap(self, z: np.ndarray) -> np.ndarray:
+        def place(end: tuple[int, tuple[float, float]]) -> np.ndarray:
+            body, at = end
+            if body < 0:
+                return np.array(at)
+            x = z[3 * body : 3 * body + 3]
+            found: np.ndarray = x[:2] + turned(x[2], np.array(at))
+            return found
+
+        return np.concatenate([place(one) - place(other) for one, other in self._pins])

@@ -20,8 +20,7 @@ import numpy as np
 from benchmarks.continuous.hand import Hand
 from benchmarks.continuous.march import Guards
 from hapticlink.components.component import Component
-from hapticlink.components.device import pantograph
-from hapticlink.components.device.motors_and_encoders import numbers
+from hapticlink.components.device.models import device_model
 from hapticlink.fmus.blocks import component
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
@@ -35,7 +34,7 @@ class Relative:
         made = {b.name: component(b.block, b.settings) for b in blocks(scene).built}
         mechanism, controller = made["virtual_mechanism"], made["controller"]
         assert scene.device
-        self.hand, device = Hand(scene.hand), numbers(scene.device)
+        self.hand, device = Hand(scene.hand), device_model(scene.device)
         n = sum(v.size for v in mechanism.states if v.name == "q")
         y, mode, t = ca.SX.sym("y", 2 * n + 6 + 6 * self.hand.moves), ca.SX.sym("mode"), ca.SX(0)
         motion, x_D, v_D = y[: 2 * n], y[2 * n : 2 * n + 3], y[2 * n + 3 : 2 * n + 6]
@@ -52,7 +51,8 @@ class Relative:
         moves = {"q": motion[:n], "qd": motion[n:], "n_constrained": mode}
         state = ca.vertcat(*(moves.get(name, ca.DM(value)) for name, value in at_start.items()))
         free = _outputs(mechanism, state, {}, t)
-        M, c = pantograph.motion(x_D, v_D, device)
+        p = device.numbers
+        M, c = device.motion(x_D, v_D, p)
         seen = {
             "x_S": free["x"],
             "v_S": free["v"],
@@ -67,9 +67,9 @@ class Relative:
         forces = _outputs(controller, ca.SX(0, 1), seen, t)
         pushed = {"F_hand": F_hand, "F_drift": forces["F_drift"]}
         qdd = _outputs(mechanism, state, pushed, t)["qdd"]
-        tau = pantograph.motor_torques(forces["F_motor"], x_D, device)
-        wrench = pantograph.jacobian(x_D, device).T @ tau + F_hand - c
-        wrench += pantograph.stop_wrench(x_D, v_D, device)
+        tau = device.motor_torques(forces["F_motor"], x_D, p)
+        wrench = device.jacobian(x_D, p).T @ tau + F_hand - c
+        wrench += device.stop_force(x_D, v_D, p)
         rate = ca.vertcat(motion[n:], qdd, v_D, ca.solve(M, wrench), *arm)
         cse = {"cse": True}
         self._rate = ca.Function("rate", [y, mode, target], [rate], cse)

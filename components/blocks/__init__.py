@@ -8,13 +8,14 @@ The functions here import their equations when they are called, so that reading 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from hapticlink.components.registry import Registry, no_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.control import Controller
-from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.device import Device, Handle
 from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.paths import Interpolation
@@ -43,6 +44,7 @@ def _virtual_mechanism(
     users: tuple[str, ...] = (),
     coupled: bool = False,
     followed: bool = False,
+    handles: Mapping[str, Handle] = MappingProxyType({}),
 ) -> Component:
     from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 
@@ -54,6 +56,7 @@ def _virtual_mechanism(
         "users": users,
         "coupled": coupled,
         "followed": followed,
+        "handles": handles,
     }
     return virtual_mechanism(linkage, mechanism, directions, contacts, **options)
 
@@ -67,6 +70,7 @@ def _virtual_environment(
     local_model: bool = False,
     users: tuple[str, ...] = (),
     predicted: bool = False,
+    handles: Mapping[str, Handle] = MappingProxyType({}),
 ) -> Component:
     from hapticlink.components.blocks.virtual_environment import virtual_environment
 
@@ -76,6 +80,7 @@ def _virtual_environment(
         "frame_s": FRAME,
         "users": users,
         "predicted": predicted,
+        "handles": handles,
     }
     return virtual_environment(linkage, graphics, directions, contacts, **options)
 
@@ -99,20 +104,24 @@ def _motor_map(device: Device) -> Component:
 
 
 def _controller(
-    controller: Controller, linkage: Linkage, directions: Directions, clutch: bool = False
+    controller: Controller,
+    linkage: Linkage,
+    directions: Directions,
+    clutch: bool = False,
+    handle: Handle | None = None,
 ) -> Component:
     from hapticlink.components.blocks import controller as block
     from hapticlink.components.linkage.parameters import mean_link_length
 
     given = directions.length_scale
     length = mean_link_length(linkage) if given is None else given
-    return block.controller(controller, linkage.space, length, clutch=clutch)
+    return block.controller(controller, linkage.space, length, clutch=clutch, handle=handle)
 
 
-def _hand(hand: Hand, clutch: bool = False) -> Component:
+def _hand(hand: Hand, clutch: bool = False, handle: Handle | None = None) -> Component:
     from hapticlink.components.blocks import hand as block
 
-    return block.hand(hand, clutch=clutch)
+    return block.hand(hand, clutch=clutch, handle=handle)
 
 
 def _discrete_equivalent(rule: str) -> Component:

@@ -28,10 +28,15 @@ import casadi as ca
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity, topology
 from hapticlink.components.dynamics import grasp
+from hapticlink.components.dynamics.rendered_directions import (
+    RenderedDirections,
+    rendered_directions,
+)
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import SpringPorts
 from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.control import Controller, PassivityLaw, Topology
+from hapticlink.components.specs.device import Handle
 
 _DRIFT = SpringPorts("x_S", "x_D", "K_pc", "B_pc", "v_S", velocity="v_D", force="F_drift")
 """F_drift between the operational point and the handle."""
@@ -112,12 +117,19 @@ def _outputs(
 
 
 def controller(
-    spec: Controller, space: PortSpace, length_scale: float, *, clutch: bool = False
+    spec: Controller,
+    space: PortSpace,
+    length_scale: float,
+    *,
+    clutch: bool = False,
+    handle: Handle | None = None,
 ) -> Component:
     """The controller of a port with the parts of `spec` that are on. length_scale is L (m). With a
     clutch it has the input held_point (grasp.py): while the hand holds no point of the mechanism,
     F_drift, F_env and F_T are 0 and the device has its own inertia,
-    u = C_d v - B_d v - K_d (x - x_ref). coupling_energy is that of the stiffnesses of F_drift and
+    u = C_d v - B_d v - K_d (x - x_ref). handle: of a device that does not render all directions
+    (rendered_directions.py); u is then E' M_d R (Lambda^-1 (...) + a_bias) + ..., with all else as
+    it is along E. coupling_energy is that of the stiffnesses of F_drift and
     F_T, e' K e/2.
 
     Raises ValueError for bias "full" without the impedance part, which carries it.
@@ -141,8 +153,10 @@ def controller(
         states=states,
         outputs=outputs,
     )
-    output, parts = _wrenches(spec, space, law, block)
+    rendered = rendered_directions(handle)
+    output, parts = _wrenches(spec, space, law, block, rendered)
     mobility = "Lambda_inv" if spec.impedance and not clutch else ""
+    is_spring = spec.teleoperation and (rendered.whole or rendered.is_angle_fixed)
     initial: dict[str, ca.SX] = {}
     step: dict[str, ca.SX] = {}
     if guard:
@@ -161,29 +175,33 @@ def controller(
         step=step,
         output=output,
         documentation=__doc__ or "",
-        springs=[replace(_DRIFT, mobility=mobility)] if spec.teleoperation else [],
+        springs=[replace(_DRIFT, mobility=mobility)] if is_spring else [],
         parts=parts,
     )
 
 
 def _wrenches(
-    spec: Controller, space: PortSpace, law: Topology | None, block: Block
+    spec: Controller,
+    space: PortSpace,
+    law: Topology | None,
+    block: Block,
+    rendered: RenderedDirections,
 ) -> tuple[dict[str, ca.SX], list[BlockPart]]:
     """u of the motors, before the passivity controller, with F_drift and F_T where they are; and
     the parts that make them, of which the last gives F_motor."""
     u, p = block.u, block.p
     output: dict[str, ca.SX] = {}
     parts, terms, reads = list[BlockPart](), "", list[str]()
-    force, coupling_energy = ca.SX.zeros(space.size), ca.SX(0)
+    force, env, coupling_energy = ca.SX.zeros(space.size), ca.SX.zeros(space.size), ca.SX(0)
     apart = ("x_S", "v_S", "x_D", "v_D")
     clutch = (grasp.HELD,) if grasp.HELD in u else ()
     e, rate = ca.SX(0), ca.SX(0)
     if spec.teleoperation or law:
         e, rate = space.difference(u["x_S"], u["x_D"]), u["v_S"] - u["v_D"]
     if spec.teleoperation:
-        spring = p["K_pc"] * e
+        spring = rendered.coupled(p["K_pc"] * e)
         coupling_energy += ca.dot(e, spring) / 2
-        output["F_drift"] = grasp.while_held(u, spring + p["B_pc"] * rate)
+        output["F_drift"] = grasp.while_held(u, spring + rendered.coupled(p["B_pc"] * rate))
         force += output["F_drift"]
         law_text = r"$F_{drift} = K_{pc} (x_S - x_D)$" "\n" r"$+ B_{pc} (v_S - v_D)$"
         gains = (*apart, "K_pc", "B_pc", *clutch)
@@ -192,7 +210,8 @@ def _wrenches(
         )
         terms, reads = " + F_{drift}", ["F_drift"]
     if spec.contact:
-        force += grasp.while_held(u, u["F_env"])
+        env = grasp.while_held(u, u["F_env"])
+        force += env
         terms, reads = terms + " + F_{env}", [*reads, "F_env", *clutch]
     if spec.damping is not None:
         force -= p["B_d"] * u["v_D"]
@@ -201,21 +220,27 @@ def _wrenches(
         force -= p["K_d"] * space.difference(u["x_D"], p["x_ref"])
         terms, reads = terms + " - K_d (x_D - x_{ref})", [*reads, "x_D", "K_d", "x_ref"]
 
-    motor, summed = force, terms.removeprefix(" + ") or "0"
+    motor, summed = rendered.mask(force), terms.removeprefix(" + ") or "0"
     if spec.impedance:
-        a = u["Lambda_inv"] @ (u["F_hand"] + force)
+        # The effect of what acts on the mechanism from elsewhere is that of all of F_env.
+        pushed = force if rendered.whole else rendered.mask(force - env) + env
+        a = u["Lambda_inv"] @ (rendered.mask(u["F_hand"]) + pushed)
         desired = rf"$a = \Lambda^{{-1}} (F_h{terms})$"
         reads = ["Lambda_inv", "F_hand", *reads]
         if spec.bias == "full":
             a += u["a_bias"]
             desired, reads = desired + "\n" r"$+ a_{bias}$", [*reads, "a_bias"]
-        motor = grasp.while_held(u, u["M"] @ a + u["c"] - u["F_hand"], u["c"] + force)
+        along = rendered.acceleration(u["Lambda_inv"], a)
+        accelerating = rendered.put(rendered.pick_matrix(u["M"]) @ along)
+        own = u["c"] - rendered.mask(u["F_hand"])
+        motor = grasp.while_held(u, accelerating + own, u["c"] + motor)
         parts.append(BlockPart("desired motion", desired, "(4.3), (4.4)", tuple(reads), ("a",)))
         summed, reads = "M_d a + C_d v - F_h", ["M", "a", "c", "F_hand", *clutch]
     if law:
 
         def constrain(pull: ca.SX) -> ca.SX:
-            return topology.constraint_wrench(space, pull, u["M"], u["P_c"], p["length_scale"])
+            given = u["M"], u["P_c"], p["length_scale"], rendered
+            return topology.constraint_wrench(space, pull, *given)
 
         F_T = grasp.while_held(u, constrain(p["k_j"] * e + p["b_j"] * rate))
         coupling_energy += ca.dot(e, constrain(p["k_j"] * e)) / 2

@@ -1,20 +1,21 @@
-"""Haptic device: twin pantograph, four motors, four encoders and the observer.
+"""Haptic device: a linkage with motors and encoders, and the observer.
 
-    M_d(x) v' + C_d(x, v) v = J_q' (tau + friction) + F_hand + stops        (4.5)
+    M_d(x) v' + C_d(x, v) v = J_q' (tau + friction) + E F_hand + stops        (4.5)
 
-tau, the torques of least norm for F_motor at the pose measured at t_k, saturated, is held over the
-communication step [t_k, t_k + h). A device without friction has no terms of it. At t = 0 the handle
-is at rest at x_start and the observed force is zero.
+in the directions E of the handle in which the device moves; x, v and all wrenches are of the plane,
+and 0 in the others (x: as at the start). tau, the torques of least norm for F_motor at the pose
+measured at t_k, saturated, is held over the communication step [t_k, t_k + h). A device without
+friction has no terms of it. At t = 0 the handle is at rest at x_start and the observed force is
+zero.
 
 Without encoders x and v are the true values. With them x is the pose that belongs to the quantised
-base angles; v and F_hand_observed come from the observer. M and c = C_d v are evaluated at the
-measured pose and velocity, workspace_margin at the true pose. All dimensions are assumed, since the
-report gives only the 0.09 degrees of an encoder count.
+angles; v and F_hand_observed come from the observer. M and c = C_d v are evaluated at the measured
+pose and velocity, workspace_margin at the true pose.
 
 With its observer beside it (block `observer`) the device takes torques tau (block `motor_map`) and
-puts out q, the base angles by the encoders: counts times resolution; q_true, the angles themselves;
-and tau_applied, the torques of the step that ends, 0 at t = 0.
-"""
+puts out q, the coordinates of its joints by the encoders: counts times resolution; q_true, these
+themselves; theta_true, the angles of its motors' axes; and tau_applied, the torques of the step
+that ends, 0 at t = 0."""
 
 from __future__ import annotations
 
@@ -25,23 +26,18 @@ import casadi as ca
 
 from hapticlink.components import integrators
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.device import observer_laws, pantograph
+from hapticlink.components.device import observer_laws, variables
+from hapticlink.components.device.device_model import DeviceModel
+from hapticlink.components.device.models import device_model
 from hapticlink.components.device.motors_and_encoders import count
 from hapticlink.components.device.variables import (
-    ENCODERS,
     F_HAND_OBSERVED,
-    FRICTION,
-    GEOMETRY,
-    INERTIA,
-    STOPS,
-    TORQUE_LIMIT,
     X_START,
     C,
     M,
-    Rows,
     V,
     X,
-    variables,
+    in_plane,
 )
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.ports import Power
@@ -50,63 +46,82 @@ from hapticlink.components.specs.device import Device
 
 SPACE = PLANE
 """Of the port at the handle."""
-MOTORS = (pantograph.MOTORS,)
 _POWER = Power("x_true")
 _F_MOTOR = Variable("F_motor", *SPACE.wrench, 0.0, "desired wrench of the motors", power=_POWER)
-_TAU = Variable("tau", MOTORS, "N.m", 0.0, "torques of the motors", power=Power("q_true"))
 _F_HAND = Variable("F_hand", *SPACE.wrench, 0.0, "wrench of the hand on the handle", power=_POWER)
 _TRUE_OUTPUTS = [
-    Variable(
-        "workspace_margin",
-        (),
-        "m",
-        0.0,
-        "smallest distance of an arm to a stop, negative beyond it",
-    ),
+    Variable("workspace_margin", (), "m", 0.0, "smallest distance to a stop, negative beyond it"),
     Variable("x_true", *SPACE.pose, description="true pose of the handle"),
     Variable("v_true", *SPACE.twist, 0.0, "true velocity of the handle", derivative_of="x_true"),
 ]
-_MEASURED_OUTPUTS = [
-    Variable("q", MOTORS, "rad", description="base angles by the encoders: counts x resolution"),
-    Variable("counts", MOTORS, "1", description="counts of the encoders"),
-    Variable("tau_applied", MOTORS, "N.m", description="torques of the step that ends"),
-    Variable("q_true", MOTORS, "rad", description="true base angles"),
-]
-_STATES = [
-    Variable("x_true", *SPACE.pose, description="pose of the handle"),
-    Variable("v_true", *SPACE.twist, description="velocity of the handle"),
-]
-_TAU_APPLIED = Variable("tau_applied", MOTORS, "N.m", description="torques of the step before")
+FRICTION = ("motor_damping", "motor_friction")
 
 
-def _parameters(device: Device, tunable: Rows) -> list[Variable]:
-    friction = FRICTION if device.motor_damping or device.motor_friction else ()
-    fixed = variables(device, (*GEOMETRY, *INERTIA), "fixed")
-    return [X_START, *fixed, *variables(device, (*tunable, *friction), "tunable")]
+class _Motion:
+    """The names of the states of the motion: x_true and v_true where these are all of the plane."""
+
+    def __init__(self, model: DeviceModel) -> None:
+        whole = model.is_pose and model.directions.whole
+        self.names = ("x_true", "v_true") if whole else ("place", "rate")
+        self.states = [
+            variables.place(model, self.names[0], "place of the device"),
+            variables.rate(model, self.names[1], "velocity of the handle"),
+        ]
+
+    def of(self, block: Block) -> tuple[ca.SX, ca.SX]:
+        """Place and velocity."""
+        return block.x[self.names[0]], block.x[self.names[1]]
 
 
-def _plant(block: Block) -> ca.Function:
-    """(x = [pose, v], u = [tau, F_hand], p, t) -> x' of (4.5)."""
-    state, drive = ca.SX.sym("x", 6), ca.SX.sym("u", 7)
-    pose, v, tau, F_hand = state[:3], state[3:], drive[:4], drive[4:]
-    M, c = pantograph.motion(pose, v, block.p)
-    J = pantograph.jacobian(pose, block.p)
+def _angles(model: DeviceModel, name: str, text: str) -> Variable:
+    units = tuple(sensed.joint.kind.units[0] for sensed in model.encoders)
+    return Variable(name, (len(units),), units, description=text)
+
+
+def _torques(model: DeviceModel, name: str, text: str, power: Power | None = None) -> Variable:
+    return Variable(name, (len(model.motors),), "N.m", 0.0, text, power=power)
+
+
+def _resolutions(model: DeviceModel) -> Variable:
+    units = tuple(sensed.joint.kind.units[0] for sensed in model.encoders)
+    values = tuple(sensed.resolution for sensed in model.encoders)
+    text = "change of a joint's coordinate by a count"
+    return Variable("encoder_resolution", (len(units),), units, values, text, "fixed")
+
+
+def _parameters(model: DeviceModel, *, torque_limit: bool = True) -> list[Variable]:
+    limits = [v for v in model.limits if torque_limit or v.name != "torque_limit"]
+    return [X_START, *model.parameters, *limits]
+
+
+def _plant(block: Block, model: DeviceModel) -> ca.Function:
+    """(x = [place, v], u = [tau, F_hand], p, t) -> x' of (4.5)."""
+    n, k, m = len(model.start_place), model.directions.size, len(model.motors)
+    state, drive = ca.SX.sym("x", n + k), ca.SX.sym("u", m + SPACE.size)
+    z, v, tau, F_hand = state[:n], state[n:], drive[:m], model.directions.pick(drive[m:])
+    inertia, c = model.motion(z, v, block.p)
+    J = model.jacobian(z, block.p)
     if "motor_friction" in block.p:
-        tau = tau + pantograph.friction_torques(J @ v, block.p)
-    wrench = J.T @ tau + F_hand
-    wrench += pantograph.stop_wrench(pose, v, block.p) - c
-    derivative = ca.vertcat(v, ca.solve(M, wrench))
+        tau = tau + model.friction_torques(J @ v, block.p)
+    force = J.T @ tau + F_hand
+    force += model.stop_force(z, v, block.p) - c
+    derivative = ca.vertcat(model.rate(z, v, block.p), ca.solve(inertia, force))
     return ca.Function("ode", [state, drive, block.p.vector, block.t], [derivative])
 
 
-def advance_device(block: Block, tau: ca.SX, substeps: int) -> ca.SX:
-    """[x_true, v_true] after h, with the torques tau and the hand's wrench held."""
-    plant, h, inputs = _plant(block), block.h / substeps, ca.vertcat(tau, block.u["F_hand"])
-    motion = ca.vertcat(block.x["x_true"], block.x["v_true"])
+def advance_device(
+    block: Block, model: DeviceModel, motion: tuple[ca.SX, ca.SX], tau: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """Place and velocity after h, with the torques tau and the hand's wrench held."""
+    substeps, n = model.device.substeps, motion[0].numel()
+    plant, h, inputs = _plant(block, model), block.h / substeps, ca.vertcat(tau, block.u["F_hand"])
+    still, both = ca.SX(model.directions.size, 1), ca.vertcat(*motion)
     for i in range(substeps):
         t = block.t + i * block.h / substeps
-        motion = integrators.step("heun", plant, motion, inputs, block.p.vector, t, h, [0, 1, 2])
-    return motion
+        both = integrators.step("heun", plant, both, inputs, block.p.vector, t, h, range(n))
+        if model.device.loop and not model.is_pose:
+            both = ca.vertcat(model.moved(both[:n], still, block.p), both[n:])
+    return both[:n], both[n:]
 
 
 _MATRICES = BlockPart("inertia", r"$M_d(x),\ c = C_d(x, v)\,v$", "(4.5)", ("x", "v"), ("M", "c"))
@@ -119,7 +134,7 @@ _MOTORS = BlockPart(
 )  # fmt: skip
 _COUNTED = BlockPart(
     "encoders", r"$q = \Delta\,[\varphi(x_D) / \Delta]$", "section 4.2.1, fig. 4.2",
-    ("x_true", "encoder_resolution"), ("q", "counts", "q_true"),
+    ("x_true", "encoder_resolution"), ("q", "counts", "q_true", "theta_true"),
 )  # fmt: skip
 _NICOSIA = (
     BlockPart(
@@ -155,122 +170,155 @@ def _observer_parts(block: Block) -> tuple[BlockPart, ...]:
     return replace(_COUNTED, gives=("q",)), kalman
 
 
-def _twin_part(block: Block) -> BlockPart:
+def _motion_part(block: Block, motion: _Motion) -> BlockPart:
     """The part of the motion."""
     p = block.p
     tau = r"(\tau + \tau_f)" if "motor_friction" in p else r"\tau"
-    friction = tuple(name for name, *_ in FRICTION if name in p)
-    stops = ("reach_limit", "stop_stiffness", "stop_damping")
+    friction = tuple(name for name in FRICTION if name in p)
+    stops = ("stop_reach", "stop_stiffness", "stop_damping")
     applied = ("tau_applied",) if "tau_applied" in block.x else ()
+    gives = dict.fromkeys((*motion.names, "x_true", "v_true", "workspace_margin", *applied))
     return BlockPart(
-        "twin pantograph",
+        "device",
         rf"$M_d \dot{{v}} + C_d v = J_q^T {tau}$" "\n" r"$+ F_h + F_{stops}$",
         "(4.5)",
         ("tau", "F_hand", *friction, *stops),
-        ("x_true", "v_true", "workspace_margin", *applied),
+        (*gives,),
     )
 
 
 def haptic_device(device: Device, encoders: bool = False) -> Component:
     """The device, sensed by encoders where `encoders` says so, with the observer of these in it or
     beside it."""
+    model = device_model(device)
     if not encoders:
-        return _ideal(device)
-    return _without_observer(device) if device.observer.beside else _with_observer(device)
+        return _ideal(model)
+    return _without_observer(model) if device.observer.beside else _with_observer(model)
 
 
-def _ideal(device: Device) -> Component:
+def _ideal(model: DeviceModel) -> Component:
     """The device whose pose and velocity are known."""
+    motion = _Motion(model)
     block = Block(
         inputs=[_F_MOTOR, _F_HAND],
-        parameters=_parameters(device, (*TORQUE_LIMIT, *STOPS)),
-        states=_STATES,
+        parameters=_parameters(model),
+        states=motion.states,
         outputs=[X, V, M, C, *_TRUE_OUTPUTS],
     )
-    x, v = block.x["x_true"], block.x["v_true"]
-    tau = pantograph.motor_torques(block.u["F_motor"], x, block.p)
-    inertia, c = pantograph.motion(x, v, block.p)
-    output = {"x": x, "v": v, "M": inertia, "c": c}
-    parts = [_MOTORS, _twin_part(block), _IDEAL, _MATRICES]
-    return _component(block, "ideally sensed", {}, _motion(block, device, tau), output, parts)
+    z, v = motion.of(block)
+    tau = model.motor_torques(model.directions.pick(block.u["F_motor"]), z, block.p)
+    inertia, c = model.motion(z, v, block.p)
+    seen = {"x": model.handle(z, block.p), "v": v, "M": inertia, "c": c}
+    parts = [_MOTORS, _motion_part(block, motion), _IDEAL, _MATRICES]
+    made = _Made(block, model, motion, "ideally sensed", parts)
+    return made.component({}, made.moved(tau), seen)
 
 
-def _with_observer(device: Device) -> Component:
+def _with_observer(model: DeviceModel) -> Component:
     """The device with encoders and observer."""
-    encoders = variables(device, ENCODERS, "fixed")
+    motion = _Motion(model)
     block = Block(
         inputs=[_F_MOTOR, _F_HAND],
         parameters=[
-            *_parameters(device, (*TORQUE_LIMIT, *STOPS)),
-            *encoders,
-            *observer_laws.parameters(device),
+            *_parameters(model),
+            _resolutions(model),
+            *observer_laws.parameters(model),
         ],
-        states=[*_STATES, *observer_laws.states(device)],
+        states=[*motion.states, *observer_laws.states(model)],
         outputs=[X, V, F_HAND_OBSERVED, M, C, *_TRUE_OUTPUTS],
     )
     u, p = block.u, block.p
-    observer = observer_laws.observer(device, p)
+    observer = observer_laws.observer(model, p)
     now = observer.read(block.x)
-    output = observer.outputs(now)
-    tau = pantograph.motor_torques(u["F_motor"], output["x"], p)
-    motion = _motion(block, device, tau)
-    first = observer.start(_measured(block, p["x_start"])[0], p["x_start"])
-    after = observer.advance(now, _measured(block, motion["x_true"])[0], tau, block.h)
-    sensing, observed = "encoders and observer", _observer_parts(block)
-    parts = [_MOTORS, _twin_part(block), *observed, _MATRICES]
-    return _component(block, sensing, first.states, motion | after.states, output, parts)
+    seen = observer.outputs(now)
+    tau = model.motor_torques(model.directions.pick(u["F_motor"]), now.place, p)
+    parts = [_MOTORS, _motion_part(block, motion), *_observer_parts(block), _MATRICES]
+    made = _Made(block, model, motion, "encoders and observer", parts)
+    moved, guess = made.moved(tau), model.place_at_pose(p["x_start"], p)
+    first = observer.start(made.measured(guess)[0], guess)
+    after = observer.advance(now, made.measured(moved[motion.names[0]])[0], tau, block.h)
+    return made.component(first.states, moved | after.states, seen)
 
 
-def _without_observer(device: Device) -> Component:
+def _without_observer(model: DeviceModel) -> Component:
     """The device with encoders, whose observer is a block of its own."""
-    encoders = variables(device, ENCODERS, "fixed")
+    motion = _Motion(model)
     block = Block(
-        inputs=[_TAU, _F_HAND],
-        parameters=[*_parameters(device, STOPS), *encoders],
-        states=[*_STATES, _TAU_APPLIED],
-        outputs=[*_MEASURED_OUTPUTS, *_TRUE_OUTPUTS],
+        inputs=[
+            _torques(model, "tau", "torques of the motors", Power("theta_true")),
+            _F_HAND,
+        ],
+        parameters=[*_parameters(model, torque_limit=False), _resolutions(model)],
+        states=[*motion.states, _torques(model, "tau_applied", "torques of the step before")],
+        outputs=[
+            _angles(model, "q", "joint coordinates by the encoders: counts x resolution"),
+            Variable("counts", (len(model.encoders),), "1", description="counts of the encoders"),
+            _torques(model, "tau_applied", "torques of the step that ends"),
+            _angles(model, "q_true", "true joint coordinates"),
+            Variable("theta_true", (len(model.motors),), "rad", description="true motor angles"),
+            *_TRUE_OUTPUTS,
+        ],
     )
-    x, tau = block.x, block.u["tau"]
-    angles, counts = _measured(block, x["x_true"])
-    output = {"q": angles, "counts": counts, "tau_applied": x["tau_applied"]}
-    output |= {"q_true": pantograph.base_angles(x["x_true"], block.p)}
+    z, tau = motion.of(block)[0], block.u["tau"]
+    made = _Made(block, model, motion, "encoders", [_motion_part(block, motion), _COUNTED])
+    angles, counts = made.measured(z)
+    output = {"q": angles, "counts": counts, "tau_applied": block.x["tau_applied"]}
+    output |= {"q_true": model.angles(z, block.p), "theta_true": model.motor_angles(z, block.p)}
     initial = {"tau_applied": ca.SX.zeros(tau.numel())}
-    step = _motion(block, device, tau) | {"tau_applied": tau}
-    return _component(block, "encoders", initial, step, output, [_twin_part(block), _COUNTED])
+    return made.component(initial, made.moved(tau) | {"tau_applied": tau}, {}, output)
 
 
-def _measured(block: Block, pose: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The base angles at a pose by the encoders (rad), and the counts of these."""
-    angles, resolution = pantograph.base_angles(pose, block.p), block.p["encoder_resolution"]
-    return count(angles, resolution)
+class _Made:
+    """A device with what is the same however it is sensed: its start, and its true motion."""
 
+    def __init__(
+        self,
+        block: Block,
+        model: DeviceModel,
+        motion: _Motion,
+        sensing: str,
+        parts: Sequence[BlockPart],
+    ) -> None:
+        self._block, self._model, self._motion = block, model, motion
+        self._sensing, self._parts = sensing, parts
 
-def _motion(block: Block, device: Device, tau: ca.SX) -> dict[str, ca.SX]:
-    """The states of the motion after h."""
-    motion = advance_device(block, tau, device.substeps)
-    return {"x_true": motion[: SPACE.size], "v_true": motion[SPACE.size :]}
+    def measured(self, place: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """The joint coordinates at a place by the encoders, and the counts of these."""
+        p = self._block.p
+        return count(self._model.angles(place, p), p["encoder_resolution"])
 
+    def moved(self, tau: ca.SX) -> dict[str, ca.SX]:
+        """The states of the motion after h."""
+        motion = self._motion.of(self._block)
+        after = advance_device(self._block, self._model, motion, tau)
+        return dict(zip(self._motion.names, after, strict=True))
 
-def _component(
-    block: Block,
-    sensing: str,
-    initial: Mapping[str, ca.SX],
-    step: Mapping[str, ca.SX],
-    output: Mapping[str, ca.SX],
-    parts: Sequence[BlockPart],
-) -> Component:
-    """The device with what is the same however it is sensed: its start, and its true motion."""
-    x, p = block.x, block.p
-    true = {name: x[name] for name in ("x_true", "v_true")}
-    true |= {"workspace_margin": ca.mmin(pantograph.margins(x["x_true"], p))}
-    at_rest = {"x_true": p["x_start"], "v_true": ca.SX.zeros(SPACE.size)}
-    return block.component(
-        "haptic_device",
-        f"Twin-pantograph haptic device with motors, {sensing}",
-        "continuous",
-        initial={**at_rest, **initial},
-        step=step,
-        output={**output, **true},
-        documentation=__doc__ or "",
-        parts=parts,
-    )
+    def component(
+        self,
+        initial: Mapping[str, ca.SX],
+        step: Mapping[str, ca.SX],
+        seen: Mapping[str, ca.SX],
+        output: Mapping[str, ca.SX] | None = None,
+    ) -> Component:
+        """The device with further initial values and steps of states, what it `seen` along the
+        directions that are felt, and further outputs."""
+        block, model = self._block, self._model
+        p, directions = block.p, model.directions
+        z, v = self._motion.of(block)
+        true = {
+            "x_true": directions.pose(model.handle(z, p), p["x_start"]),
+            "v_true": directions.put(v),
+            "workspace_margin": ca.mmin(model.margins(z, p)),
+        }
+        start = model.place_at_pose(p["x_start"], p), ca.SX.zeros(directions.size)
+        at_rest = dict(zip(self._motion.names, start, strict=True))
+        return block.component(
+            "haptic_device",
+            f"Haptic device with motors, {self._sensing}",
+            "continuous",
+            initial={**at_rest, **initial},
+            step=step,
+            output={**in_plane(directions, seen, p["x_start"]), **(output or {}), **true},
+            documentation=__doc__ or "",
+            parts=self._parts,
+        )

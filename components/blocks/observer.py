@@ -8,7 +8,7 @@ before t_k. The first sample starts the observer: at rest, without a force, at t
 x_start that belongs to q.
 
 The equations are in components/device/observer.py and kalman_observer.py, the device's kinematics
-in pantograph.py.
+in device_model.py.
 """
 
 from __future__ import annotations
@@ -16,54 +16,44 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.device import observer_laws, pantograph
-from hapticlink.components.device.variables import (
-    F_HAND_OBSERVED,
-    GEOMETRY,
-    INERTIA,
-    X_START,
-    C,
-    M,
-    V,
-    X,
-    variables,
-)
+from hapticlink.components.device import observer_laws
+from hapticlink.components.device.models import device_model
+from hapticlink.components.device.variables import F_HAND_OBSERVED, X_START, C, M, V, X, in_plane
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 
-_MOTORS = (pantograph.MOTORS,)
-_INPUTS = [
-    Variable("q", _MOTORS, "rad", description="measured base angles"),
-    Variable("tau", _MOTORS, "N.m", description="torques of the motors until now"),
-]
 _A = Variable("a", *PLANE.acceleration, description="observed acceleration of the handle")
 _PERIOD = Variable("period", (), "s", description="time since the last sample, 0 before the first")
 
 
 def observer(device: Device) -> Component:
     """The observer of a device, with the gains of its [device.observer]."""
+    model = device_model(device)
+    units = tuple(sensed.joint.kind.units[0] for sensed in model.encoders)
+    m = (len(model.motors),)
     block = Block(
-        inputs=_INPUTS,
-        parameters=[
-            X_START,
-            *variables(device, (*GEOMETRY, *INERTIA), "fixed"),
-            *observer_laws.parameters(device),
+        inputs=[
+            Variable("q", (len(units),), units, description="measured joint coordinates"),
+            Variable("tau", m, "N.m", description="torques of the motors until now"),
         ],
-        states=[*observer_laws.states(device), _PERIOD],
+        parameters=[X_START, *model.parameters, *observer_laws.parameters(model)],
+        states=[*observer_laws.states(model), _PERIOD],
         outputs=[X, V, _A, F_HAND_OBSERVED, M, C],
     )
     x, u, p = block.x, block.u, block.p
-    law = observer_laws.observer(device, p)
+    law = observer_laws.observer(model, p)
     now = law.advance(law.read(x), u["q"], u["tau"], x["period"])
+    guess = model.place_at_pose(p["x_start"], p)
     # The first output advances the start by a period of 0.
-    first = law.start(u["q"], p["x_start"]).unsampled(p["x_start"])
+    first = law.start(u["q"], guess).unsampled(guess)
     initial = first.states | {"period": ca.SX(0)}
+    seen = law.outputs(now) | {"a": law.acceleration(now, u["tau"])}
     return block.component(
         "observer",
-        "Observer of a twin pantograph's handle and of the hand's wrench on it",
+        "Observer of a device's handle and of the hand's wrench on it",
         "sampled",
         initial=initial,
         step=now.states | {"period": block.h},
-        output=law.outputs(now) | {"a": law.acceleration(now, u["tau"])},
+        output=in_plane(model.directions, seen, p["x_start"]),
         documentation=__doc__ or "",
     )

@@ -10,6 +10,8 @@ on the mechanism's branch.
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import casadi as ca
 import numpy as np
 
@@ -57,12 +59,14 @@ def virtual_environment(
     frame_s: float = 1 / 30,
     users: further_points.Users = (),
     predicted: bool = False,
+    handles: further_points.Handles = MappingProxyType({}),
 ) -> Component:
     """The FMU `virtual_environment` with the outputs that are requested: `mobility` Lambda_inv,
     `directions` P_c and n_constraints, `contacts` their geometry, `local_model` D, W, w and J_h
     (B.15). Mobility and directions are those of the operational point and of the further points of
-    `users`; `predicted`: at predicted coordinates, with their gradients (gradients.py). frame_s (s)
-    is where the parameter `frame_size` starts, for contacts.
+    `users`, `handles` those of devices that do not render all directions; `predicted`: at predicted
+    coordinates, with their gradients (gradients.py). frame_s (s) is where the parameter
+    `frame_size` starts, for contacts.
 
     Raises AssemblyError where a loop does not close, MasslessError where a massless body is free.
     """
@@ -102,7 +106,7 @@ def virtual_environment(
     found: dict[str, ConstrainedDirections] = {}
     if directions:
         points = grasp.points_of_copy(block) if linkage.choices else None
-        found = further_points.directions(block, space, users, q0, q_next, points)
+        found = further_points.directions(block, space, users, q0, q_next, points, handles)
         for name, directed in found.items():
             initial[name], step[name] = directed.first, directed.after
             output |= directed.output

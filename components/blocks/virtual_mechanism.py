@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import casadi as ca
 
@@ -69,10 +70,12 @@ def virtual_mechanism(
     users: further_points.Users = (),
     coupled: bool = False,
     followed: bool = False,
+    handles: further_points.Handles = MappingProxyType({}),
 ) -> Component:
     """The FMU `virtual_mechanism`. With `directions` it has its own Lambda_inv and P_c as outputs;
     `felt`, the efforts of others (further hands, motors on joints) are in F_env, as contacts are;
-    `users` are the further points that a device holds (further_points.py); with frame_s (s) it is
+    `users` are the further points that a device holds (further_points.py), and `handles` those of
+    devices that do not render all directions; with frame_s (s) it is
     the local model (B.15), with D, W, w and J_h as inputs, held for a frame. Of a linkage with
     several points for the hand, `coupled` and `followed` are those of grasp.py.
 
@@ -89,7 +92,7 @@ def virtual_mechanism(
     if contacts and not contact_forces.places(linkage, contacts):
         contacts = None
     felt = felt and bool(linkage.point or joint_ports.inputs(linkage))
-    parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt, users, method)
+    parts = _Parts(linkage, mechanism, directions, contacts, frame_s, felt, users, method, handles)
     if linkage.choices:
         parts = replace(parts, coupled=coupled, followed=followed)
     defaults = StepDefaults(linkage, mechanism, contacts, step_s, frame_s)
@@ -128,6 +131,7 @@ class _Parts:
     felt: bool
     users: further_points.Users
     method: Integrator
+    handles: further_points.Handles
     coupled: bool = False
     followed: bool = False
 
@@ -273,8 +277,8 @@ class _Equations:
             return {}
         moves = self._start[0], self._after[: self.model.q.numel()]
         points = self._grasp.points if self._grasp else None
-        users = self._parts.users
-        return further_points.directions(self._block, self._space, users, *moves, points)
+        users, handles = self._parts.users, self._parts.handles
+        return further_points.directions(self._block, self._space, users, *moves, points, handles)
 
     def initial(self) -> dict[str, ca.SX]:
         """All states at t = 0."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import casadi as ca
 
 from hapticlink.components.dynamics.constrained_directions import scaling
+from hapticlink.components.dynamics.rendered_directions import WHOLE, RenderedDirections
 from hapticlink.components.port_space import PortSpace
 
 LAW = r"$F_T = S (P_c M_s^{-1} P_c)^+ S$" "\n" r"$(k_j e + b_j \dot{e}),\ e = x_S - x_D$"
@@ -16,7 +17,12 @@ LAW = r"$F_T = S (P_c M_s^{-1} P_c)^+ S$" "\n" r"$(k_j e + b_j \dot{e}),\ e = x_
 
 
 def constraint_wrench(
-    space: PortSpace, pull: ca.SX, M: ca.SX, P_c: ca.SX, length_scale: ca.SX
+    space: PortSpace,
+    pull: ca.SX,
+    M: ca.SX,
+    P_c: ca.SX,
+    length_scale: ca.SX,
+    rendered: RenderedDirections = WHOLE,
 ) -> ca.SX:
     """F_T = S (P_c M_s^-1 P_c)^+ S pull, with M_s = S^-1 M_d S^-1 (N, N, N.m).
 
@@ -28,8 +34,10 @@ def constraint_wrench(
     The pseudoinverse takes bounded work for any rank, since for a projector P
 
         (P A P)^+ = (P A P + I - P)^-1 P.
+
+    All of it is in the directions that are `rendered`.
     """
-    S = scaling(space, length_scale)
-    mobility = S @ ca.inv(M) @ S
-    regular = P_c @ mobility @ P_c + ca.SX.eye(space.size) - P_c
-    return S @ ca.solve(regular, P_c @ S @ pull)
+    S, P = (rendered.pick_matrix(each) for each in (scaling(space, length_scale), P_c))
+    mobility = S @ ca.inv(rendered.pick_matrix(M)) @ S
+    regular = P @ mobility @ P + ca.SX.eye(rendered.size) - P
+    return rendered.put(S @ ca.solve(regular, P @ S @ rendered.pick(pull)))

@@ -27,10 +27,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from hapticlink.components.device import pantograph
-from hapticlink.components.device.motors_and_encoders import numbers
-from hapticlink.components.device.observer import Kinematics, Parameters
-from hapticlink.components.specs.device import Device
+from hapticlink.components.device.device_model import DeviceModel, Parameters
+from hapticlink.components.device.motors_and_encoders import mass_and_count
 
 NOISE = 0.05
 """Error of F by counts (N, rms) from which the default bandwidth follows."""
@@ -57,39 +55,26 @@ def gains(omega_n: ca.SX, period: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     return 1 - real * pair**2, h2 / T, h3 / T**2
 
 
-def bandwidth(device: Device) -> float:
+def bandwidth(model: DeviceModel) -> float:
     """omega_n (rad/s) at which counts make an error of F of NOISE at the period NOMINAL; at another
-    one it is (NOMINAL/T)^(1/5) times that. M and Delta are means over x and y, midway between the
-    bases.
-
-    Raises ValueError where the arms do not reach there.
-    """
-    p = numbers(device)
-    pose = ca.DM([device.base_x, (device.base_y_a + device.base_y_b) / 2, 0])
-    x = ca.SX.sym("x", 3)
-    J, (M, _) = pantograph.jacobian(x, p), pantograph.motion(x, ca.SX(3, 1), p)
-    mass, count = ca.sqrt(ca.det(M[:2, :2])), ca.sqrt(ca.trace(ca.inv(J.T @ J)[:2, :2]) / 2)
-    product = float(ca.Function("product", [x], [mass * count])(pose))
-    found = (6 * NOISE / (product * device.encoder_resolution * math.sqrt(NOMINAL))) ** 0.4
-    if not math.isfinite(found):
-        raise ValueError(
-            "`device.observer.omega_n` has no default with law = 'kalman': the arms do not reach "
-            "the middle between their bases; give it in rad/s"
-        )
-    return found
+    one it is (NOMINAL/T)^(1/5) times that. M and Delta are means over the lengths that are felt,
+    where the device is assembled."""
+    mass, count = mass_and_count(model)
+    return (6 * NOISE / (mass * count * math.sqrt(NOMINAL))) ** 0.4
 
 
 class KalmanState(NamedTuple):
-    """Estimated pose (m, m, rad), velocity, and wrench of the hand (N, N, N.m), each (n,)."""
+    """Estimated place of the device (n,), and velocity and wrench of the hand in the k directions
+    in which it is felt."""
 
-    x: ca.SX
+    place: ca.SX
     v: ca.SX
     F: ca.SX
 
     @property
     def states(self) -> dict[str, ca.SX]:
         """By the names that they have in a block."""
-        return {"x_observer": self.x, "v_observer": self.v, "F_observer": self.F}
+        return {"x_observer": self.place, "v_observer": self.v, "F_observer": self.F}
 
     def unsampled(self, guess: ca.SX) -> KalmanState:
         """The state before a first sample at which it is advanced by a period of 0."""
@@ -100,7 +85,7 @@ class KalmanState(NamedTuple):
 class KalmanObserver:
     """The observer of a device with parameters p, `omega_n` among them."""
 
-    device: Kinematics
+    device: DeviceModel
     p: Parameters
 
     def read(self, x: Mapping[str, ca.SX]) -> KalmanState:
@@ -108,30 +93,34 @@ class KalmanObserver:
         return KalmanState(x["x_observer"], x["v_observer"], x["F_observer"])
 
     def start(self, angles: ca.SX, guess: ca.SX) -> KalmanState:
-        """The handle at rest, without a force, with measured angles (rad) near a guessed pose."""
-        pose = self.device.pose_from_angles(angles, guess, self.p)
-        return KalmanState(pose, ca.SX.zeros(pose.numel()), ca.SX.zeros(pose.numel()))
+        """The handle at rest, without a force, with measured angles near a guessed place."""
+        place, k = self.device.place_from_angles(angles, guess, self.p), self.device.directions.size
+        return KalmanState(place, ca.SX.zeros(k), ca.SX.zeros(k))
 
     def advance(self, before: KalmanState, angles: ca.SX, tau: ca.SX, period: ca.SX) -> KalmanState:
-        """The estimate with measured angles (rad), a `period` (s) after a sample before it, over
-        which the torques tau (N.m) were held."""
+        """The estimate with measured angles, a `period` (s) after a sample before it, over which
+        the torques tau (N.m) were held."""
+        device, p = self.device, self.p
         M, a = self._motion(before, tau)
-        x, v = before.x + period * before.v + period**2 / 2 * a, before.v + period * a
-        e = self.device.pose_from_angles(angles, x, self.p, iterations=1) - x
-        g1, g2, g3 = gains(self.p["omega_n"], period)
-        return KalmanState(x + g1 * e, v + g2 * e, before.F + M @ (g3 * e))
+        way = period * before.v + period**2 / 2 * a
+        place, v = device.moved(before.place, way, p), before.v + period * a
+        e = device.way_from_angles(angles, place, p)
+        g1, g2, g3 = gains(p["omega_n"], period)
+        return KalmanState(device.moved(place, g1 * e, p), v + g2 * e, before.F + M @ (g3 * e))
 
     def outputs(self, now: KalmanState) -> dict[str, ca.SX]:
-        """By name: pose x, velocity v, F_hand_observed, and M and c = C v there."""
-        M, c = self.device.motion(now.x, now.v, self.p)
-        return {"x": now.x, "v": now.v, "F_hand_observed": now.F, "M": M, "c": c}
+        """By name: the handle's x, its velocity v, F_hand_observed, and M and c = C v there, all in
+        the k directions."""
+        M, c = self.device.motion(now.place, now.v, self.p)
+        y = self.device.handle(now.place, self.p)
+        return {"x": y, "v": now.v, "F_hand_observed": now.F, "M": M, "c": c}
 
     def acceleration(self, now: KalmanState, tau: ca.SX) -> ca.SX:
-        """a = M^-1 (J_q' tau + F - C v) of (4.5) (m/s2, m/s2, rad/s2), (n,), with the torques tau
+        """a = M^-1 (J_q' tau + F - C v) of (4.5) (m/s2, m/s2, rad/s2), (k,), with the torques tau
         (N.m) held."""
         return self._motion(now, tau)[1]
 
     def _motion(self, now: KalmanState, tau: ca.SX) -> tuple[ca.SX, ca.SX]:
         """M and a."""
-        M, c = self.device.motion(now.x, now.v, self.p)
-        return M, ca.solve(M, self.device.jacobian(now.x, self.p).T @ tau + now.F - c)
+        M, c = self.device.motion(now.place, now.v, self.p)
+        return M, ca.solve(M, self.device.jacobian(now.place, self.p).T @ tau + now.F - c)

@@ -3,15 +3,14 @@ and what one count of an encoder looks like to a controller."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from functools import cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.device import pantograph
+from hapticlink.components.device.device_model import DeviceModel
+from hapticlink.components.device.models import device_model
 from hapticlink.components.specs.device import Device
 
 Field = NDArray[np.float64]
@@ -36,32 +35,52 @@ def _quantised(value: ca.SX, quantum: ca.SX, share: float) -> tuple[ca.SX, ca.SX
     return ca.if_else(coarse, quantum * counts, value), counts
 
 
-def numbers(device: Device) -> dict[str, Any]:
-    """The device's parameters by name."""
-    return {k: v for k, v in asdict(device).items() if isinstance(v, float | int)}
-
-
 @cache
 def torque_function(device: Device) -> ca.Function:
-    """Torques (N.m), (4,), of a wrench (N, N, N.m) at a pose (m, m, rad) of the handle, both (3,),
+    """Torques (N.m), (m,), of a wrench (N, N, N.m) at a pose (m, m, rad) of the handle, both (3,),
     as the device's motors give them: of least norm, and limited."""
+    model = device_model(device)
     wrench, pose = ca.SX.sym("wrench", 3), ca.SX.sym("pose", 3)
-    tau = pantograph.motor_torques(wrench, pose, numbers(device))
-    return ca.Function("torques", [wrench, pose], [tau])
+    z = model.place_at_pose(pose)
+    tau = model.motor_torques(model.directions.pick(wrench), z, model.numbers)
+    return ca.Function("torques", [wrench, pose], [tau], {"cse": True})
 
 
 def motor_torques(device: Device, wrenches: Field, poses: Field) -> Field:
-    """`torque_function` of wrenches and poses, both (k, 3): (k, 4)."""
+    """`torque_function` of wrenches and poses, both (k, 3): (k, m)."""
     torques = torque_function(device).map(len(wrenches))
     return np.asarray(torques(wrenches.T, poses.T)).T
 
 
+def torque_shares(device: Device, torques: Field) -> Field:
+    """Torques (k, m) by the limits of their motors: the largest share of each row, (k,)."""
+    limits = np.array([motor.torque_limit for motor in device.motors])
+    shares: Field = (np.abs(torques) / limits).max(axis=1)
+    return shares
+
+
+def mass_and_count(model: DeviceModel) -> tuple[float, float]:
+    """Mass (kg) at the handle and way (m) of it by a count, means over the lengths that are felt,
+    where the device is assembled."""
+    z, p = ca.SX.sym("z", len(model.start_place)), model.numbers
+    lengths = min(model.directions.size, 2)
+    J = model.angle_rates(z, p)
+    counts = ca.diag(ca.DM([1 / sensed.resolution for sensed in model.encoders])) @ J
+    M, _ = model.motion(z, ca.SX(model.directions.size, 1), p)
+    mass = ca.det(M[:lengths, :lengths]) ** (1 / lengths)
+    spread = ca.trace(ca.inv(counts.T @ counts)[:lengths, :lengths]) / lengths
+    found = ca.Function("mass_and_count", [z], [mass, ca.sqrt(spread)])(model.start_place)
+    return float(found[0]), float(found[1])
+
+
 def count_energies(device: Device, pose: Field, period_s: float) -> Field:
-    """The kinetic energies (J), (4,), v' M v/2 with v = (J' J)^-1 J' e_i delta/T, of a handle at
+    """The kinetic energies (J), (e,), v' M v/2 with v = (J' J)^-1 J' e_i delta/T, of a handle at
     the pose (m, m, rad) whose measured pose moves by one count delta of encoder i in a period T."""
-    x, p = ca.SX.sym("x", 3), numbers(device)
-    J = pantograph.jacobian(x, p)
-    v = ca.solve(J.T @ J, J.T) * (device.encoder_resolution / period_s)
-    M, _ = pantograph.dynamics(x, ca.SX(3, 1), p)
+    model, x = device_model(device), ca.SX.sym("x", 3)
+    z, p = model.place_at_pose(x), model.numbers
+    J = model.angle_rates(z, p)
+    resolutions = ca.DM([sensed.resolution for sensed in model.encoders])
+    v = ca.solve(J.T @ J, J.T) @ ca.diag(resolutions) / period_s
+    M, _ = model.motion(z, ca.SX(model.directions.size, 1), p)
     energies = ca.sum1(v * (M @ v)) / 2
     return np.asarray(ca.Function("energies", [x], [energies])(pose)).ravel()

@@ -22,11 +22,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import casadi as ca
 
 from hapticlink.components.device import discretisation
+from hapticlink.components.device.device_model import DeviceModel, Parameters
 
 
 class State(NamedTuple):
@@ -81,52 +82,30 @@ class ForceObserver:
         return state.x2 + self.k_D * (pose - state.x1)
 
 
-Parameters = Mapping[str, ca.SX]
-
-
-class Kinematics(Protocol):
-    """What the observer asks of a device, as functions of its parameters p: `pantograph`. Poses and
-    velocities are (n,), angles and torques of the motors (m,)."""
-
-    def pose_from_angles(
-        self, angles: ca.SX, guess: ca.SX, p: Parameters, iterations: int = 2
-    ) -> ca.SX:
-        """The pose whose angles are nearest to those measured, by steps of Gauss-Newton."""
-
-    def jacobian(self, pose: ca.SX, p: Parameters) -> ca.SX:
-        """Of the angles with respect to the pose, (m, n)."""
-
-    def dynamics(self, pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-        """M and C, both (n, n)."""
-
-    def motion(self, pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
-        """M and the vector C v."""
-
-
 class ObservedHandle(NamedTuple):
-    """The measured pose (m, m, rad) at a sample, (n,), and the state of the observer there."""
+    """The measured place of the device at a sample, (n,), and the state of the observer there."""
 
-    pose: ca.SX
+    place: ca.SX
     state: State
 
     @property
     def states(self) -> dict[str, ca.SX]:
         """By the names that they have in a block."""
         x1, x2 = self.state
-        return {"x_measured": self.pose, "x_observer": x1, "v_observer": x2}
+        return {"x_measured": self.place, "x_observer": x1, "v_observer": x2}
 
     def unsampled(self, guess: ca.SX) -> ObservedHandle:
-        """The state before a first sample at which it is advanced by a period of 0: the pose is
+        """The state before a first sample at which it is advanced by a period of 0: the place is
         found again from the guess."""
-        return self._replace(pose=guess)
+        return self._replace(place=guess)
 
 
 @dataclass(frozen=True)
 class HandleObserver:
     """The observer of a device with parameters p, `omega_n` and `k_D` among them, stepped by a rule
-    of `discretisation`."""
+    of `discretisation`, in the k directions in which the device is felt."""
 
-    device: Kinematics
+    device: DeviceModel
     p: Parameters
     rule: str
 
@@ -135,33 +114,37 @@ class HandleObserver:
         return ObservedHandle(x["x_measured"], State(x["x_observer"], x["v_observer"]))
 
     def start(self, angles: ca.SX, guess: ca.SX) -> ObservedHandle:
-        """The handle at rest, without a force, with measured angles (rad) near a guessed pose."""
-        pose = self.device.pose_from_angles(angles, guess, self.p)
-        return ObservedHandle(pose, State(pose, ca.SX.zeros(pose.numel())))
+        """The handle at rest, without a force, with measured angles near a guessed place."""
+        place = self.device.place_from_angles(angles, guess, self.p)
+        y = self.device.handle(place, self.p)
+        return ObservedHandle(place, State(y, ca.SX.zeros(y.numel())))
 
     def advance(
         self, before: ObservedHandle, angles: ca.SX, tau: ca.SX, period: ca.SX
     ) -> ObservedHandle:
-        """The handle with measured angles (rad), a `period` (s) after a sample before it, over
-        which the torques tau (N.m) were held."""
-        pose = self.device.pose_from_angles(angles, before.pose, self.p)
-        F_motor = self.device.jacobian(before.pose, self.p).T @ tau
-        M, C = self.device.dynamics(before.pose, before.state.x2, self.p)
-        step = self._law.step(before.state, before.pose, pose, F_motor, M, C, period)
-        return ObservedHandle(pose, step)
+        """The handle with measured angles, a `period` (s) after a sample before it, over which the
+        torques tau (N.m) were held."""
+        place = self.device.place_from_angles(angles, before.place, self.p)
+        F_motor = self.device.jacobian(before.place, self.p).T @ tau
+        M, C = self.device.dynamics(before.place, before.state.x2, self.p)
+        y0, y1 = (self.device.handle(z, self.p) for z in (before.place, place))
+        step = self._law.step(before.state, y0, y1, F_motor, M, C, period)
+        return ObservedHandle(place, step)
 
     def outputs(self, now: ObservedHandle) -> dict[str, ca.SX]:
-        """By name: pose x, velocity v, F_hand_observed, and M and c = C v there."""
-        v = self._law.velocity(now.state, now.pose)
-        M, c = self.device.motion(now.pose, v, self.p)
-        F_hand = self._law.force(now.state, now.pose, M)
-        return {"x": now.pose, "v": v, "F_hand_observed": F_hand, "M": M, "c": c}
+        """By name: the handle's x, its velocity v, F_hand_observed, and M and c = C v there, all in
+        the k directions."""
+        y = self.device.handle(now.place, self.p)
+        v = self._law.velocity(now.state, y)
+        M, c = self.device.motion(now.place, v, self.p)
+        F_hand = self._law.force(now.state, y, M)
+        return {"x": y, "v": v, "F_hand_observed": F_hand, "M": M, "c": c}
 
     def acceleration(self, now: ObservedHandle, tau: ca.SX) -> ca.SX:
-        """a = M^-1 (J_q' tau + F_hand_observed - C v) of (4.5) (m/s2, m/s2, rad/s2), (n,), at the
+        """a = M^-1 (J_q' tau + F_hand_observed - C v) of (4.5) (m/s2, m/s2, rad/s2), (k,), at the
         end of a period over which the torques tau (N.m) were held."""
         seen = self.outputs(now)
-        F_motor = self.device.jacobian(now.pose, self.p).T @ tau
+        F_motor = self.device.jacobian(now.place, self.p).T @ tau
         return ca.solve(seen["M"], F_motor + seen["F_hand_observed"] - seen["c"])
 
     @property

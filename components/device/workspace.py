@@ -1,18 +1,19 @@
-"""Workspace of the twin pantograph: the poses of the handle at which no arm is at its stops."""
+"""Workspace of a device: the poses of its handle at which it is at none of its stops."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
-from hapticlink.components.device import pantograph
-from hapticlink.components.device.motors_and_encoders import numbers
+from hapticlink.components.device.models import device_model
 from hapticlink.components.specs.device import Device
 
 Field = NDArray[np.float64]
@@ -21,38 +22,83 @@ Range = tuple[float, float]
 
 
 def margin(device: Device, poses: Field) -> Field:
-    """Smallest distance (m) of an arm to its stops, shape (n,), at poses (x m, y m, theta rad) of
-    shape (n, 3); negative outside the workspace."""
-    pose = ca.SX.sym("pose", 3)
-    least = ca.Function("margin", [pose], [ca.mmin(pantograph.margins(pose, numbers(device)))])
+    """Smallest distance (m) of the device to its stops, shape (n,), at poses (x m, y m, theta rad)
+    of shape (n, 3); negative outside the workspace."""
     given, margins = np.ascontiguousarray(poses, float), np.zeros(len(poses))
     buffer: Any
-    buffer, evaluate = least.map(len(poses)).buffer()  # a plain call takes ten times as long
+    # A plain call takes ten times as long.
+    buffer, evaluate = _margin_function(device).map(len(poses)).buffer()
     buffer.set_arg(0, given.data)
     buffer.set_res(0, margins.data)
     evaluate()
-    return margins
+    return np.where(np.isfinite(margins), margins, -np.inf)
 
 
-def link_function(device: Device) -> ca.Function:
-    """The points of `links`, (2, 12), as a function of the pose, (3,)."""
-    p, pose = numbers(device), ca.SX.sym("pose", 3)
-    rows = []
-    for arm in pantograph.arms(pose, p):
-        elbow = arm.base + p["proximal_length"] * arm.proximal_direction
-        rows += [arm.base, elbow, pose[:2] + arm.offset]
-    return ca.Function("links", [pose], [ca.horzcat(*rows)])
+@cache
+def _margin_function(device: Device) -> ca.Function:
+    pose = ca.SX.sym("pose", 3)
+    return ca.Function("margin", [pose], [device_model(device).least_margin(pose)], {"cse": True})
 
 
-def links(device: Device, pose: Sequence[float]) -> Field:
-    """Base joint, elbow and crank end (x, y m) of the four arms at a pose, shape (4, 3, 2); the
-    elbow is NaN where an arm does not reach."""
-    return np.asarray(link_function(device)(ca.DM(list(pose)))).T.reshape(4, 3, 2)
+@cache
+def line_function(device: Device) -> ca.Function:
+    """The lines of `lines`, (2, points), end to end, as a function of the pose, (3,)."""
+    model, pose = device_model(device), ca.SX.sym("pose", 3)
+    frames = model.frames(model.place_at_pose(pose), model.numbers)
+    points = [
+        frames[body].point(None if at is None else ca.SX(ca.DM(at)))
+        for line in drawn_lines(device)
+        for body, at in line
+    ]
+    return ca.Function("lines", [pose], [ca.horzcat(*points)], {"cse": True})
+
+
+@cache
+def drawn_lines(device: Device) -> tuple[tuple[tuple[str, Any], ...], ...]:
+    """The device as lines: of each body its pins and, where that is on it, the handle, in their
+    order along it; and from the ground to what slides on it."""
+    at: dict[str, list[Any]] = {body.name: [] for body in device.body}
+    joined = [(j.child, j.at_child) for j in device.placed]
+    joined += [(j.parent, j.at_parent) for j in device.placed if j.type == "revolute"]
+    joined += [end for c in device.placed_loops for end in zip(c.bodies, c.at, strict=True)]
+    for body, point in [*joined, (device.handle.body, device.handle.at)]:
+        if body in at and (point or (0.0, 0.0)) not in at[body]:
+            at[body].append(point or (0.0, 0.0))
+    lines = [tuple((body, point) for point in _in_order(points)) for body, points in at.items()]
+    for j in device.placed:
+        if j.type == "prismatic":
+            lines.append(((j.parent, j.at_parent), (j.child, j.at_child)))
+    return tuple(line for line in lines if len(line) > 1)
+
+
+def _in_order(points: list[Any]) -> list[Any]:
+    """Points of a body along it: from one of the two farthest ones on."""
+    far = max(points, key=lambda p: max(math.dist(p, q) for q in points))
+    return sorted(points, key=lambda p: math.dist(p, far))
+
+
+def lines(device: Device, pose: Sequence[float]) -> list[Field]:
+    """The device at a pose as lines of points (x, y m), each (points, 2)."""
+    points = np.asarray(line_function(device)(ca.DM(list(pose)))).T
+    ends = np.cumsum([len(line) for line in drawn_lines(device)])
+    return np.split(points, ends[:-1])
+
+
+def motor_points(device: Device, pose: Sequence[float]) -> Field:
+    """Where the motors are (x, y m) at a pose, (m, 2)."""
+    model, at = device_model(device), ca.SX.sym("pose", 3)
+    p = model.numbers
+    frames = model.frames(model.place_at_pose(at), p)
+    joints = [motor.joint for motor in model.motors]
+    points = [frames[j.parent].point(p.get(f"{j.name}.at_parent")) for j in joints]
+    found = ca.Function("motors", [at], [ca.horzcat(*points)])(ca.DM(list(pose)))
+    return np.asarray(found).T
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Margins (m) on a grid of x, y (m) and theta (rad, a whole turn), shape (x, y, theta)."""
+    """Margins (m) on a grid of x, y (m) and theta (rad, a whole turn, or one angle of a device that
+    has no turn to be felt), shape (x, y, theta)."""
 
     x: Field
     y: Field
@@ -84,15 +130,68 @@ class Workspace:
         return [(float(self.theta[run[0]]), float(self.theta[run[-1]])) for run in runs if run.size]
 
 
+@cache
 def workspace(device: Device) -> Workspace:
-    """The workspace on a grid over the common reach of the four arms."""
-    reach = device.reach_limit * (device.proximal_length + device.distal_length) + device.crank / 2
-    across = abs(reach - device.base_half_width)
-    x = device.base_x + np.linspace(-across, across, POINTS)
-    y = np.linspace(device.base_y_b - reach, device.base_y_a + reach, POINTS)
-    theta = np.linspace(-math.pi, math.pi, ANGLES + 1)
+    """The workspace on a grid: a coarse one over all that the lengths of the device's links could
+    reach, then a fine one over what of it is inside, and hangs together with the start."""
+    model = device_model(device)
+    center, reach = _reach(device)
+    whole = 2 * math.pi if model.directions.has_moments else 0.0
+    coarse, fine = (
+        np.linspace(-whole / 2, whole / 2, count + 1 if whole else 1)
+        for count in (ANGLES // 4, ANGLES)
+    )
+    theta = model.start_pose[2:] if not whole else coarse
+    x, y = (c + np.linspace(-reach, reach, POINTS // 2) for c in center)
+    found = _on_grid(device, x, y, theta)
+    inside = found.some >= 0
+    if not inside.any():
+        return found
+    x, y = (_around(side, inside.any(axis=1 - i)) for i, side in enumerate((x, y)))
+    return _on_grid(device, x, y, theta if not whole else fine)
+
+
+def _around(side: Field, inside: Any) -> Field:
+    """A finer grid over the part of a coarse one that is inside."""
+    (at,) = np.nonzero(inside)
+    return np.linspace(side[max(at[0] - 1, 0)], side[min(at[-1] + 1, len(side) - 1)], POINTS)
+
+
+def _on_grid(device: Device, x: Field, y: Field, theta: Field) -> Workspace:
     poses = np.stack(np.meshgrid(x, y, theta, indexing="ij"), axis=-1)
-    return Workspace(x, y, theta, margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3]))
+    margins = margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3])
+    start = device_model(device).start_pose
+    parts, _ = label(margins >= 0)
+    nearest = [
+        int(np.abs(axis - at).argmin()) for axis, at in zip((x, y, theta), start, strict=True)
+    ]
+    if own := parts[tuple(nearest)]:
+        margins = np.where((margins < 0) | (parts == own), margins, -np.inf)
+    return Workspace(x, y, theta, margins)
+
+
+def _reach(device: Device) -> tuple[Field, float]:
+    """The ground's joint (m, 2) from which joints of the tree lead to the handle, and the sum (m)
+    of all lengths on the way."""
+    above, body, point = {j.child: j for j in device.placed}, device.handle.body, device.handle.at
+    reach = 0.0
+    while True:
+        joint = above[body]
+        reach += math.dist(point or (0.0, 0.0), joint.at_child or (0.0, 0.0))
+        if joint.type == "prismatic":
+            reach += max(map(abs, joint.range or (0.0,)))
+        body, point = joint.parent, joint.at_parent
+        if body == "ground":
+            return np.array(point or (0.0, 0.0)), max(reach, 1e-3)
+
+
+def extent_along(device: Device) -> Range:
+    """The first and the last coordinate (m) along the one way of a device that has one."""
+    model = device_model(device)
+    (way,) = np.array(model.directions.rows)
+    _, reach = _reach(device)
+    grid = np.linspace(-reach, reach, POINTS) + way @ model.start_pose
+    return _ends(grid, margin(device, np.outer(grid, way)))
 
 
 def _ends(grid: Field, margin: Field) -> Range:

@@ -22,6 +22,7 @@ import casadi as ca
 
 from hapticlink.components.component import Block
 from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.rendered_directions import WHOLE, RenderedDirections
 from hapticlink.components.port_space import PortSpace
 
 SWEEPS = 5
@@ -71,7 +72,7 @@ def _ranks(eigenvalues: ca.SX) -> list[ca.SX]:
             for j in range(n)
             if j != i
         ]
-        ranks.append(reduce(operator.add, below))
+        ranks.append(reduce(operator.add, below) if below else ca.SX(0))
     return ranks
 
 
@@ -115,13 +116,15 @@ class Points:
 
 @dataclass(frozen=True)
 class ConstrainedDirections:
-    """The state n_constrained at the start and after a step, and the outputs; S, and of the scaled
-    mobility the eigenvalues and eigenvectors, of which P_c has the `number` smallest."""
+    """The state n_constrained at the start and after a step, and the outputs; `scaled_by`, the rows
+    S R with which the scaled mobility is S R Lambda^-1 R' S, and of that the eigenvalues and
+    eigenvectors, of which P_c has the `number` smallest."""
 
     first: ca.SX
     after: ca.SX
     output: dict[str, ca.SX]
-    scaling: ca.SX
+    rendered: RenderedDirections
+    scaled_by: ca.SX
     values: ca.SX
     vectors: ca.SX
     number: ca.SX
@@ -135,15 +138,18 @@ def constrained_directions(
     J: ca.SX | None = None,
     prefix: str = "",
     points: Points | None = None,
+    rendered: RenderedDirections = WHOLE,
 ) -> ConstrainedDirections:
     """The constrained directions of a block with the state n_constrained that starts at q0 and
     steps from q to q1: at the operational point, or at a point with Jacobian J, whose names have
-    the prefix. points: of an operational point that changes."""
+    the prefix. points: of an operational point that changes.
+    rendered: those of the device at the point, among which directions are constrained."""
     p, before, q = block.p, block.x[f"{prefix}n_constrained"], space.model.q
     own = [] if space.model.point is None else [space.model.point]
-    S = scaling(space.model.linkage.space, p["length_scale"])
-    mobility = space.Lambda_inv if J is None else space.mobility(J)
-    opened = space.open_mobility(space.terms.J_h if J is None else J)
+    S = rendered.pick_matrix(scaling(space.model.linkage.space, p["length_scale"]))
+    whole = space.Lambda_inv if J is None else space.mobility(J)
+    mobility = rendered.mobility(whole)
+    opened = rendered.mobility(space.open_mobility(space.terms.J_h if J is None else J))
     given, both = (
         (block.u.vector, p.vector, *own),
         [S @ mobility @ S, locking_threshold(S @ opened @ S)],
@@ -156,10 +162,12 @@ def constrained_directions(
         return count(eigen(mobility)[0], before, tolerance, hysteresis, least)
 
     found = (*eigen(scaled(q, *given)[0]), before)
-    output = {f"{prefix}P_c": projector(*found), f"{prefix}n_constraints": before}
+    P_c = rendered.put_matrix(projector(*found))
+    output = {f"{prefix}P_c": P_c, f"{prefix}n_constraints": before}
     first, after = own, own
     if points:
         first, after = [points.first], [points.after]
         before = ca.if_else(points.changes, 0, before)
     numbers = number(q0, ca.SX(0), *first), number(q1, before, *after)
-    return ConstrainedDirections(*numbers, output, S, *found)
+    scaled_by = S @ rendered.reduction(whole)
+    return ConstrainedDirections(*numbers, output, rendered, scaled_by, *found)

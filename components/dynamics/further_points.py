@@ -15,8 +15,9 @@ other users among them, by the mobility between their points:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import casadi as ca
 
@@ -28,13 +29,17 @@ from hapticlink.components.dynamics.constrained_directions import (
 )
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench, wrench_output
 from hapticlink.components.dynamics.operational_space import OperationalSpace
+from hapticlink.components.dynamics.rendered_directions import rendered_directions
 from hapticlink.components.dynamics.variables import mobility_output
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.ports import Power
+from hapticlink.components.specs.device import Handle
 from hapticlink.components.specs.linkage import Linkage
 
 Users = tuple[str, ...]
 """The names of the points that a device holds."""
+Handles = Mapping[str, Handle]
+"""The handles of devices by the points that they hold; the operational point's name is empty."""
 
 
 def inputs(linkage: Linkage, users: Users) -> Iterator[Variable]:
@@ -137,10 +142,13 @@ def directions(
     q0: ca.SX,
     q1: ca.SX,
     points: Points | None = None,
+    handles: Handles = MappingProxyType({}),
 ) -> dict[str, ConstrainedDirections]:
     """The constrained directions at the operational point and at those of users, by state.
-    points: of an operational point that changes."""
-    constrained = [constrained_directions(block, space, q0, q1, points=points)]
+    points: of an operational point that changes; handles: of devices that do not render all."""
+    moves = block, space, q0, q1
+    rendered = {name: rendered_directions(handles.get(name)) for name in ("", *users)}
+    constrained = [constrained_directions(*moves, points=points, rendered=rendered[""])]
     for name, J in jacobians(space.model, users).items():
-        constrained.append(constrained_directions(block, space, q0, q1, J, f"{name}."))
+        constrained.append(constrained_directions(*moves, J, f"{name}.", rendered=rendered[name]))
     return dict(zip(counts(users), constrained, strict=True))

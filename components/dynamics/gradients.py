@@ -100,11 +100,13 @@ def of_mobility(space: OperationalSpace, J: ca.SX) -> ca.SX:
 
 def of_projector(found: ConstrainedDirections, slope: ca.SX) -> ca.SX:
     """That of the projector on constrained directions, from that of the mobility; without the part
-    between two equal eigenvalues, where there is none."""
-    S, values, vectors = found.scaling, found.values, found.vectors
-    n, chosen = S.shape[0], is_among_smallest(values, found.number)
+    between two equal eigenvalues, where there is none. That of R Lambda^-1 R' is R dLambda^-1 R',
+    by R Lambda^-1 t = 0."""
+    SR, values, vectors = found.scaled_by, found.values, found.vectors
+    (n, entries), chosen = SR.shape, is_among_smallest(values, found.number)
     turned = [
-        vectors.T @ S @ ca.reshape(column, n, n) @ S @ vectors for column in ca.horzsplit(slope)
+        vectors.T @ SR @ ca.reshape(column, entries, entries) @ SR.T @ vectors
+        for column in ca.horzsplit(slope)
     ]
     columns = []
     for rate in turned:
@@ -113,7 +115,8 @@ def of_projector(found: ConstrainedDirections, slope: ca.SX) -> ca.SX:
             for j in range(n):
                 gap = ca.if_else(values[i] == values[j], ca.inf, values[i] - values[j])
                 mixed[i, j] = chosen[i] * (1 - chosen[j]) * rate[j, i] / gap
-        columns.append(ca.vec((vectors @ (mixed + mixed.T) @ vectors.T).T))
+        own = vectors @ (mixed + mixed.T) @ vectors.T
+        columns.append(ca.vec(found.rendered.put_matrix(own).T))
     return ca.horzcat(*columns)
 
 

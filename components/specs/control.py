@@ -55,9 +55,11 @@ class Controller:
 
     impedance: bool = True
     """Impedance control: the device moves as the mechanism would move."""
-    bias: Literal["none", "full"] = "none"
+    bias: Literal["none", "full"] | None = None
     """full: adds M_d a_bias, the compensation of the mechanism's Coriolis and centrifugal terms,
-    gravity, springs and drives; none: leaves it out (the report)."""
+    gravity, springs and drives; none: leaves it out (the report). By default full with a device
+    whose bodies weigh less than 0.2 kg in all, which makes up for little of what is left out; none
+    with another."""
     damping: Damping | None = None
     """B_d, the desired damping of (4.1)."""
     stiffness: Stiffness | None = None

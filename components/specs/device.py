@@ -1,20 +1,32 @@
-"""[device]: the twin pantograph and its observer, as a scene writes them."""
+"""[device]: a linkage with motors and encoders, and its observer, as a scene or a device file
+writes them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated, Literal
 
 from hapticlink.components.port_space import PLANE, PortSpace
+from hapticlink.components.specs.bodies import Body
+from hapticlink.components.specs.driver import Driver
+from hapticlink.components.specs.joint_types import JOINT_TYPES, JointType
+from hapticlink.components.specs.linkage import Joint, Linkage, Loop, OperationalPoint
 from hapticlink.components.specs.quantities import (
-    Length,
+    Angle,
+    Coordinate,
     LinearDamping,
     LinearStiffness,
     Mass,
     MomentOfInertia,
-    Position,
+    Point,
     Quantity,
 )
+
+LIGHT = 0.2
+"""Mass (kg) below which a device is light."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,10 +39,11 @@ class Observer:
     rule: Literal["forward", "backward", "trapezoidal"] = "backward"
     """Discretisation rule of section 1.3.1; of nicosia."""
     omega_n: Annotated[float, Quantity("rad/s", gt=0)] | None = None
-    """Bandwidth; by default 50, of kalman that at which counts make an error of the force of 0.05 N
-    (rms), by inertia, counts and haptic rate."""
-    k_D: Annotated[float, Quantity("1/s", gt=0)] = 100.0
-    """Output gain; of nicosia."""
+    """Bandwidth; by default that at which counts make a certain error of the force, by inertia and
+    counts: of nicosia 0.11 N by a count, at most 300; of kalman 0.05 N (rms), by haptic rate,
+    too."""
+    k_D: Annotated[float, Quantity("1/s", gt=0)] | None = None
+    """Output gain; of nicosia, by default twice the bandwidth."""
     beside: bool = False
     """true: the observer is an FMU of its own beside the device. The device then takes torques
     and puts out base angles, as an observed device from elsewhere does; the numbers are the same.
@@ -38,67 +51,258 @@ class Observer:
 
 
 @dataclass(frozen=True, kw_only=True)
+class DeviceBody:
+    """A rigid body of a device."""
+
+    name: str
+    """Its name in joints and loops; not "ground"."""
+    mass: Mass
+    """Mass."""
+    inertia: MomentOfInertia
+    """Moment of inertia about the centre of mass."""
+    center: Point | None = None
+    """Centre of mass in the body's frame; by default its origin."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motor:
+    """A motor on a joint. What a joint does not say is that of [device.motor]."""
+
+    torque_limit: Annotated[float, Quantity("N.m", gt=0)] | None = None
+    """Largest torque; if one motor would exceed its own, all are scaled by one factor."""
+    ratio: Annotated[float, Quantity("1 or rad/m")] | None = None
+    """Turn of the rotor by that of the joint, or by its displacement; by default 1."""
+    inertia: MomentOfInertia | None = None
+    """Inertia of the rotor; by default 0."""
+    damping: Annotated[float, Quantity("N.m.s/rad", ge=0)] | None = None
+    """Viscous damping about its axis; by default 0."""
+    friction: Annotated[float, Quantity("N.m", ge=0)] | None = None
+    """Dry friction about its axis: friction tanh(rate/(0.1 rad/s)); by default 0."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Encoder:
+    """An encoder on a joint."""
+
+    resolution: Annotated[float, Quantity("rad or m", gt=0)] | None = None
+    """Change of the joint's coordinate by a count."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceJoint:
+    """A joint of a device's tree."""
+
+    name: str
+    """Its name in `start`."""
+    type: Literal["revolute", "prismatic"] = "revolute"
+    """revolute: one angle; prismatic: one displacement along `axis`."""
+    parent: str = "ground"
+    """The body that carries the joint."""
+    child: str
+    """The body that the joint carries."""
+    at_parent: Point | None = None
+    """Position of the joint in the parent's frame; by default its origin."""
+    at_child: Point | None = None
+    """Position of the joint in the child's frame; by default its origin."""
+    axis: Angle | None = None
+    """Direction of a prismatic joint in the parent's frame, from its x axis; required there."""
+    motor: Motor | bool = False
+    """Its motor; true for that of [device.motor]."""
+    encoder: Encoder | bool = False
+    """Its encoder; true for that of [device.encoder]."""
+    range: tuple[Coordinate, Coordinate] | None = None
+    """Where its stops begin; by default it has none."""
+
+    @property
+    def kind(self) -> JointType:
+        """The record of its type."""
+        return JOINT_TYPES[self.type]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceLoop:
+    """A pin that closes a loop between two bodies of a device."""
+
+    bodies: tuple[str, str]
+    """The two bodies; may be "ground"."""
+    at: tuple[Point, Point]
+    """The two points, each in the frame of its body."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Handle:
+    """The point of a device that the hand holds, and the directions in which it is felt."""
+
+    body: str
+    """The body that it belongs to."""
+    at: Point | None = None
+    """Its position in the body's frame; by default its origin."""
+    angle: Literal["held", "free", "fixed"] = "held"
+    """held: the handle turns with its body, and moments are rendered; free: a point, whose angle
+    belongs to nobody; fixed: the device does not let it turn, as a stage."""
+    along: tuple[Annotated[float, Quantity("1")], Annotated[float, Quantity("1")]] | None = None
+    """Direction in the world of the one way of a device with one degree of freedom; by default x
+    and y are felt."""
+
+    def __post_init__(self) -> None:
+        if self.along is not None and self.angle == "held":
+            raise ValueError('handle: `along` is one direction of the plane: give angle = "free"')
+        if self.along is not None and not math.hypot(*self.along) > 0.0:
+            raise ValueError(f"handle: along = {list(self.along)} has no direction")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stops:
+    """The stops at the limits of the workspace: a spring and damper that never pulls."""
+
+    reach: Annotated[float, Quantity("1", gt=0.5, lt=1)] = 0.95
+    """Fraction of the full reach of two links at which they begin: they are as far from its other
+    limit, folded."""
+    stiffness: LinearStiffness = 5000.0
+    """Stiffness."""
+    damping: LinearDamping = 20.0
+    """Damping."""
+
+
+@dataclass(frozen=True)
+class DrivenJoint:
+    """A joint with its motor, all of whose numbers are given."""
+
+    joint: DeviceJoint
+    torque_limit: float
+    ratio: float
+    inertia: float
+    damping: float
+    friction: float
+
+
+@dataclass(frozen=True)
+class SensedJoint:
+    """A joint with its encoder."""
+
+    joint: DeviceJoint
+    resolution: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Device:
-    """Twin pantograph. The report gives no dimensions: every number here is assumed, except for the
-    0.09 degrees of an encoder count.
+    """A linkage with motors and encoders. The keys are those of a device file; the ones that a
+    scene writes are merged over it: [device files](device-file.md)."""
 
-    Two five-bars in parallel planes, A and B, hold the ends of a crank at p -+ (crank/2)
-    (cos theta, sin theta), p the handle. Base joints at (base_x -+ base_half_width, base_y_a) and
-    (..., base_y_b), elbows outward: [the device](device.md).
-    """
-
-    proximal_length: Length = 0.16
-    """Length of the links next to the motors."""
-    distal_length: Length = 0.20
-    """Length of the links between elbow and crank."""
-    crank: Length = 0.08
-    """Length of the crank between the two planes."""
-    base_x: Position = -0.005
-    """x midway between the base joints of a plane."""
-    base_half_width: Annotated[float, Quantity("m", ge=0)] = 0.03
-    """Half the distance between the base joints of a plane."""
-    base_y_a: Position = -0.20
-    """y of the base joints of plane A, below the workspace."""
-    base_y_b: Position = 0.20
-    """y of the base joints of plane B, above the workspace."""
-    rotor_inertia: MomentOfInertia = 1.4e-5
-    """Inertia of each motor's rotor."""
-    proximal_mass: Mass = 0.05
-    """Mass of each proximal link."""
-    proximal_center: Position = 0.07
-    """Its centre of mass from the base joint, along the link."""
-    proximal_inertia: MomentOfInertia = 1.07e-4
-    """Its inertia about the centre of mass."""
-    distal_mass: Mass = 0.035
-    """Mass of each distal link."""
-    distal_center: Position = 0.10
-    """Its centre of mass from the elbow, along the link."""
-    distal_inertia: MomentOfInertia = 1.17e-4
-    """Its inertia about the centre of mass."""
-    handle_mass: Annotated[float, Quantity("kg", gt=0)] = 0.12
-    """Mass of handle and crank."""
-    handle_inertia: Annotated[float, Quantity("kg.m2", gt=0)] = 8e-5
-    """Inertia of handle and crank."""
-    motor_damping: Annotated[float, Quantity("N.m.s/rad", ge=0)] = 0.0
-    """Viscous damping about the axis of each motor."""
-    motor_friction: Annotated[float, Quantity("N.m", ge=0)] = 0.0
-    """Dry friction about the axis of each motor: motor_friction tanh(rate/(0.1 rad/s))."""
-    torque_limit: Annotated[float, Quantity("N.m", gt=0)] = 0.5
-    """Largest torque of a motor; if one would exceed it, all four are scaled by one factor."""
-    encoder_resolution: Annotated[float, Quantity("rad", gt=0)] = 0.0015707963267948966
-    """Angle of one encoder count (0.09 degrees)."""
-    reach_limit: Annotated[float, Quantity("1", gt=0.5, lt=1)] = 0.95
-    """Fraction of an arm's full reach at which the stops begin."""
-    stop_stiffness: LinearStiffness = 5000.0
-    """Stiffness of the stops."""
-    stop_damping: LinearDamping = 20.0
-    """Damping of the stops."""
+    title: str = ""
+    """What the device is, in a few words."""
+    description: str = ""
+    """Where its numbers are from."""
+    body: tuple[DeviceBody, ...]
+    """The bodies."""
+    joint: tuple[DeviceJoint, ...]
+    """The joints of the tree: every body is the child of exactly one."""
+    loop: tuple[DeviceLoop, ...] = ()
+    """The pins that close loops."""
+    handle: Handle
+    """What the hand holds."""
+    base: Point = (0.0, 0.0)
+    """Where the origin of the device's own frame stands in the world."""
+    start: Mapping[str, Coordinate] = field(default_factory=dict)
+    """Joint coordinates by the joint's name near which its loops are assembled, by default 0: they
+    tell on which side each elbow is."""
+    motor: Motor = field(default_factory=Motor)
+    """What all motors have that do not say otherwise."""
+    encoder: Encoder = field(default_factory=Encoder)
+    """What all encoders have that do not say otherwise."""
+    stop: Stops = field(default_factory=Stops)
+    """The stops at the limits of its workspace."""
     substeps: Annotated[int, Quantity("1", ge=1, le=100)] = 1
     """Integration steps per communication step; the size of the FMU's equations grows with them."""
     observer: Observer = field(default_factory=Observer)
     """The observer, used with sensing = "encoders"."""
+    driver: Driver | None = None
+    """The board that takes the device's place in a run in real time, once it has a port."""
+
+    def __post_init__(self) -> None:
+        for j in self.joint:
+            if j.motor and self._of(j.motor, self.motor, "torque_limit") is None:
+                raise ValueError(f"joint {j.name!r}: give its motor a torque_limit (N.m)")
+            if j.encoder and self._of(j.encoder, self.encoder, "resolution") is None:
+                raise ValueError(f"joint {j.name!r}: give its encoder a resolution")
+            if j.motor and self._of(j.motor, self.motor, "ratio") == 0.0:
+                raise ValueError(f"joint {j.name!r}: ratio = 0 is a motor that moves nothing")
+
+    def __hash__(self) -> int:
+        return hash(repr(self))
+
+    @staticmethod
+    def _of(own: object, common: object, key: str) -> float | None:
+        given: float | None = getattr(own, key, None)
+        return getattr(common, key) if given is None else given
+
+    @cached_property
+    def placed(self) -> tuple[DeviceJoint, ...]:
+        """The joints, with those on the ground where the device stands in the world."""
+        return tuple(
+            replace(j, at_parent=self._in_world(j.at_parent))
+            if any(self.base) and j.parent == "ground"
+            else j
+            for j in self.joint
+        )
+
+    @cached_property
+    def placed_loops(self) -> tuple[DeviceLoop, ...]:
+        """The pins that close loops, likewise."""
+
+        def moved(body: str, at: Point) -> Point:
+            return self._in_world(at) if body == "ground" else at
+
+        both = ((moved(c.bodies[0], c.at[0]), moved(c.bodies[1], c.at[1])) for c in self.loop)
+        return tuple(replace(c, at=at) for c, at in zip(self.loop, both, strict=True))
+
+    def _in_world(self, at: Point | None) -> Point:
+        x, y = at or (0.0, 0.0)
+        return x + self.base[0], y + self.base[1]
+
+    @cached_property
+    def motors(self) -> tuple[DrivenJoint, ...]:
+        """The joints with a motor, in their order."""
+        default = {"ratio": 1.0, "inertia": 0.0, "damping": 0.0, "friction": 0.0}
+        found = []
+        for j in (j for j in self.placed if j.motor):
+            given = {key: self._of(j.motor, self.motor, key) for key in ("torque_limit", *default)}
+            filled = {k: default.get(k, 0.0) if v is None else v for k, v in given.items()}
+            found.append(DrivenJoint(j, **filled))
+        return tuple(found)
+
+    @cached_property
+    def encoders(self) -> tuple[SensedJoint, ...]:
+        """The joints with an encoder, in their order."""
+        sensed = (j for j in self.placed if j.encoder)
+        return tuple(
+            SensedJoint(j, self._of(j.encoder, self.encoder, "resolution") or 0.0) for j in sensed
+        )
+
+    @property
+    def is_light(self) -> bool:
+        """Whether its bodies weigh less in all than a device that a mechanism is felt through as it
+        is."""
+        return sum(body.mass for body in self.body) < LIGHT
+
+    @property
+    def torque_limit(self) -> float:
+        """The largest torque (N.m) that each of its motors can give."""
+        return min(motor.torque_limit for motor in self.motors)
 
     @property
     def space(self) -> PortSpace:
         """That of the port at the handle."""
         return PLANE
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """Its bodies, joints and loops, held at the handle."""
+        keys = ("name", "type", "parent", "child", "at_parent", "at_child", "axis")
+        return Linkage(
+            body=tuple(Body(**vars(b)) for b in self.body),
+            joint=tuple(Joint(**{key: getattr(j, key) for key in keys}) for j in self.placed),
+            loop=tuple(Loop(bodies=c.bodies, at=c.at) for c in self.placed_loops),
+            operational_point=OperationalPoint(body=self.handle.body, at=self.handle.at),
+            start=self.start,
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from hapticlink.components.specs.paths import Interpolation, PoseSine, WrenchSine
 from hapticlink.components.specs.quantities import (
@@ -11,7 +11,10 @@ from hapticlink.components.specs.quantities import (
     Damping,
     Force,
     Inertia,
+    LinearDamping,
+    LinearStiffness,
     Position,
+    Quantity,
     Stiffness,
     Time,
     Torque,
@@ -95,4 +98,32 @@ class SpringHand:
     that at the end of its step."""
 
 
-Hand = ConstantHand | ProfileHand | ArmHand | SpringHand
+@dataclass(frozen=True, kw_only=True)
+class FingertipHand:
+    """A fingertip that touches the handle in a point: a finger's mass behind its pulp, which passes
+    on forces and no moment. All defaults are assumed."""
+
+    type: Literal["fingertip"] = "fingertip"
+    """A fingertip with point contact."""
+    mass: Annotated[float, Quantity("kg", gt=0)] = 0.006
+    """Mass of the finger that moves along."""
+    stiffness: LinearStiffness = 400.0
+    """Stiffness, finger to target."""
+    damping: LinearDamping = 3.0
+    """Damping, finger to target."""
+    pulp_stiffness: LinearStiffness = 1500.0
+    """Stiffness of the pulp, finger to handle."""
+    pulp_damping: LinearDamping = 1.5
+    """Damping of the pulp, finger to handle."""
+    target: Path | PoseSine = ((0.0, 0.0, 0.0, 0.0),)
+    """Rows of time and pose, sorted by time, the ends held; a sine; or a recorded log. The angle is
+    left out."""
+    interpolation: Interpolation = "linear"
+    """Between rows: linear, the cubic spline whose rate is 0 at both ends, or each row held until
+    the next."""
+    timing: Literal["sampled", "continuous"] = "sampled"
+    """sampled: F is that at the beginning of a communication step; continuous: a plant, whose F is
+    that at the end of its step."""
+
+
+Hand = ConstantHand | ProfileHand | ArmHand | SpringHand | FingertipHand

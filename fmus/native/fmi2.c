@@ -45,30 +45,7 @@
 
 typedef const fmi2ValueReference *References;
 
-static const double NEAR = 1e-3; /* share of a step by which its begin and end may be off */
-
-enum { SETTABLE = N_U + N_P, REALS = N_U + N_P + N_Y };
-enum { WITH_OUTPUTS = SAMPLED ? 0 : SUBSTEPS - 1 }; /* the substep that evaluates them */
-enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8 }; /* modes */
-
-typedef struct { /* what fmi2GetFMUstate saves and serialises; without padding */
-    char guid[40];
-    long long mode, start_due, output_due; /* due: to be computed before it is read */
-    double time, reals[REALS], x[N_X];
-} State;
-
-typedef struct {
-    State now;
-    fmi2CallbackFunctions callbacks;
-    double trial[N_X], after[N_X], sample[N_Y];
-    double shared[N_Z + 1], next[N_Z + 1]; /* z, and the one after a step */
-    double stop;                           /* INFINITY where none is defined */
-    double shared_time;                    /* for which z was evaluated; NAN: it is out of date */
-    int left_out;                          /* whether the last step left out outputs */
-    long long unread, unread_before; /* steps since outputs on request were read, and before that */
-    char name[];
-} Model;
-
+#include "fmi2_model.h"
 #include "fmi2_common.h"
 
 /* --- messages ------------------------------------------------------------------------------- */
@@ -148,9 +125,9 @@ static void refresh(Model *m) {
     }
 }
 
-/* Bring what is read at an output's value reference up to date. */
-static void refresh_output(Model *m, fmi2ValueReference vr) {
-    if (REDUCED && !on_request[vr - SETTABLE]) {
+/* Bring outputs up to date before they are read, some of them `on request`. */
+static void refresh_outputs(Model *m, int requested) {
+    if (REDUCED && !requested) {
         if (m->now.start_due || m->now.output_due) refresh(m);
         return;
     }
@@ -227,14 +204,25 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 /* --- values --------------------------------------------------------------------------------- */
 
+/* The largest of value references, 0 of none. */
+static fmi2ValueReference largest(References vr, size_t n) {
+    fmi2ValueReference last = 0;
+    for (size_t i = 0; i < n; i++) last = vr[i] > last ? vr[i] : last;
+    return last;
+}
+
 fmi2Status fmi2GetReal(fmi2Component c, References vr, size_t n, fmi2Real value[]) {
     Model *m = c;
     if (is_null(m, __func__, n, vr, value)) return fmi2Error;
-    for (size_t i = 0; i < n; i++) {
-        if (is_unknown(m, vr[i], REALS)) return fmi2Error;
-        if (vr[i] >= SETTABLE) refresh_output(m, vr[i]);
-        value[i] = m->now.reals[vr[i]];
+    const fmi2ValueReference last = largest(vr, n);
+    if (n && is_unknown(m, last, REALS)) return fmi2Error;
+    if (n && last >= SETTABLE) {
+        int requested = 0;
+        for (size_t i = 0; REDUCED && i < n; i++)
+            requested |= vr[i] >= SETTABLE && on_request[vr[i] - SETTABLE];
+        refresh_outputs(m, requested);
     }
+    for (size_t i = 0; i < n; i++) value[i] = m->now.reals[vr[i]];
     return fmi2OK;
 }
 
@@ -243,18 +231,18 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
     if (out_of_order(m, __func__, INSTANTIATED | INITIALIZATION | STEP)) return fmi2Error;
     if (is_null(m, __func__, n, vr, value)) return fmi2Error;
     const int initialized = m->now.mode == STEP;
-    for (size_t i = 0; i < n; i++) { /* all are looked at before any is set */
-        if (is_unknown(m, vr[i], REALS)) return fmi2Error;
-        if (vr[i] >= SETTABLE)
-            return fail(m, fmi2Error, "%s is an output; it cannot be set", names[vr[i]]);
-        if (initialized && is_fixed[vr[i]])
-            return fail(m, fmi2Error, "parameter %s is fixed; set it before the end of "
-                        "initialisation mode", names[vr[i]]);
+    const fmi2ValueReference last = largest(vr, n);
+    if (n && last >= N_U) { /* not inputs alone: all are looked at before any is set */
+        if (is_unknown(m, last, REALS)) return fmi2Error;
+        if (last >= SETTABLE)
+            return fail(m, fmi2Error, "%s is an output; it cannot be set", names[last]);
+        for (size_t i = 0; initialized && i < n; i++)
+            if (is_fixed[vr[i]])
+                return fail(m, fmi2Error, "parameter %s is fixed; set it before the end of "
+                            "initialisation mode", names[vr[i]]);
+        m->shared_time = NAN;
     }
-    for (size_t i = 0; i < n; i++) {
-        m->now.reals[vr[i]] = value[i];
-        if (vr[i] >= N_U) m->shared_time = NAN;
-    }
+    for (size_t i = 0; i < n; i++) m->now.reals[vr[i]] = value[i];
     if (!initialized) m->now.start_due = 1;
     if (!initialized || !SAMPLED) m->now.output_due = 1;
     return fmi2OK;

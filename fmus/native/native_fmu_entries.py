@@ -29,7 +29,7 @@ from hapticlink.fmus.reference_run import reference_run
 from hapticlink.fmus.reproducible_zip import digest, guid_of
 
 WRAPPER = Path(__file__).parent / "fmi2.c"
-COMMON = Path(__file__).parent / "fmi2_common.h"
+INCLUDED = tuple(Path(__file__).parent / name for name in ("fmi2_common.h", "fmi2_model.h"))
 """What it includes."""
 
 
@@ -53,7 +53,7 @@ def entries(
         about = describe_component(component, False, **experiment)
         run = reference_run(component, about.step_size)
         files = {PAGE: documentation(component, run)}
-    own = {path.name: path.read_bytes() for path in (WRAPPER, COMMON)}
+    own = {path.name: path.read_bytes() for path in (WRAPPER, *INCLUDED)}
     if fmi == 3:
         own |= {name: text.encode() for name, text in fmi3_sources(about.variables).items()}
     made_by = [compiler_version(), *FLAGS, TARGETS]

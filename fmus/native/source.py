@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import casadi as ca
 
 from hapticlink.components.component import Component
-from hapticlink.fmus.fmu_functions import RARELY, on_request, one_pass
+from hapticlink.fmus.fmu_functions import RARELY, functions_of_fmu, on_request
 from hapticlink.fmus.native.split_functions import split_functions
 
 
@@ -20,7 +20,7 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
 
     The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """
-    parts = one_pass(component)
+    parts = functions_of_fmu(component)
     text, pieces = functions(parts.functions)
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
@@ -72,6 +72,18 @@ def _room(text: str, of: str) -> int:
     return max(int(n) for n in re.findall(rf"\*sz_{of} = (\d+);", text))
 
 
+_FLOOR = """
+/* floor, without a call of the C library: many processors have no instruction for it. */
+static inline double whole_below(double x) {
+    const double whole = 4503599627370496.0; /* 2^52, from which on there are integers alone */
+    if (!(fabs(x) < whole)) return x;
+    const double nearest = copysign((fabs(x) + whole) - whole, x);
+    return nearest - (nearest > x);
+}
+#define floor whole_below
+"""
+
+
 def functions(given: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
     """Static C functions in which each instruction of CasADi's virtual machine is a statement on
     local variables, and the C files with the pieces of those that are long.
@@ -84,4 +96,5 @@ def functions(given: Iterable[ca.Function]) -> tuple[str, Iterable[str]]:
         generator.add(function if function.is_a("SXFunction") else function.expand())
     text = "#define CASADI_SYMBOL_EXPORT static\n" + generator.dump()
     text = re.sub(r"arg\[\d+\]\? (arg\[\d+\]\[\d+\]) : 0;", r"\1;", text)
-    return split_functions(re.sub(r"if \(res\[\d+\]!=0\) ", "", text))
+    text = re.sub(r"if \(res\[\d+\]!=0\) ", "", text)
+    return split_functions(text.replace("#include <math.h>\n", f"#include <math.h>\n{_FLOOR}", 1))

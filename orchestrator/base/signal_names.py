@@ -33,6 +33,8 @@ MEASURED_HANDLE_POSES = (f"{OBSERVER}.x", f"{DEVICE}.x")
 """The measured pose, computed by either block."""
 HANDLE_INERTIAS = (f"{OBSERVER}.M", f"{DEVICE}.M")
 """The device's inertia at the handle, computed by either block."""
+BOARD_SENT_AT = f"{DEVICE}.sent_at"
+"""When torques were sent to a board in the place of the device."""
 WORKSPACE_MARGIN = f"{DEVICE}.workspace_margin"
 """Negative (m) where the device is outside its workspace."""
 
@@ -42,8 +44,11 @@ COUPLING_ENERGY = f"{CONTROLLER}.coupling_energy"
 """Stored in F_drift and F_T, where the operational point changes."""
 MOTOR_WRENCH = f"{CONTROLLER}.F_motor"
 MOTOR_TORQUES = f"{MOTOR_MAP}.tau"
-MOTOR_ANGLES = f"{DEVICE}.q_true"
+MOTOR_ANGLES = f"{DEVICE}.theta_true"
 """Both where the observer is beside the device; the torques work over the angles."""
+APPLIED_TORQUES = f"{DEVICE}.tau_applied"
+TORQUE_LIMITS = f"{DEVICE}.torque_limit"
+"""What a device from elsewhere tells of its motors (N.m)."""
 PASSIVITY_DAMPING = f"{CONTROLLER}.passivity_damping"
 PASSIVITY_ENERGY = f"{CONTROLLER}.passivity_energy_left"
 

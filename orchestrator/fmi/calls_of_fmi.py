@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import logging
+import math
 import sys
 import time as clock
 from collections.abc import Callable, Sequence
@@ -58,6 +59,7 @@ class InProcess(Instance):
         self._saved: dict[int, SavedFmuState] = {}
         self._saved_time: dict[int, float] = {}
         self._initialized = self._over = self._is_new = False
+        self._started: tuple[list[Scalar], Setting] | None = None
         self._some: dict[tuple[int, ...], tuple[Vector, list[Transfer]]] = {}
         self._setters = 0
         """Setters of an FMU of this project, whose inputs change by them alone; 0 of others."""
@@ -193,9 +195,15 @@ class InProcess(Instance):
 
     def _set_starts(self, *, structural: bool = False) -> None:
         """Set the start values, of structural parameters or of all others."""
-        started = [s for s, _ in self.starts if s.structural == structural]
-        started.sort(key=lambda s: TYPES.index(s.type))
-        *_, transfers = self._setting(started, start=True)
+        chosen = [(s, value) for s, value in self.starts if s.structural == structural]
+        chosen.sort(key=lambda start: TYPES.index(start[0].type))
+        scalars = [s for s, _ in chosen]
+        if self._started and self._started[0] == scalars:  # those of the run before
+            values, _, transfers = self._started[1]
+            values[:] = [as_signal(s, value) for s, value in chosen]
+        else:
+            setting = self._setting(scalars, start=True)
+            self._started, transfers = (scalars, setting) if self.resets else None, setting[2]
         self._carry_out(transfers, "sets")
 
     def enter_initialization(self, stop_time: float) -> None:
@@ -222,6 +230,18 @@ class InProcess(Instance):
             raise self.failed(name, getattr(error, "status", ERROR)) from error
         finally:
             self._keep_arithmetic()
+
+    def _fmi(self, function: str, *arguments: Any) -> None:
+        """Call a function that all versions of FMI have."""
+        self._call(f"fmi{self.description.fmi}{function}", *arguments)
+
+    def update_discrete_states(self) -> tuple[bool, bool, float]:
+        """In event mode: whether its discrete states need another update, whether it requests the
+        end of the simulation, and the time (s) of its next time event, infinity without one."""
+        info = fmi2.fmi2EventInfo()
+        self._call("fmi2NewDiscreteStates", ctypes.byref(info))
+        next_event = info.nextEventTime if info.nextEventTimeDefined else math.inf
+        return bool(info.newDiscreteStatesNeeded), bool(info.terminateSimulation), next_event
 
     def _keep_arithmetic(self) -> None:
         """Restores how this process rounds numbers where an FMU of others has changed it."""

@@ -30,6 +30,7 @@ from hapticlink.orchestrator.fmi.variables import (
     Scalar,
     derivatives,
     differences,
+    names_of,
     numbers,
     require_countable,
     require_unique,
@@ -46,13 +47,32 @@ SERIALISED = "canSerializeFMUstate"
 """As FMI 2.0 calls it."""
 ONCE = "canBeInstantiatedOnlyOncePerProcess"
 """FMI 2.0.5 section 4.3.1, FMI 3.0 section 4.3.1."""
+NEEDED = "an FMU of FMI 2.0 or 3.0 for co-simulation or model exchange is needed"
 PLATFORMS = {"2": platform, "3": platform_tuple}
 """The folder of this platform in binaries/, by FMI version."""
 
 
+INTERFACES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
+"""The elements of modelDescription.xml by the name of the interface, the preferred one first."""
+TOLERANCE = 1e-5
+"""Relative, of a solver for an FMU that states none; FMPy's."""
+
+
+@dataclass(frozen=True)
+class Equations:
+    """What a model-exchange FMU has in the place of a solver.
+
+    states: the names of its continuous states. indicators: the number of its event indicators.
+    completes: whether it is told of each step of the solver (`completedIntegratorStep`)."""
+
+    states: tuple[str, ...]
+    indicators: int
+    completes: bool
+
+
 @dataclass(frozen=True)
 class Description:
-    """A co-simulation FMU, as its modelDescription.xml describes it."""
+    """An FMU by one of its interfaces, as its modelDescription.xml describes it."""
 
     path: Path
     guid: str
@@ -63,7 +83,7 @@ class Description:
     """The major version: "2" or "3"."""
     units: dict[str, Unit] = field(default_factory=dict)
     flags: frozenset[str] = frozenset()
-    """The capabilities of its CoSimulation element that are true."""
+    """The capabilities of the element of its interface that are true."""
     step_size: str | None = None
     """Of its default experiment (s), as it is written."""
     tolerance: float | None = None
@@ -89,6 +109,16 @@ class Description:
     clocks: tuple[clocks.FmiClock, ...] = ()
     block: str | None = None
     """The block of this project that it was built from; None for FMUs of others."""
+    equations: Equations | None = None
+    """Of one for model exchange; None for co-simulation."""
+
+    @property
+    def solver(self) -> str:
+        """What integrates its equations here, as text; "" for co-simulation."""
+        if (of := self.equations) is None:
+            return ""
+        sizes = f"states: {len(of.states)}, event indicators: {of.indicators}"
+        return f"integrated by CVODE, relative tolerance {self.tolerance or TOLERANCE:g}, {sizes}"
 
     @property
     def has_event_mode(self) -> bool:
@@ -195,14 +225,17 @@ class Description:
         return tuple(sorted(outputs, key=lambda s: TYPES.index(s.type)))
 
 
-def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Description:
+def describe(
+    path: Path, sizes: Mapping[str, int] = MappingProxyType({}), interface: str | None = None
+) -> Description:
     """The FMU, its arrays of the sizes that structural parameters have with the values of `sizes`
-    (FMI 3.0 section 2.4.7.5.1). Raises InputFault where the file is no co-simulation FMU of FMI 2.0
-    or 3.0 that can run here."""
+    (FMI 3.0 section 2.4.7.5.1), by an interface, the first that it has of INTERFACES by default.
+    Raises InputFault where the file is no FMU of FMI 2.0 or 3.0 that can run here."""
     with open_archive(path, "FMU") as archive:
         content = read_xml(archive, "modelDescription.xml")
         tree = ElementTree.fromstring(content)
         version = _version(path, tree)
+        element = _find_interface(path, tree, interface)
         if sizes:
             content = _set_sizes(tree, sizes)
         try:
@@ -212,14 +245,19 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
             ticking = tuple(clocks.read_clocks(tree))
         except Exception as error:  # FMPy raises bare Exception for what it cannot read
             raise InputFault(f"{path}: modelDescription.xml cannot be used: {error}") from error
-        _require_binary(archive, model.coSimulation.modelIdentifier, version)
+        identifier = element.get("modelIdentifier", "")
+        _require_binary(archive, identifier, version)
         require_whole(archive)
     try:
         declared = annotation.read_annotation(tree, variables["scalars"], variables["units"])
     except ValueError as error:
         raise InputFault(f"{path}: its hapticlink annotation cannot be used: {error}") from error
-    capable = {k for k, value in tree.find("CoSimulation").items() if value == "true"}  # type: ignore[union-attr]
-    if ticking and "hasEventMode" not in capable:
+    capable = {k for k, value in element.items() if value == "true"}
+    equations = _read_equations(model) if element.tag == "ModelExchange" else None
+    if equations:
+        # Its directional derivatives are those of an instant, not over a step.
+        capable = {c for c in capable if "DirectionalDerivative" not in c} | {VARIABLE_STEP}
+    elif ticking and "hasEventMode" not in capable:
         raise InputFault(
             f"{path}: it has clocks ({ticking[0].name}) and no event mode, in which alone they are "
             "active: FMI 3.0 asks for hasEventMode (section 4.4)"
@@ -227,12 +265,13 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
     return Description(
         path=path,
         guid=model.guid,
-        identifier=model.coSimulation.modelIdentifier,
+        identifier=identifier,
         fmi=version,
         flags=frozenset(capable),
         step_size=model.defaultExperiment and model.defaultExperiment.stepSize,
         tolerance=_read_tolerance(model.defaultExperiment),
         clocks=ticking,
+        equations=equations,
         block=None if annotation.block(tree) is None else model.modelName,
         **variables,
         **declared,
@@ -240,27 +279,46 @@ def describe(path: Path, sizes: Mapping[str, int] = MappingProxyType({})) -> Des
 
 
 def _version(path: Path, tree: ElementTree.Element) -> str:
-    """ "2" or "3". Raises InputFault for other versions, and for an FMU without co-simulation."""
+    """ "2" or "3". Raises InputFault for other versions."""
     version = tree.get("fmiVersion") or "none"
-    cosimulates = tree.find("CoSimulation") is not None
-    if not cosimulates and tree.find("ScheduledExecution") is not None:
+    if version.partition(".")[0] not in ("2", "3"):
+        raise InputFault(f"{path}: it is of FMI {version}: {NEEDED}; export it again")
+    if not re.fullmatch(r"\d+(\.\d+)*", version):  # 3.0-beta.2
+        raise InputFault(
+            f"{path}: it is of FMI {version}, a draft of the standard, whose functions have "
+            f"changed since: {NEEDED}; export it again with a newer tool"
+        )
+    return version[0]
+
+
+def _find_interface(
+    path: Path, tree: ElementTree.Element, interface: str | None
+) -> ElementTree.Element:
+    """The element of the interface that is taken. Raises InputFault where there is none."""
+    there = {
+        name: found for name, tag in INTERFACES.items() if (found := tree.find(tag)) is not None
+    }
+    if not there and tree.find("ScheduledExecution") is not None:
         raise InputFault(
             f"{path}: it is for scheduled execution only, where a scheduler activates its model "
             "partitions and preempts them; a run takes steps: export it for co-simulation"
         )
-    needed = "a co-simulation FMU of FMI 2.0 or 3.0 is needed"
-    if version.partition(".")[0] not in ("2", "3"):
-        raise InputFault(f"{path}: it is of FMI {version}: {needed}; export it again")
-    if not re.fullmatch(r"\d+(\.\d+)*", version):  # 3.0-beta.2
+    if not there:
+        what = " or ".join(f"<{tag}>" for tag in INTERFACES.values())
+        raise InputFault(f"{path}: it is without {what}: {NEEDED}; export it again")
+    if interface and interface not in there:
         raise InputFault(
-            f"{path}: it is of FMI {version}, a draft of the standard, whose functions have "
-            f"changed since: {needed}; export it again with a newer tool"
+            f"{path}: it is for {' and '.join(there)} only, not for {interface}: leave `interface` "
+            "out, or export it again"
         )
-    if not cosimulates:
-        model = tree.find("ModelExchange") is not None
-        what = "for model exchange, without a solver" if model else "without <CoSimulation>"
-        raise InputFault(f"{path}: it is {what}: {needed}; export it for co-simulation")
-    return version[0]
+    return there[interface] if interface else next(iter(there.values()))
+
+
+def _read_equations(model: Any) -> Equations:
+    states = (d.variable.derivative or d.variable for d in model.derivatives)
+    names = tuple(name for state in states for name in names_of(state))
+    completes = model.modelExchange.needsCompletedIntegratorStep
+    return Equations(names, model.numberOfEventIndicators, completes)
 
 
 def _set_sizes(tree: ElementTree.Element, sizes: Mapping[str, int]) -> bytes:

@@ -1,4 +1,5 @@
-"""An FMI 3.0 co-simulation FMU whose events its importer handles (`hasEventMode`).
+"""An FMU whose events its importer handles: here those of FMI 3.0 for co-simulation that declare it
+(`hasEventMode`), in `model_exchange` those that a solver integrates.
 
 FMI 3.0.2 section 4.2.1: "The importer must call fmi3EnterEventMode when any of the following
 conditions are met: time has reached nextEventTime as returned by fmi3UpdateDiscreteStates, or the
@@ -28,16 +29,19 @@ import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd
+from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.clocks import APERIODIC, PERIODIC, FmiClock
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.status import SHARE, succeeded
 from hapticlink.orchestrator.fmi.transfer import Transfer
-from hapticlink.orchestrator.fmi.variables import Scalar
+from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 
 MOST = 1000
 """Event iterations at one instant, and doSteps that do not advance time, before the FMU counts as
 one that never settles."""
+MOST_PARTS = 10_000
+"""Parts of a step, each up to an event, before the FMU counts as one that chatters."""
 CHANGED = 2
 """The value of fmi3IntervalQualifier for a new interval."""
 
@@ -55,8 +59,14 @@ class Pending:
     seen: dict[int, float] = field(default_factory=dict)
 
 
-class InProcessWithEvents(InProcess3):
-    """An FMU of FMI 3.0 with event mode, whose library is loaded into this process."""
+class WithEvents(InProcess):
+    """What FMUs with event mode have in common, before the class of their version of FMI. Their
+    step function ends at an event, and tells by `step_flags` and `reached` as fmi3DoStep does."""
+
+    _back = "EnterStepMode"
+    """The function that leaves event mode."""
+    step_flags: list[Any]
+    reached: Any
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -78,24 +88,6 @@ class InProcessWithEvents(InProcess3):
         """Whether its events are handled here, by Python."""
         return not self.in_c
 
-    def _instantiate(self) -> Any:
-        """One whose library refuses what its modelDescription.xml declares handles its events
-        itself."""
-        try:
-            return super()._instantiate()
-        except Exception:  # FMPy raises bare Exception, which comes again where this was not it
-            if self._clocks or self.texts:
-                raise
-        self.in_c = True
-        slave = super()._instantiate()
-        warning = "%s declares event mode (hasEventMode) and refuses it: it handles its own events"
-        logging.getLogger(__name__).warning(warning, self.name)
-        return slave
-
-    def _logging(self) -> dict[str, Any]:
-        used = {"eventModeUsed": self.has_events, "earlyReturnAllowed": self._returns_early}
-        return super()._logging() | used
-
     @property
     def _returns_early(self) -> bool:
         return self.has_events and self._cuts
@@ -109,11 +101,11 @@ class InProcessWithEvents(InProcess3):
             return
         self._clocks = tuple(self._with_interval(clock) for clock in self._clocks)
         self._plan(0.0, {c.reference for c in self._clocks if c.kind == "changing"})
-        self._call("fmi3ExitInitializationMode")
+        self._fmi("ExitInitializationMode")
         self._initialized = True
         if self._iterate():
             raise AsksToEnd(self.name, "has asked to end the simulation", 0.0)
-        self._call("fmi3EnterStepMode")
+        self._fmi(self._back)
         self.read()
         self._start_loop()
 
@@ -157,11 +149,14 @@ class InProcessWithEvents(InProcess3):
     def _in_parts(self, do_step: Callable[[float, float], int], time: float, size: float) -> int:
         """The status of a step from `time` over `size` (s), in parts that end at events."""
         end, near, now = time + size, SHARE * size, time
-        status, stuck = 0, 0
+        status, stuck, parts = 0, 0, 0
         if (due := self._due(time, near)) and self.event(time, due):
             self._end(time)
             return status
         while now < end - near:
+            if (parts := parts + 1) > MOST_PARTS:
+                what = f"it has {MOST_PARTS} events within one step: it switches on and off"
+                raise self._fault(f"{what} all the time, which a hysteresis in it ends", now)
             until = self._until(now + near, end, near)
             status = do_step(now, size if (now, until) == (time, end) else until - now)
             if not succeeded(status):
@@ -218,28 +213,26 @@ class InProcessWithEvents(InProcess3):
         """Event mode at `time` (s), in which `settings` are made and the clocks of the references
         `active` are activated. Returns whether the FMU requests the end of the simulation."""
         self.place.time = time
-        self._call("fmi3EnterEventMode")
+        self._fmi("EnterEventMode")
         settings()
         for _ in range(MOST):
             if self._iterate(active):
                 return True
             active = {r for r, at in self.pending.planned.items() if at <= time}
             if not active:
-                self._call("fmi3EnterStepMode")
+                self._fmi(self._back)
                 return False
         raise self._fault(f"its clocks are due {MOST} times at one instant", time)
 
     def _iterate(self, active: Collection[int] = ()) -> bool:
         """Event iterations until the discrete states need no update. Returns whether the FMU
-        requests the end of the simulation (FMI 3.0.2 section 2.3.5, fmi3UpdateDiscreteStates)."""
-        more, ends, _, _, defined = flags = [ctypes.c_bool() for _ in range(5)]
-        next_event = ctypes.c_double()
-        results = [*(ctypes.byref(flag) for flag in flags), ctypes.byref(next_event)]
+        requests the end of the simulation (FMI 3.0.2 section 2.3.5, fmi3UpdateDiscreteStates; FMI
+        2.0.5 section 3.2.2, fmi2NewDiscreteStates)."""
         for _ in range(MOST):
             self._activate(active)
-            self._call("fmi3UpdateDiscreteStates", *results)
+            more, ends, next_event = self.update_discrete_states()
             self._plan(self.time, active)
-            active, self.pending.next_event = (), next_event.value if defined else math.inf
+            active, self.pending.next_event = (), next_event
             if ends:
                 return True
             if not more:
@@ -336,6 +329,31 @@ class InProcessWithEvents(InProcess3):
         own = {name: saved[name] for name in vars(self.pending)}
         self.pending, self.taken_over = Pending(**own), saved["inputs"]
 
+    def take_continuous(self, setter: Setter) -> None:
+        """Continuous inputs have been set in step mode."""
+
+
+class InProcessWithEvents(WithEvents, InProcess3):
+    """An FMU of FMI 3.0 for co-simulation with event mode."""
+
+    def _instantiate(self) -> Any:
+        """One whose library refuses what its modelDescription.xml declares handles its events
+        itself."""
+        try:
+            return super()._instantiate()
+        except Exception:  # FMPy raises bare Exception, which comes again where this was not it
+            if self._clocks or self.texts:
+                raise
+        self.in_c = True
+        slave = super()._instantiate()
+        warning = "%s declares event mode (hasEventMode) and refuses it: it handles its own events"
+        logging.getLogger(__name__).warning(warning, self.name)
+        return slave
+
+    def _logging(self) -> dict[str, Any]:
+        used = {"eventModeUsed": self.has_events, "earlyReturnAllowed": self._returns_early}
+        return super()._logging() | used
+
 
 class EventSetter:
     """Sets continuous inputs in step mode, and the others, which are discrete inputs and tunable
@@ -344,15 +362,15 @@ class EventSetter:
     grown."""
 
     def __init__(
-        self, instance: InProcessWithEvents, scalars: Sequence[Scalar], places: Sequence[int]
+        self, instance: WithEvents, scalars: Sequence[Scalar], places: Sequence[int]
     ) -> None:
         self._instance, self._before = instance, (-1, b"")
         rows = [*zip(scalars, places, strict=True)]
         self._clocks = [(s.reference, p) for s, p in rows if s.type == "Clock"]
         self._clocked = [(s, p) for s, p in rows if s.clocks and s.type != "Clock"]
         others = [(s, p) for s, p in rows if not s.clocks and s.type != "Clock"]
-        self._continuous = self._of([row for row in others if _is_continuous(row[0])])
-        self._discrete = self._of([row for row in others if not _is_continuous(row[0])])
+        self._continuous = self._of([row for row in others if is_continuous(row[0])])
+        self._discrete = self._of([row for row in others if not is_continuous(row[0])])
         self._signals: Vector = np.zeros(0)
         self._setters: dict[frozenset[int], Setter] = {}
 
@@ -369,6 +387,7 @@ class EventSetter:
         if self._clocked:
             self._signals = signals.copy()  # as they are now, when a clock is active
         self._continuous(signals)
+        instance.take_continuous(self._continuous)
         seen, active = instance.pending.seen, []
         for reference, place in self._clocks:
             if signals[place] > seen.get(reference, 0.0):
@@ -400,8 +419,8 @@ def _one(reference: int) -> Any:
     return (ctypes.c_uint * 1)(reference)
 
 
-def _is_continuous(scalar: Scalar) -> bool:
+def is_continuous(scalar: Scalar) -> bool:
     """Whether it may be set in step mode: an input that varies continuously, as those of floating
-    point do by default (FMI 3.0.2 section 2.4.7.4)."""
-    default = "continuous" if scalar.type.startswith("Float") else "discrete"
+    point do by default (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)."""
+    default = "continuous" if scalar.type in CONTINUOUS else "discrete"
     return scalar.causality == "input" and (scalar.variability or default) == "continuous"

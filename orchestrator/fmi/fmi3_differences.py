@@ -6,6 +6,7 @@ Intermediate update is not used: inputs are constant over each step (FMI 3.0 sec
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -55,6 +56,13 @@ class InProcess3(InProcess):
                 what = f"{self.do_step} returned early, at {self.reached.value:.6g} s, unasked"
                 raise self._fault(what, time)
         return status
+
+    def update_discrete_states(self) -> tuple[bool, bool, float]:
+        more, ends, _, _, defined = flags = [ctypes.c_bool() for _ in range(5)]
+        next_event = ctypes.c_double()
+        results = [*(ctypes.byref(flag) for flag in flags), ctypes.byref(next_event)]
+        self._call("fmi3UpdateDiscreteStates", *results)
+        return more.value, ends.value, next_event.value if defined else math.inf
 
     def _setting(self, scalars: Sequence[Scalar], start: bool = False) -> Setting:
         """Arrays are set as a whole: entries that are not connected keep their start values. Raises

@@ -66,23 +66,18 @@ class OutputBounds:
 
     def __init__(self, description: Description, outputs: Vector) -> None:
         self._scalars, self._outputs = description.outputs, outputs
+        self._nominal = np.array([s.nominal for s in self._scalars])
+        self._bounds = np.array([_bound(s) for s in self._scalars])
+        self._unknown = np.array([_is_unknown(s) for s in self._scalars], bool)
         self.inverse, self._shares = np.zeros(len(outputs)), np.zeros(len(outputs))
         self._before = np.zeros(len(outputs))
 
     def start(self) -> None:
         """Sets the bounds from the start values. Integers have the bounds of their types."""
-        nominal = np.array([s.nominal for s in self._scalars])
-        scales = np.maximum(np.abs(self._outputs), nominal)
-        bounds = GROWTH * scales
-        for i, scalar in enumerate(self._scalars):
-            if scalar.bound:
-                bounds[i] = scalar.bound
-            elif scalar.type not in CONTINUOUS:
-                bounds[i] = np.inf
-            elif scalar.unit is None:
-                bounds[i] = UNKNOWN_GROWTH * scales[i]
-                self._before[i] = np.inf
-        self.inverse[:] = 1.0 / bounds
+        scales = np.maximum(np.abs(self._outputs), self._nominal)
+        grown = np.where(self._unknown, UNKNOWN_GROWTH, GROWTH) * scales
+        self._before[self._unknown] = np.inf
+        self.inverse[:] = 1.0 / np.where(np.isnan(self._bounds), grown, self._bounds)
 
     def forget(self) -> None:
         """Stand as before `start`."""
@@ -110,6 +105,18 @@ class OutputBounds:
         unknown = self._before > 0.0
         self._before[unknown] = np.where(shares > 1.0, shares, np.inf)[unknown]
         return int(np.argmax(diverged)) if diverged.any() else None
+
+
+def _bound(scalar: Scalar) -> float:
+    """The bound that an output has whatever its start value is; NaN without one."""
+    if scalar.bound:
+        return scalar.bound
+    return np.nan if scalar.type in CONTINUOUS else np.inf
+
+
+def _is_unknown(scalar: Scalar) -> bool:
+    """Whether nothing is known of the magnitude of an output."""
+    return not scalar.bound and scalar.type in CONTINUOUS and scalar.unit is None
 
 
 class Instance(ABC):
@@ -215,6 +222,14 @@ class Instance(ABC):
         """Nothing waits for a step any more."""
         self._waiting.clear()
         self.place.waiting = math.inf
+
+    # --- hardware -------------------------------------------------------------------------
+
+    def begin(self) -> None:  # noqa: B027
+        """Everything else is ready to run."""
+
+    def rest(self) -> None:  # noqa: B027
+        """The run has ended, however: hardware is left without torque before anything else."""
 
     # --- what each kind does in its way, every call of which may raise FmuFault -----------
 
@@ -328,6 +343,8 @@ class Instance(ABC):
 
     def require_finite(self) -> None:
         """Raises FmuFault naming the first output that is not finite."""
+        if np.isfinite(self.outputs).all():
+            return
         for scalar, value in zip(self.description.outputs, self.outputs.tolist(), strict=True):
             if not np.isfinite(value):
                 what = f"output {scalar.name} is {value!r}"

@@ -44,19 +44,19 @@ _reset: dict[tuple[str, str], Idle] = {}
 _lock = Lock()
 
 
-def describe_once(path: Path) -> Description:
-    """The description of an FMU, read once as long as the file does not change. Raises InputFault
-    as `describe` does."""
+def describe_once(path: Path, interface: str | None = None) -> Description:
+    """The description of an FMU by an interface, read once as long as the file does not change.
+    Raises InputFault as `describe` does."""
     try:
         file = file_at(path)
     except OSError:
-        return describe(path)  # which raises an InputFault with the reason
-    return _describe(file)
+        return describe(path, interface=interface)  # which raises an InputFault with the reason
+    return _describe(file, interface)
 
 
 @lru_cache(MAX_UNPACKED)
-def _describe(file: File) -> Description:
-    return describe(file[0])
+def _describe(file: File, interface: str | None) -> Description:
+    return describe(file[0], interface=interface)
 
 
 def file_at(path: Path) -> File:

@@ -119,7 +119,7 @@ def numbers(
     ):
         return
     check_variable(variable)
-    names = _names(variable)
+    names = names_of(variable)
     starts = [_number(text) for text in (variable.start or "").split()] or [0.0]
     if len(starts) == 1:
         starts *= len(names)
@@ -162,9 +162,9 @@ def derivatives(model: Any) -> dict[str, str]:
     structured = model.variableNamingConvention == "structured"
     by_output: dict[str, str] = {}
     for variable in model.modelVariables:
-        names = _names(variable)
+        names = names_of(variable)
         if variable.derivative is not None:
-            by_output |= dict(zip(_names(variable.derivative), names, strict=False))
+            by_output |= dict(zip(names_of(variable.derivative), names, strict=False))
         elif structured and (y := _DERIVATIVE.fullmatch(variable.name)):
             by_output |= {y[1] + name.removeprefix(variable.name): name for name in names}
     return by_output
@@ -177,7 +177,8 @@ def indices(sizes: Iterable[int]) -> list[str]:
     return [f"[{','.join(map(str, entry))}]" if entry else "" for entry in every]
 
 
-def _names(variable: Any) -> list[str]:
+def names_of(variable: Any) -> list[str]:
+    """The names of the scalars of a variable."""
     return [f"{variable.name}{entry}" for entry in indices(variable.shape or ())]
 
 

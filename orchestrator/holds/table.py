@@ -40,14 +40,14 @@ TABLE: dict[str, HoldRow] = {
     "delayed": HoldRow("delayed", "delayed", depth=2, remembers=1, degree=1),
     "smooth": HoldRow("smooth", "smooth", depth=2, remembers=2, degree=3),
     "model": HoldRow("samples", "model", needs="gradient", downsamples=True),
-    "ahead": HoldRow("samples", "ahead", depth=2, needs="step", degree=None),
+    "ahead": HoldRow("samples", "ahead", depth=2, needs="step", degree=3),
     "passive": HoldRow("account", "passive", needs="power"),
     "nepce": HoldRow("account", "nearly_energy_preserving", needs="power"),
     "pspm": HoldRow("set_position", "set_position", needs="spring"),
     "latest": HoldRow("samples", "zero_order", gives_samples=True, downsamples=True),
     "mean": HoldRow("mean", "mean", remembers=3, downsamples=True),
     "half-lead": HoldRow("mean", "half_lead", remembers=3, downsamples=True),
-    "mid": HoldRow("samples", "mid", remembers=1, needs="coupling", downsamples=True),
+    "mid": HoldRow("mid", "mid", remembers=1, needs="coupling", downsamples=True),
 }
 """By the name in a scene, which tells what a hold is: docs/holds.md."""
 IN_PYTHON = HoldRow("in_python", "in_python")

@@ -83,14 +83,16 @@ def _steps(clock: Clock) -> str:
 
 
 def _count_fetched(system: System) -> Iterator[str]:
-    """How many outputs of each FMU are fetched, and how many of these are written."""
+    """How many outputs of each FMU are fetched, how many of these are written, and what integrates
+    it where it has no solver."""
     written = system.recording.outputs
     rows = f" in every row of {system.recording.every}" if system.recording.every > 1 else ""
     for u in system.fmus:
         names = [s.name for s in u.description.outputs]
         many = len([n for n in names if written is None or f"{u.name}.{n}" in written])
         some = f", {len(u.recorded_only)} of them for rows alone" if u.recorded_only else ""
-        yield f"  {u.name}: {len(names)} outputs fetched{some}, {many} recorded{rows}"
+        solved = f", {u.description.solver}" * bool(u.description.solver)
+        yield f"  {u.name}: {len(names)} outputs fetched{some}, {many} recorded{rows}{solved}"
 
 
 def _holds(system: System) -> Iterator[str]:

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.base.signal_names import by_user
+from hapticlink.orchestrator.base.signal_names import DEVICE, block_of_user, by_user
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.run_record import first_error
 from hapticlink.orchestrator.scene.overrides import toml
@@ -33,6 +33,17 @@ def all_devices(results: Results) -> dict[str, Device]:
     """The devices of all users of a run, as `by_user`."""
     others = scene_part(results, "devices", Mapping[str, Device])
     return by_user(scene_part(results, "device", Device), others or {})
+
+
+def described_devices(results: Results) -> dict[str, Device]:
+    """The devices that are as [device] says: not those in whose place an FMU from elsewhere is,
+    except where the observer beside it goes by [device]."""
+    replaced = {fmu.get("replaces") for fmu in results.record.scene.get("fmu", ())}
+    return {
+        user: device
+        for user, device in all_devices(results).items()
+        if device.observer.beside or block_of_user(DEVICE, user) not in replaced
+    }
 
 
 @cache  # which takes longer to make than most figures take to draw

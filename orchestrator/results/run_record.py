@@ -213,6 +213,8 @@ class RunEnding:
     beyond all that it was given."""
     isolated: dict[str, str] = field(default_factory=dict)
     """Why an FMU ran in a process of its own."""
+    solvers: dict[str, str] = field(default_factory=dict)
+    """What has integrated an FMU for model exchange."""
     logged: dict[str, dict[str, int]] = field(default_factory=dict)
     """The number of messages in fmus.log, by FMU and status."""
     unsaved: list[str] = field(default_factory=list)

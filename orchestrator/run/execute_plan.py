@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from hapticlink.orchestrator.plan.sample_ages import causal
 from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEnding, Timings
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run import kept_runs, run_state
+from hapticlink.orchestrator.run.compiled import lanes
 from hapticlink.orchestrator.run.compiled.loop import NO_HALTS, CompiledLoop, Halt
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
 from hapticlink.orchestrator.run.kept_runs import KeptRun, StartMemory
@@ -35,6 +37,7 @@ from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.ports import power_across_rates
 
 Progress = Callable[[float], None]
+Steps = Mapping[str, Any]
 PAUSE = 0.02
 """Time (s) between two reports of progress."""
 
@@ -104,6 +107,109 @@ class Outcome:
         )
 
 
+class _Run:
+    """A run by its phases; `outcome` says how it ended so far."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        results: RunResults,
+        real_time: RealTimeRun | None = None,
+        state: RunState | None = None,
+        saving: Saving | None = None,
+    ) -> None:
+        self._plan, self._results, self._real_time = plan, results, real_time
+        self._state, self._saving = state, saving
+        self.outcome = Outcome()
+        self._simulation: Simulation | None = None
+        self.loop: CompiledLoop | None = None
+        self._kept: KeptRun | None = None
+        self._ended: KeptRun | None = None
+
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """An exception within the context is how the run ended."""
+        try:
+            yield
+        except (Exception, KeyboardInterrupt) as error:
+            self.outcome.set_reason(error, self._results)
+
+    def begin(self, stack: ExitStack) -> CompiledLoop:
+        """Stand before the first event; `stack` ends what is not kept."""
+        plan, results, real_time = self._plan, self._results, self._real_time
+        state = self._state
+        apart = real_time or results.log_path or state or self._saving
+        kept = None if apart else kept_runs.take(plan.system)
+        self._opened = opened = stack.enter_context(kept.opened if kept else ExitStack())
+        if kept:
+            self._simulation, self.loop = kept.simulation, kept.loop
+            self._kept = kept = kept.begin_again(plan, results, stack)
+            self._plan = kept.plan
+            return self.loop
+        pace = real_time.pace if real_time else None
+        self._simulation = simulation = Simulation(
+            plan.system, results, stack, opened, pace, goes_back=False
+        )
+        if real_time:
+            stack.enter_context(real_time.of(plan, simulation))
+        self.loop = loop = CompiledLoop(plan, simulation)
+        keeps = not apart and kept_runs.may_be_kept(simulation, results)
+        memory = StartMemory(simulation) if keeps else None
+        simulation.rows_before = state.content["rows"] if state else {}
+        simulation.start()
+        coming = loop.events.coming()
+        loop.events.prepare(real_time.kinds(coming) if real_time else coming)
+        if state:
+            run_state.restore(state, simulation, loop)
+        if memory:
+            memory.take_pointers()
+            self._kept = KeptRun(plan, simulation, loop, memory, opened)
+        for instance in simulation.instances.values():
+            instance.begin()
+        return loop
+
+    def run_events(self, progress: Progress | None) -> None:
+        """Run all events."""
+        loop = self.loop
+        assert loop
+        assert self._simulation
+        halts = self._saving.halts(self._simulation, loop) if self._saving else NO_HALTS
+        _run_events(
+            self._plan,
+            self._simulation,
+            loop,
+            self._results,
+            self.outcome,
+            progress,
+            self._real_time,
+            halts,
+        )
+
+    def take_time(self, wall_time: float) -> None:
+        """Note the time (s) of the loop where others ran beside it, and end the tables."""
+        self.outcome.wall_time = wall_time
+        self._results.finish()
+
+    def end(self) -> None:
+        """End the run of the FMUs, so that they may begin another."""
+        if self._kept and self._kept.end():
+            self._ended = replace(self._kept, opened=self._opened.pop_all())
+
+    def conclude(self) -> Outcome:
+        """How the run ended, when nothing but what may be kept is open."""
+        outcome, simulation = self.outcome, self._simulation
+        outcome.published = self._results.published
+        if simulation:
+            outcome.end_time = self._results.last
+        if simulation and self.loop:
+            outcome.details = _details(self._plan, simulation, self.loop, self._real_time)
+            if self._ended:
+                kept_runs.keep(self._ended)
+            if outcome.fault is None and (diverged := _judge_energy(outcome, simulation)):
+                outcome.reason, outcome.fault = "diverged", diverged
+        return outcome
+
+
 def run(
     plan: Plan,
     results: RunResults,
@@ -117,66 +223,61 @@ def run(
     progress is called with the simulated time (s) from time to time. real_time: see RealTimeRun.
     state: from which the run goes on. saving: when states are saved, and what saves them.
     """
-    outcome = Outcome()
-    simulation: Simulation | None = None
-    loop: CompiledLoop | None = None
-    ended: KeptRun | None = None
-    try:
-        # Non-finite values are detected by 0 x NaN, for which numpy would warn.
-        with (
-            interrupt.defer_signals(),
-            ExitStack() as stack,
-            np.errstate(invalid="ignore", over="ignore"),
-        ):
-            interrupt.raise_if_interrupted()
-            apart = real_time or results.log_path or state or saving
-            kept = None if apart else kept_runs.take(plan.system)
-            opened = stack.enter_context(kept.opened if kept else ExitStack())
-            if kept:
-                simulation, loop = kept.simulation, kept.loop
-                kept = kept.begin_again(plan, results, stack)
-                plan = kept.plan
-            else:
-                pace = real_time.pace if real_time else None
-                simulation = Simulation(plan.system, results, stack, opened, pace, goes_back=False)
-                if real_time:
-                    stack.enter_context(real_time.of(plan, simulation))
-                loop = CompiledLoop(plan, simulation)
-                keeps = not apart and kept_runs.may_be_kept(simulation, results)
-                memory = StartMemory(simulation) if keeps else None
-                simulation.rows_before = state.content["rows"] if state else {}
-                simulation.start()
-                coming = loop.events.coming()
-                loop.events.prepare(real_time.kinds(coming) if real_time else coming)
-                if state:
-                    run_state.restore(state, simulation, loop)
-                if memory:
-                    memory.take_pointers()
-                    kept = KeptRun(plan, simulation, loop, memory, opened)
-            if real_time:
-                stack.enter_context(real_time.pace.undisturbed())
-            halts = saving.halts(simulation, loop) if saving else NO_HALTS
-            _run_events(plan, loop, results, outcome, progress, real_time, halts)
-            if kept and kept.end():
-                ended = replace(kept, opened=opened.pop_all())
-    except (Exception, KeyboardInterrupt) as error:
-        outcome.set_reason(error, results)
-    outcome.published = results.published
-    if simulation:
-        outcome.end_time = results.last
-    if simulation and loop:
-        outcome.details = _details(plan, simulation, loop, real_time)
-        if ended:
-            kept_runs.keep(ended)
-        if outcome.fault is None and (diverged := _judge_energy(outcome, simulation)):
-            outcome.reason, outcome.fault = "diverged", diverged
+    this = _Run(plan, results, real_time, state, saving)
+    # Non-finite values are detected by 0 x NaN, for which numpy would warn.
+    with (
+        this.noted(),
+        interrupt.defer_signals(),
+        ExitStack() as stack,
+        np.errstate(invalid="ignore", over="ignore"),
+    ):
+        interrupt.raise_if_interrupted()
+        this.begin(stack)
+        if real_time:
+            stack.enter_context(real_time.pace.undisturbed())
+        this.run_events(progress)
+        this.end()
+    outcome = this.conclude()
     if progress:
         progress(outcome.end_time)
     return outcome
 
 
+def run_side_by_side(each: Sequence[tuple[Plan, RunResults]], steps: Steps) -> list[Outcome | None]:
+    """Execute plans of systems that differ in start values alone, all at once, with the outcomes of
+    those that lasted; None for the others, which are to be run again alone. Raises Interrupted.
+
+    steps: the functions of FMUs that take a step of all at once.
+    """
+    runs = [_Run(*one) for one in each]
+    begun: list[tuple[_Run, CompiledLoop]] = []
+    with (
+        interrupt.defer_signals(),
+        ExitStack() as stack,
+        np.errstate(invalid="ignore", over="ignore"),
+    ):
+        interrupt.raise_if_interrupted()
+        for one in runs:
+            with suppress(Fault):
+                begun.append((one, one.begin(stack.enter_context(ExitStack()))))
+        begun = [(one, loop) for one, loop in begun if loop.goes_with(begun[0][1])]
+        begin, seconds = perf_counter(), each[0][0].system.timeline.seconds
+        ended = lanes.run_side_by_side(
+            [loop for _, loop in begun],
+            steps,
+            lambda tick: interrupt.raise_if_interrupted(seconds(tick)),
+        )
+        share = (perf_counter() - begin) / max(len(begun), 1)
+        lasted = [one for (one, _), why in zip(begun, ended, strict=True) if why is None]
+        for one in lasted:
+            one.take_time(share)
+            one.end()
+    return [one.conclude() if one in lasted else None for one in runs]
+
+
 def _run_events(
     plan: Plan,
+    simulation: Simulation,
     loop: CompiledLoop,
     results: RunResults,
     outcome: Outcome,
@@ -203,6 +304,8 @@ def _run_events(
         ):  # tables are written with all the depth that there is
             loop.run(turn, halts)
     finally:
+        for instance in simulation.instances.values():
+            instance.rest()
         outcome.wall_time = perf_counter() - begin
         results.finish()
         outcome.table_time = perf_counter() - begin - outcome.wall_time
@@ -224,6 +327,7 @@ def _details(
         premises=simulation.premises(),
         overdrawn=simulation.overdrawn(),
         isolated=simulation.isolated,
+        solvers={u.name: u.description.solver for u in system.fmus if u.description.solver},
         held_outputs={name: i.held for name, i in instances.items() if i.held},
         in_python=loop.in_python,
         real_time=real_time.report() if real_time else None,

@@ -71,7 +71,11 @@ def initialize(
     sources = found.sources
     before = values[sources]
     start.evaluate(every)
-    if not np.isclose(values[sources], before, TOLERANCE, TOLERANCE, equal_nan=True).all():
+    after = values[sources]
+    if not (
+        np.array_equal(after, before)
+        or np.isclose(after, before, TOLERANCE, TOLERANCE, equal_nan=True).all()
+    ):
         # An FMU does not keep to the dependencies that it declares.
         start.solve(every, values.copy())
         start.evaluate(every)

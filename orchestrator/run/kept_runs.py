@@ -32,7 +32,7 @@ from hapticlink.orchestrator.run.compiled.structures import POINTERS
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.system.system import System
 
-MOST = 8
+MOST = 16
 """Runs that a process keeps."""
 Words = NDArray[np.uint64]
 

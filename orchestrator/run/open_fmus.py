@@ -9,6 +9,8 @@ from functools import partial
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.boards.board import Board
+from hapticlink.orchestrator.boards.replayed_board import ReplayedBoard
 from hapticlink.orchestrator.fmi.description import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
@@ -44,8 +46,9 @@ def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
 
 def refuse_hardware(fmus: Iterable[Fmu]) -> None:
     """Raises InputFault for FMUs that drive hardware, outside of a run in real time."""
-    if hardware := [fmu.name for fmu in fmus if fmu.hardware]:
-        what = f"{', '.join(hardware)}: hardware = true"
+    if hardware := [fmu for fmu in fmus if fmu.hardware]:
+        keys = {"device.driver.port" if fmu.driver else "hardware = true" for fmu in hardware}
+        what = f"{', '.join(fmu.name for fmu in hardware)}: {', '.join(sorted(keys))}"
         raise InputFault(f"{what}: it is moved by runs in real time alone (--real-time)")
 
 
@@ -67,13 +70,23 @@ class LoadedFmus:
         if not in_real_time:
             refuse_hardware(system.fmus)
         self.system, self.signals = system, SignalVector(system)
-        self.isolated = find_isolated(system.fmus)
+        self.isolated = find_isolated(fmu for fmu in system.fmus if not fmu.stand_in)
         self.instances: dict[str, Instance] = {}
         for fmu in system.fmus:
             interrupt.raise_if_interrupted()
-            kind = Isolated if fmu.name in self.isolated else in_process(fmu.description)
             outputs = self.signals.values[self.signals.fmu(fmu.name)]
-            opening = partial(Remote, fmu.served) if fmu.served else kind
+            opening: Callable[..., Instance]
+            if fmu.stand_in:
+                opening = fmu.stand_in
+            elif fmu.served:
+                opening = partial(Remote, fmu.served)
+            elif fmu.driver and fmu.replayed:
+                opening = partial(ReplayedBoard, fmu.replayed, fmu.driver)
+            elif fmu.driver:
+                opening = partial(Board, fmu.driver)
+            else:
+                isolated = fmu.name in self.isolated
+                opening = Isolated if isolated else in_process(fmu.description)
             instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
             instance.recorded_only, instance.log_path = fmu.recorded_only, log_path
             own = fmu.description.block is not None or system.coupling.scheme == "iterated"

@@ -69,6 +69,10 @@ class RealTimeRun:
             left = (side.close() for side in simulation.sides.values())
             self._abandoned = [name for name in left if name]
 
+    def with_recordings(self, system: System) -> System:
+        """The system, with what is read in the place of its boards."""
+        return system
+
     def _require_skipping(self, system: System, hardware: Iterable[Fmu]) -> None:
         """Raises InputFault where ticks of hardware cannot be skipped."""
         haptics = system.timeline.clocks[0].name

@@ -1,7 +1,8 @@
 """Runs a scene again with the arrivals of an earlier run in real time, without clock or network.
 
 The steps beside the loop are done when the earlier run's samples arrived, by a clock that goes on
-only while the loop waits for it. Holds then get the same samples at the same ticks, so that tables
+only while the loop waits for it; what a board measured is read where it was recorded, and ticks are
+skipped that were skipped. Holds then get the same samples at the same ticks, so that tables
 of the same FMUs have the same numbers, however late samples were.
 """
 
@@ -9,12 +10,16 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.boards.replayed_board import BoardRecording
 from hapticlink.orchestrator.network.served_part import OF_A_RUN
 from hapticlink.orchestrator.results import run_record
 from hapticlink.orchestrator.results.read_results import read_table
@@ -22,7 +27,9 @@ from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.concurrent_fmus import SAMPLES, Job
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.system import System
 
 END = 1.0
 """Seconds behind the last recorded arrival after which none is waited for."""
@@ -31,8 +38,12 @@ END = 1.0
 class RecordedClock:
     """A clock (ns) that jumps to where the loop waits for, and the jobs that are done by it."""
 
-    def __init__(self) -> None:
+    def __init__(self, begun: Sequence[int] = (), period: int = 0) -> None:
+        """begun: the times (ns) at which the haptic loop has begun its events, of which those
+        between were skipped, every `period`."""
         self.time = 0
+        self._next = dict(pairwise(begun))
+        self._period = period
         self._left: list[tuple[float, Job]] = []
 
     def __call__(self) -> int:
@@ -44,7 +55,8 @@ class RecordedClock:
         return self.time
 
     def wait(self, until: int) -> None:
-        self.time = max(self.time, until)
+        behind = self._next.get(until, until) - self._period  # skips what is past until then
+        self.time = max(self.time, until, behind + 1)
 
     def at(self, due: float, done: Job) -> None:
         """Call `done` at a time (ns)."""
@@ -90,7 +102,12 @@ class RecordedArrivals(RealTimeRun):
         keys = [k for k in before.scene if k not in OF_A_RUN]
         if differing := [k for k in keys if not _same(before.scene[k], plain.get(k))]:
             raise InputFault(f"{folder}: a run of another scene: {', '.join(differing)} differ")
+        boards = any(driver_of(scene, user) for user in scene.all_devices)
+        self._table = read_table(folder / "haptics.csv") if boards else None
         clock, arrivals = RecordedClock(), {}
+        if self._table is not None:
+            begun = [int(1e9 * time) for time in self._table["time"]]
+            clock = RecordedClock(begun, int(1e9 * before.real_time["period"]))
         for name in before.real_time["samples"]:
             arrivals[name] = read_table(folder / f"{name}_{SAMPLES}.csv")["arrival"]
         last = max([before.end.time or 0.0, *(float(a.max()) for a in arrivals.values())])
@@ -101,6 +118,19 @@ class RecordedArrivals(RealTimeRun):
             clock.wait,
             lambda name: RecordedWorker(clock, arrivals[name]),
         )
+
+    def with_recordings(self, system: System) -> System:
+        """The system, whose boards are read from the earlier run. Raises InputFault where that has
+        not recorded them."""
+        if self._table is None:
+            return system
+        if system.recording.every != 1:
+            raise InputFault(f"{self._folder}: a board needs all rows: run with record.every = 1")
+        fmus = (
+            replace(u, replayed=BoardRecording(u.name, self._table)) if u.driver else u
+            for u in system.fmus
+        )
+        return replace(system, fmus=tuple(fmus))
 
     def _require_arrivals(self, simulation: Simulation, loop: CompiledLoop) -> None:
         if self.pace.now() > self._end:

@@ -90,6 +90,8 @@ def _why_unsavable(fmu: Fmu, is_isolated: bool) -> str:
         return "runs on another computer"
     if fmu.hardware:
         return "drives hardware"
+    if about.equations:
+        return "is for model exchange, and the history of its solver cannot be written to a file"
     if is_isolated and about.has_event_mode:
         return "has event mode in a process of its own"
     if not about.restores_state:

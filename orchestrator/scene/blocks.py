@@ -8,6 +8,8 @@ from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
+from hapticlink.components.specs.device import Device, Handle
+from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.linkage import GraphicsCopy
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
@@ -126,13 +128,18 @@ def _loop(scene: Scene, skip: bool) -> Iterator[BlockPlan]:
 
 
 def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
-    clutch = bool(scene.linkage and scene.linkage.choices)
+    clutch, partial = bool(scene.linkage and scene.linkage.choices), partial_handles(scene)
     for user, hand in scene.all_hands.items():
+        if driver_of(scene, user):  # somebody's own hand holds the board
+            continue
         settings: dict[str, Any] = {"hand": hand}
         if clutch and not user:
             settings["clutch"] = True
+        if user in partial:
+            settings["handle"] = partial[user]
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
-    beside = {user: scene.all_devices[user] for user in observed_beside(scene)}
+    devices = {user: replace(d, driver=None) for user, d in scene.all_devices.items()}
+    beside = {user: devices[user] for user in observed_beside(scene)}
     for user, device in beside.items():
         yield BlockPlan(block_of_user(OBSERVER, user), OBSERVER, "haptics", {"device": device})
     for user, controller in scene.all_controllers.items():
@@ -143,10 +150,12 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
         }
         if clutch and not user:
             settings["clutch"] = True
+        if user in partial:
+            settings["handle"] = partial[user]
         yield BlockPlan(block_of_user(CONTROLLER, user), CONTROLLER, "haptics", settings)
     for user, device in beside.items():
         yield BlockPlan(block_of_user(MOTOR_MAP, user), MOTOR_MAP, "haptics", {"device": device})
-    for user, device in scene.all_devices.items():
+    for user, device in devices.items():
         settings = {"device": device}
         if scene.sensing == "encoders":
             settings["encoders"] = True
@@ -160,6 +169,8 @@ def _mechanism(scene: Scene) -> dict[str, Any]:
     felt = others(scene) and bool(scene.all_controllers)
     if scene.directions_from == "mechanism" or scene.mechanism.directions:
         settings["directions"] = scene.directions
+        if handles := partial_handles(scene):
+            settings["handles"] = handles
     if scene.contacts:
         settings["contacts"] = scene.contacts
     if scene.controller and felt:
@@ -187,9 +198,17 @@ def _environment(scene: Scene, wanted: FromGraphics) -> dict[str, Any]:
         "mobility": wanted.mobility,
         "local_model": wanted.local_model,
     }
+    if wanted.directions and (handles := partial_handles(scene)):
+        settings["handles"] = handles
     if holds_model(scene) and copied["sync"] != "operational":
         settings["predicted"] = True
     return settings | ({"users": tuple(scene.devices)} if scene.devices else {})
+
+
+def partial_handles(scene: Scene) -> dict[str, Handle]:
+    """The handles of devices that do not render all directions, by user."""
+    handles = {user: device.handle for user, device in scene.all_devices.items()}
+    return {user: handle for user, handle in handles.items() if handle.angle != "held"}
 
 
 def holds_model(scene: Scene) -> bool:
@@ -206,10 +225,28 @@ def topology(scene: Scene) -> bool:
     return any(controller.topology is not False for controller in scene.all_controllers.values())
 
 
+def described_devices(scene: Scene) -> dict[str, Device]:
+    """The devices that are as [device] says, by user: not those in whose place an FMU from
+    elsewhere is, except where the observer beside it goes by [device]."""
+    replaced = {fmu.replaces for fmu in scene.fmu}
+    return {
+        user: device
+        for user, device in scene.all_devices.items()
+        if device.observer.beside or block_of_user(DEVICE, user) not in replaced
+    }
+
+
 def observed_beside(scene: Scene) -> list[str]:
     """The users whose device has its observer beside it."""
     sensed = scene.all_devices if scene.sensing == "encoders" else {}
     return [user for user, device in sensed.items() if device.observer.beside]
+
+
+def driver_of(scene: Scene, user: str) -> Driver | None:
+    """The board in the place of a user's device, None where that is simulated."""
+    device = scene.all_devices.get(user)
+    driver = device.driver if device else None
+    return driver if driver and driver.active else None
 
 
 def others(scene: Scene) -> bool:

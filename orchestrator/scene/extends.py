@@ -8,8 +8,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault, shorten, unknown
-from hapticlink.orchestrator.scene import families, toml_keys
+from hapticlink.orchestrator.scene import device_files, families, toml_keys
 from hapticlink.orchestrator.scene.find_scene import find_scene
+from hapticlink.orchestrator.scene.merge import merge
 from hapticlink.orchestrator.scene.rates import find_traces
 from hapticlink.orchestrator.scene.recorded_tables import find_recorded_tables
 from hapticlink.orchestrator.scene.scene import Scene
@@ -68,6 +69,8 @@ def document(
     if folder:
         for _, holder, key in find_recorded_tables(data):
             holder[key] = {**holder[key], "path": str(folder / str(holder[key]["path"]))}
+    if folder:
+        device_files.locate(data, folder)
     base, dropped = data.pop("extends", None), data.pop("drop", [])
 
     def refuse(message: str, key: str = "extends") -> SceneFault:
@@ -93,7 +96,7 @@ def document(
     below, below_places = document(base_text, base, where, so_far, base)
     below = _drop_keys(below, dropped, lambda message: refuse(message, "drop"))
     replaced: set[Path] = set()
-    merged = _merge(below, data, replaced)
+    merged = merge(below, data, replaced)
     inherited = {
         path: place
         for path, place in below_places.items()
@@ -139,30 +142,10 @@ def with_family(data: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(linkage, dict) or "family" not in linkage:
         return data
     others = {k: v for k, v in linkage.items() if k not in families.ARGUMENTS}
-    return {**data, "linkage": _merge(families.members(linkage), others, set())}
-
-
-def _merge(
-    base: dict[str, Any], top: Mapping[str, Any], replaced: set[Path], above: Path = ()
-) -> dict[str, Any]:
-    """`top` over `base`: tables merge key by key; other values of `top`, and tables of another
-    `type`, replace those of `base`, at paths which are added to `replaced`."""
-    merged = dict(base)
-    for key, value in top.items():
-        below = base.get(key)
-        if isinstance(below, dict) and isinstance(value, dict) and _alike(below, value):
-            value = _merge(below, value, replaced, (*above, key))
-        else:
-            replaced.add((*above, key))
-        merged[key] = value
-    return merged
+    return {**data, "linkage": merge(families.members(linkage), others, set())}
 
 
 def tables_of(data: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
     """The entries of [[key]] that are tables; anything else is reported by the schema."""
     entries = data.get(key)
     return [e for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
-
-
-def _alike(below: Mapping[str, Any], table: Mapping[str, Any]) -> bool:
-    return bool(table.get("type", below.get("type")) == below.get("type"))

@@ -15,6 +15,7 @@ from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
 from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.scene import (
     checks,
+    device_files,
     families,
     hold_tables,
     overrides,
@@ -34,8 +35,14 @@ from hapticlink.orchestrator.scene.refused_keys_and_values import (
 )
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
 from hapticlink.orchestrator.scene.scene_source import Source
-from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals, written_path
-from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem, flat, flatten
+from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals
+from hapticlink.orchestrator.scene.toml_keys import (
+    Problem,
+    collect_problem,
+    flat,
+    flatten,
+    written_path,
+)
 
 
 def read_scene(
@@ -50,18 +57,24 @@ def read_scene(
 
 def from_source(source: Source) -> Scene:
     """The scene of the tables of `source`, changed by its options; raises as `read` does."""
-    data, set_by = plain(dict(source.tables)), dict(source.set_by)
-    # Options of the family come first, since others may change the bodies that it expands to.
+    data, set_by, read_from = plain(dict(source.tables)), dict(source.set_by), source
+    # Options of a family or a device file come first, since others may change the bodies that it
+    # expands to.
     given = [(option, overrides.parse(option)) for option in source.options]
-    of_family = [families.is_argument(names) for _, (names, _) in given]
+    of_family = [
+        families.is_argument(names) or device_files.is_choice(names) for _, (names, _) in given
+    ]
     set_by |= {overrides.apply(data, *each): each[0] for each in compress(given, of_family)}
     try:
         data = with_family(data)
     except families.FamilyError as error:
         origin = replace(source, tables=data, options=(), set_by=set_by)
         raise SceneFault(source.name, [origin.finding(error.path, error.message)]) from None
+    of_devices = device_files.put_device_files(data, source.places)
+    source = replace(source, places={**source.places, **of_devices.places})
     others = compress(given, map(not_, of_family))
     set_by |= {overrides.apply(data, *each): each[0] for each in others}
+    device_files.put_device_files(data, {})  # of devices that options have added
     origin = replace(source, tables=data, options=(), set_by=set_by)
 
     moved: dict[int, int] = {}
@@ -71,6 +84,7 @@ def from_source(source: Source) -> Scene:
             raise SceneFault(source.name, found)
 
     refuse(islice(find_unrepresentable(data), COUNTED))
+    refuse([*of_devices.problems, *device_files.find_old_keys(data), *device_files.put_likes(data)])
     flatten(data)
     data, moved = with_signals(data)
     wrong: list[Problem] = []
@@ -101,4 +115,6 @@ def from_source(source: Source) -> Scene:
         refuse([*wrong, *find_further_problems(wrong, data)[: COUNTED - len(wrong)]])
     refuse(checks.check_scene(scene))
     scene = registry_tables.put_registry_tables(scene, parts)
-    return WrittenScene(**vars(scene), read_from=source, origin=origin, written=scene)
+    return WrittenScene(
+        **vars(scene), read_from=read_from, origin=origin, written=scene, signals=moved
+    )

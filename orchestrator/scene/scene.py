@@ -12,7 +12,7 @@ further point NAME, blocks `hand_NAME`, `haptic_device_NAME` and `controller_NAM
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Annotated, Any, Literal
 
@@ -22,12 +22,19 @@ from hapticlink.components.ports import Kind
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
+from hapticlink.components.specs.hand import (
+    ArmHand,
+    ConstantHand,
+    FingertipHand,
+    ProfileHand,
+    SpringHand,
+)
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.base.plain_data import Plain, plain
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN, by_user
+from hapticlink.orchestrator.boards import DRIVERS as DRIVERS  # registers the drivers
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene.rates import AnyRate, Rate, Seconds
@@ -44,7 +51,7 @@ from hapticlink.orchestrator.scene.scene_tables import (
     TimedEvent,
     Wire,
 )
-from hapticlink.orchestrator.scene.toml_keys import Path
+from hapticlink.orchestrator.scene.toml_keys import Path, written_path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +89,8 @@ Hand = Annotated[
     Annotated[ConstantHand, Tag("constant")]
     | Annotated[ProfileHand, Tag("profile")]
     | Annotated[ArmHand, Tag("arm")]
-    | Annotated[SpringHand, Tag("spring")],
+    | Annotated[SpringHand, Tag("spring")]
+    | Annotated[FingertipHand, Tag("fingertip")],
     Discriminator(_hand_type),
 ]
 
@@ -166,7 +174,7 @@ class Scene:
     directions: Directions = field(default_factory=Directions)
     """Detection of constrained directions, in which the loop closures allow no motion."""
     device: Device | None = None
-    """The twin pantograph, the block `haptic_device`: [device](device.md)."""
+    """The block `haptic_device`: [device](device.md)."""
     controller: Controller | None = None
     """The block `controller`."""
     hand: Hand | None = None
@@ -235,9 +243,17 @@ class Scene:
     def all_controllers(self) -> dict[str, Controller]:
         """The controllers of `all_devices`, by user."""
         own = self.controller or Controller()
-        return by_user(
+        written = by_user(
             self.controller, {name: self.controllers.get(name, own) for name in self.devices}
         )
+        return {user: self._with_bias(user, controller) for user, controller in written.items()}
+
+    def _with_bias(self, user: str, controller: Controller) -> Controller:
+        """The controller with its default bias, which follows from the device's mass."""
+        device = self.all_devices.get(user)
+        if controller.bias or not (device and device.is_light and controller.impedance):
+            return controller
+        return replace(controller, bias="full")
 
     @property
     def named_holds(self) -> dict[str, str]:
@@ -257,7 +273,8 @@ class Scene:
     def ends_when(self) -> str:
         """The condition that ends the run, its default included; "" where there is none."""
         if self.stop_when is None:
-            return f"{WORKSPACE_MARGIN} < 0" if self.device else ""
+            simulated = self.device and not (self.device.driver and self.device.driver.active)
+            return f"{WORKSPACE_MARGIN} < 0" if simulated else ""
         return self.stop_when
 
 
@@ -271,9 +288,12 @@ class WrittenScene(Scene):
     """The same with its options applied."""
     written: Scene = field(compare=False, repr=False)
     """The scene as it was read, before any change in Python."""
+    signals: Mapping[int, int] = field(compare=False, repr=False, default_factory=dict)
+    """By the index of an FMU that is made for a connection from a signal, that of the
+    connection."""
 
     def place(self, path: Path, message: str) -> Finding:
-        return self.origin.finding(path, message)
+        return self.origin.finding(written_path(path, self.signals), message)
 
     @property
     def source(self) -> Source | None:

@@ -62,8 +62,12 @@ class ForeignFmu:
     """sampled: doStep(t, h) computes y(t) from the inputs at t; continuous: y(t + h); frame: y(t),
     which is known at t + h. By default
     what the FMU declares, else that of the block that it replaces, else "continuous"."""
+    interface: Literal["co-simulation", "model-exchange"] | None = None
+    """By which of its interfaces an FMU with both is run; by default co-simulation, where it has
+    that. For model exchange a [solver](foreign-fmus.md#model-exchange) integrates it."""
     tolerance: Annotated[float | None, Quantity("1", gt=0, lt=1)] = None
-    """Relative tolerance for the solver in it; by default that of its DefaultExperiment."""
+    """Relative tolerance for the solver in it, or for it; by default that of its
+    DefaultExperiment, for model exchange 1e-5 without one."""
     start: Mapping[str, Value] = field(default_factory=dict)
     """Start values of inputs and parameters by name; a list for a whole vector, lists of rows for a
     matrix."""

@@ -25,7 +25,6 @@ from hapticlink.orchestrator.scene.recorded_tables import (
     si_unit,
 )
 from hapticlink.orchestrator.scene.scene_tables import OWN, Wire
-from hapticlink.orchestrator.scene.toml_keys import Path
 
 BLOCK = "signal"
 _Row = tuple[Annotated[float, Quantity(OWN)], ...]
@@ -80,13 +79,6 @@ def with_signals(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[int, int
         return dict(data), {}
     moved = {len(fmus) + n: i for n, i in enumerate(made)}
     return {**data, "fmu": [*fmus, *made.values()], "connection": wires}, moved
-
-
-def written_path(path: Path, moved: Mapping[int, int]) -> Path:
-    """Where a scene's file has what is at `path` of the tables of `with_signals`."""
-    if path[:1] == ("fmu",) and path[1:] and path[1] in moved:
-        return ("connection", moved[int(path[1])], "from", *path[3:])
-    return path
 
 
 def _has_units(source: Mapping[str, Any]) -> bool:

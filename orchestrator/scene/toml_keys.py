@@ -130,6 +130,14 @@ def key_lines(text: str) -> dict[Path, int]:
     return lines
 
 
+def written_path(path: Path, moved: Mapping[int, int]) -> Path:
+    """Where a scene's file has what is at `path` of tables with an FMU for each connection from a
+    signal; `moved`: by the index of such an FMU that of its connection."""
+    if path[:1] == ("fmu",) and path[1:] and path[1] in moved:
+        return ("connection", moved[int(path[1])], "from", *path[3:])
+    return path
+
+
 def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
     """File and line of `path`, or of the nearest table around it; line 0 where there is none."""
     while path:

@@ -10,11 +10,13 @@ from types import UnionType
 from typing import Any
 
 from hapticlink.components.registry import Names
+from hapticlink.components.specs.device import Device, DeviceBody
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.paths import AnySine
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.scene import registry_tables
+from hapticlink.orchestrator.scene.device_files import DeviceBodyTable, DeviceTable
 from hapticlink.orchestrator.scene.extends import SceneFile
 from hapticlink.orchestrator.scene.families import FamilyLinkage
 from hapticlink.orchestrator.scene.hold_tables import HoldTable
@@ -25,7 +27,13 @@ from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.signal_sources import WrittenWire
 from hapticlink.orchestrator.scene.toml_keys import Path, value
 
-_WRITTEN: dict[Any, Any] = {Scene: SceneFile, Linkage: FamilyLinkage, Wire: WrittenWire}
+_WRITTEN: dict[Any, Any] = {
+    Scene: SceneFile,
+    Linkage: FamilyLinkage,
+    Wire: WrittenWire,
+    Device: DeviceTable,
+    DeviceBody: DeviceBodyTable,
+}
 """Records that have further keys in a file, which are resolved before the record is read."""
 
 

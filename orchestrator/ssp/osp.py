@@ -9,7 +9,7 @@ libcosim 0.11.2, data/xsd/OspSystemStructure.xsd).
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlparse
@@ -23,7 +23,7 @@ from hapticlink.orchestrator.fmi.description import Description, describe
 
 SUFFIX = ".xml"
 _NAMESPACE = "{http://opensimulationplatform.com/MSMI/OSPSystemStructure}"
-_VALUES = {
+_VALUES: dict[str, Callable[[str], Any]] = {
     "Real": float,
     "Integer": int,
     "Boolean": lambda text: text in ("true", "1"),

@@ -48,6 +48,7 @@ def tables(path: Path) -> dict[str, Any]:
     about = rest.get("fmu", {})
     tables["fmu"] = [
         {"path": str(fmu.path), "start": starts[place], "name": named[place]}
+        | ({"interface": "model-exchange"} if fmu.equations else {})
         | about.get(join_place(place), {})
         for place, fmu in described.items()
     ]
@@ -122,20 +123,21 @@ def names(places: Iterable[Place]) -> dict[Place, str]:
 
 def _describe_components(system: SsdElement, room: Path) -> dict[Place, Description]:
     """The FMU of each component; an entry that several of them have is read once."""
-    known: dict[tuple[Path, str], Description] = {}
+    known: dict[tuple[Path, str, str | None], Description] = {}
     fmus = {}
     for part in system:
         if part.source:
             file, entry = part.source
-            if (file.path, entry) not in known:
+            key = file.path, entry, part.interface
+            if key not in known:
                 unpacked = _unpack_fmu(room, file, entry, part.place)
                 try:
-                    known[file.path, entry] = describe(unpacked)
+                    known[key] = describe(unpacked, interface=part.interface)
                 except InputFault as why:
                     cache.forget(unpacked)
                     where = f"{file.path}: {join_place(part.place)}: {entry}"
                     raise InputFault(str(why).replace(str(unpacked), where)) from None
-            fmus[part.place] = known[file.path, entry]
+            fmus[part.place] = known[key]
     return fmus
 
 

@@ -115,9 +115,14 @@ class SsdConnection:
     convert: bool
 
 
+IMPLEMENTATIONS = {"any": None, "CoSimulation": None, "ModelExchange": "model-exchange"}
+"""The interface of an FMU by the attribute `implementation` of its component."""
+
+
 @dataclass(frozen=True)
 class SsdElement:
-    """A component, with `source` its FMU's file and entry; or a system, with `parts` and with
+    """A component, with `source` its FMU's file and entry and `interface` that by which it is run,
+    None for the one that the FMU has first; or a system, with `parts` and with
     `lines`, the connections between its own connectors and those of its parts. bindings: its
     parameter bindings, each with the file that it is in. A reference to a signal dictionary is a
     system without parts; dictionary: the place of that."""
@@ -126,6 +131,7 @@ class SsdElement:
     connectors: Mapping[str, Connector]
     bindings: tuple[tuple[File, Element], ...]
     source: tuple[File, str] | None = None
+    interface: str | None = None
     parts: tuple[SsdElement, ...] = ()
     lines: tuple[SsdConnection, ...] = ()
     dictionary: Place | None = None
@@ -244,7 +250,8 @@ class Tree:
         if element.tag != f"{{{SSD}}}System":
             source = file, file.resolved(_source_of(path, where, element))
             if element.get("type", FMU) == FMU:
-                return SsdElement(place, connectors, bindings, source)
+                how = IMPLEMENTATIONS[element.get("implementation", "any")]
+                return SsdElement(place, connectors, bindings, source, how)
             system = self._inner(*source, element, place)
             return replace(system, bindings=(*system.bindings, *bindings))
         inside = [*element.iterfind(f"{{{SSD}}}Elements/*")]
@@ -317,16 +324,16 @@ def _reference(
 def _source_of(path: Path, where: str, element: Element) -> str:
     """The source of a component. Raises InputFault for an element that is none to run."""
     kind, type_ = element.tag.removeprefix(f"{{{SSD}}}"), element.get("type", FMU)
-    how, source = element.get("implementation", "CoSimulation"), element.get("source")
+    how, source = element.get("implementation", "any"), element.get("source")
     if kind == "Component":
         known = type_ in (FMU, PACKAGE, DEFINITION)
-        if known and source and how == "CoSimulation":
+        if known and source and how in IMPLEMENTATIONS:
             return source
-        unfit = f" for {how}" if how != "CoSimulation" else " without source"
+        unfit = f" for {how}" if how not in IMPLEMENTATIONS else " without source"
         kind += unfit if known else f" of type {type_}"
     raise InputFault(
         f"{path}: {where} is a {kind}; supported are systems, and components that are FMUs for "
-        "co-simulation, .ssp or .ssd: connect signals one by one"
+        "co-simulation or model exchange, .ssp or .ssd: connect signals one by one"
     )
 
 

@@ -22,6 +22,7 @@ from hapticlink.components.ports import BASES
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.reproducible_zip import write_zip
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi.description import INTERFACES
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -116,7 +117,8 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
 
 def _component(elements: Element, unit: Fmu, version: str) -> Element:
     about = {"name": unit.name, "type": FMU, "source": f"resources/{unit.name}.fmu"}
-    component = SubElement(elements, f"{{{SSD}}}Component", about, implementation="CoSimulation")
+    kind = INTERFACES["model-exchange" if unit.description.equations else "co-simulation"]
+    component = SubElement(elements, f"{{{SSD}}}Component", about, implementation=kind)
     variables = _variables(unit)
     taken = ("input", "output", "parameter")
     shown = {n: e for n, e in variables.items() if e[0].causality in taken}

@@ -12,11 +12,19 @@ from typing import Any
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import plugins, shelf, temporary_folders
 from hapticlink.orchestrator.base.errors import SceneFault
-from hapticlink.orchestrator.base.signal_names import HAND
+from hapticlink.orchestrator.base.signal_names import (
+    CONTROLLER,
+    DEVICE,
+    HAND,
+    block_of_user,
+    user_of_block,
+)
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.boards.board import ENDS, describe_board
+from hapticlink.orchestrator.boards.driver import find_misfits
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.process_cache import describe_once
-from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks, blocks
+from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks, blocks, driver_of
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
@@ -39,6 +47,7 @@ from hapticlink.orchestrator.system.system import (
     Connection,
     Coupling,
     Fmu,
+    InputChange,
     Recording,
     System,
 )
@@ -75,6 +84,18 @@ def build_system(scene: Scene, starts: Mapping[str, Starts] | None = None) -> It
         if made_of:
             _SYSTEMS.put(known or Assembled(made_of, described, system))
         yield system
+
+
+def build_again(scene: Scene) -> System | None:
+    """The system of a scene that differs in start values alone from one that `build_system` has
+    just made, without a look at the FMU files; None where this process keeps none."""
+    planned = separate_start_values(blocks(scene))
+    made_of = MadeOf.of(scene, planned)
+    known = made_of and _SYSTEMS.take(lambda item: item.made_of == made_of)
+    if not known:
+        return None
+    _SYSTEMS.put(known)
+    return _with_starts(scene, planned, known.system)
 
 
 MAX_SYSTEMS = 32
@@ -152,6 +173,7 @@ def _assemble(
     ours = [Fmu(b.name, describe_once(files[b.name]), of[b.name]) for b in planned.own]
     if not exported:
         ours = [_started(fmu, block) for fmu, block in zip(ours, planned.own, strict=True)]
+        ours = [_with_board(fmu, scene, problems) for fmu in ours]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (
         Fmu(t.name, about, of[t.name], starts, t.isolate, t.hardware)
@@ -185,7 +207,7 @@ def _assemble(
     )
     problems += checks.check_system(scene, system)
     problems += replacements.check_replacements(scene, replaced, rows, system)
-    changes = timed_events.changes(scene, system, problems)
+    changes = (*_coupling_ramps(scene, system), *timed_events.changes(scene, system, problems))
     written = choose_outputs(scene.record, system, problems)
     if problems:
         raise _faults(scene, problems)
@@ -199,6 +221,44 @@ def _assemble(
         replacements=replacements.replacements(replaced, rows, system, mapped),
         changes=changes,
     )
+
+
+RAMP_STEPS = 16
+TORQUE_RISE = 5e-3
+"""Time (s) in which the torques of a board may grow to their limit."""
+COUPLING_GAINS = ("K_pc", "B_pc")
+
+
+def _coupling_ramps(scene: Scene, system: System) -> Iterator[InputChange]:
+    """The changes by which the coupling of a mechanism with a board's handle grows from the start
+    on, on both of its sides: a ramp of the motors alone lets the handle leave the mechanism."""
+    for user in scene.all_controllers:
+        driver, name = driver_of(scene, user), block_of_user(CONTROLLER, user)
+        if not (driver and driver.ramp and name in system.fmu):
+            continue
+        fmu = system.fmu[name]
+        gains = tuple(s for k in COUPLING_GAINS for s in fmu.description.port(k, "parameter"))
+        starts = {s: float(v) for s, v in ({s: s.start for s in gains} | dict(fmu.starts)).items()}
+        for k in range(RAMP_STEPS):
+            share = (k + 1) / RAMP_STEPS
+            begin = driver.ramp * k / RAMP_STEPS
+            values = tuple(share * starts[s] for s in gains)
+            text = f"coupling of {name} at {100 * share:.3g} %"
+            yield InputChange(begin, begin, text, name, gains, values)
+
+
+def _with_board(fmu: Fmu, scene: Scene, problems: list[Problem]) -> Fmu:
+    """A device's FMU, with the board in its place where the scene has one."""
+    user = user_of_block(fmu.name, DEVICE)
+    if user is None or not (driver := driver_of(scene, user)):
+        return fmu
+    motors, encoders = (len(fmu.description.port(*port)) for port in ENDS)
+    table: Keys = ("devices", user, "driver") if user else ("device", "driver")
+    problems += (((*table, key), why) for key, why in find_misfits(driver, motors, encoders))
+    most = driver.torque_limit or scene.all_devices[user].torque_limit
+    rate = driver.torque_rate or most / TORQUE_RISE
+    driver = replace(driver, torque_limit=most, torque_rate=rate)
+    return replace(fmu, description=describe_board(fmu.description), hardware=True, driver=driver)
 
 
 def _started(fmu: Fmu, block: BlockPlan) -> Fmu:

@@ -92,6 +92,26 @@ def check_change(
     return new
 
 
+def result_after(system: System, clock: str) -> float:
+    """How long after its begin (s) the result of a step that is taken early is there, the latest of
+    a clock."""
+    steps = (c for c in system.connections if c.needs == "step")
+    late = (c.latency for c in steps if system.fmu[c.source].clock == clock)
+    return max((float(each.max or each.min) for each in late if each), default=0.0)
+
+
+def require_result(system: System, clock: str, shortest: float) -> None:
+    """Raises InputFault where steps of a clock would be so short (s) that the next one begins
+    before the result of one is there."""
+    late = result_after(system, clock)
+    if shortest < late:
+        raise InputFault(
+            f"rate of {clock}: steps would be down to {shortest:.6g} s, and the result of one is "
+            f"there after {late:.6g} s (computing_time): take at most {1 / late:.6g} Hz, and less "
+            "with a jitter"
+        )
+
+
 def require_other_rate(system: System, clock: str) -> None:
     """Raises InputFault where a run cannot change the rate of a clock."""
     fixed = [f.name for f in system.fmus if f.clock == clock and not f.description.varies_step]

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from hapticlink.fmus.cache import folder, remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
 from hapticlink.fmus.native.compiler import compiler_version
 from hapticlink.orchestrator.base import interrupt, plugins, shelf
-from hapticlink.orchestrator.base.errors import Fault, InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault, SceneFault
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import MAX_UNPACKED, File, file_at
 from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks
@@ -57,7 +58,8 @@ def fmu_files(
     starts: for FMUs that other tools run, by block, values that replace the start values of its
     parameters; these also have the scene's step sizes, gains and default experiment, which a run
     sets itself: it needs one FMU for all of them. Raises InputFault where no FMU can be built from
-    the settings (a loop that does not close), Fault where the compiler fails.
+    the settings (a loop that does not close), with the line of those of an [[fmu]], and Fault where
+    the compiler fails.
     """
     every = (*blocks.built, *blocks.engines)
     begun, cached_in = count(1), folder()
@@ -98,13 +100,30 @@ def fmu_files(
 
     try:
         found = {b.name: find(b) for b in every}
-        built = _build({name: f for name, f in found.items() if not isinstance(f, Path)})
+        missing = {name: f for name, f in found.items() if not isinstance(f, Path)}
+        built = _build({n: partial(_build_placed, scene, n, f) for n, f in missing.items()})
         return {name: f if isinstance(f, Path) else built[name] for name, f in found.items()}
     except CompilerError as error:
         interrupt.raise_if_interrupted()  # Ctrl-C in a terminal ends the compiler too
         raise Fault(str(error)) from error
     except FmuError as error:
         raise InputFault(str(error)) from error
+
+
+def _build_placed(scene: Scene, name: str, build: Callable[[], Path]) -> Path:
+    """The file of a block. Raises SceneFault with the line of the settings of an [[fmu]] that give
+    none, or of the one that the message names."""
+    try:
+        return build()
+    except CompilerError:
+        raise
+    except FmuError as error:
+        for i, fmu in enumerate(scene.fmu):
+            if fmu.name == name and fmu.block:
+                named = [key for key in fmu.settings if f"`{key}`" in str(error)]
+                place = scene.place(("fmu", i, "settings", *named[:1]), str(error))
+                raise SceneFault(scene.title, [place]) from error
+        raise
 
 
 _FOUND: shelf.Shelf[tuple[str, File]] = shelf.Shelf(MAX_UNPACKED)

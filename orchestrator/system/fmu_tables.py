@@ -72,10 +72,10 @@ def fmus(
 
 def _describe(path: FilePath, fmu: ForeignFmu) -> Description:
     """The FMU with the sizes that `start` gives it by structural parameters. Raises InputFault."""
-    description = describe_once(path)
+    description = describe_once(path, fmu.interface)
     structural = {s.name for s in description.scalars if s.structural}
     sizes = {n: v for n, v in fmu.start.items() if n in structural and type(v) is int}
-    return describe(path, sizes) if sizes else description
+    return describe(path, sizes, fmu.interface) if sizes else description
 
 
 def _with_derivative(description: Description, name: str, derivative: str) -> Description:

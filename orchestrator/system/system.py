@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
+from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base.ticks import Timeline
+from hapticlink.orchestrator.boards.replayed_board import BoardRecording
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.start_values import Starts
@@ -43,6 +47,12 @@ class Fmu:
     recorded_only: frozenset[str] = frozenset()
     served: ServedAt | None = None
     """Where it runs, if that is on another computer."""
+    driver: Driver | None = None
+    """The board in its place."""
+    stand_in: Callable[..., Any] | None = None
+    """What makes the `Instance` that runs in its place, by the arguments of one."""
+    replayed: BoardRecording | None = field(default=None, compare=False)
+    """What is read in the board's place."""
 
     @property
     def sampled(self) -> bool:
@@ -241,10 +251,19 @@ class System:
         return frozenset(c.source for c in self.connections if c.needs == "step")
 
     def into(self, name: str) -> tuple[Connection, ...]:
-        return tuple(c for c in self.connections if c.target == name and not c.initial)
+        return self._by_end[0].get(name, ())
 
     def out_of(self, name: str) -> tuple[Connection, ...]:
-        return tuple(c for c in self.connections if c.source == name and not c.initial)
+        return self._by_end[1].get(name, ())
+
+    @cached_property
+    def _by_end(self) -> tuple[Mapping[str, tuple[Connection, ...]], ...]:
+        """The connections by their targets, and by their sources, without initial ones."""
+        lasting = [c for c in self.connections if not c.initial]
+        return tuple(
+            {end: tuple(c for c in lasting if of(c) == end) for end in {*map(of, lasting)}}
+            for of in (attrgetter("target"), attrgetter("source"))
+        )
 
 
 _NO_TIME = Timeline(Fraction(1), 0, (), {})

@@ -24,7 +24,7 @@ from hapticlink.analysis.sweep import table
 from hapticlink.analysis.sweep.job import Job, job
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.run_sweep import sweep
-from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.numbers import short
@@ -102,7 +102,9 @@ class Found:
     """The runs by cell and method: errors (mm), and which are within the limits."""
 
     def __init__(self, rows: Iterable[Row]) -> None:
-        limits = AcceptanceLimits.of(Device())
+        device = open_scene.load("closed-loop").device
+        assert device is not None
+        limits = AcceptanceLimits.of(device)
         self.error: dict[Cell, dict[str, float]] = {}
         for row in rows:
             value = float(row[METRIC]) if not limits.why_not(row) else np.inf
@@ -207,7 +209,8 @@ def page(found: Found, elsewhere: Mapping[str, Found]) -> Iterator[str]:
     yield "![Errors with the best gains, by rate](model.png)"
     yield (
         "[theorem.csv](theorem.csv) and [orders.csv](orders.csv) are of the [theorem](../../docs/"
-        "model-hold.md), by `python -m studies.model_theorem`."
+        "model-hold.md), by `python -m studies.model_theorem`; [growth.csv](growth.csv) has growth "
+        "rates by the lifted map and of runs, by `python -m studies.model_growth`."
     )
 
 

@@ -68,13 +68,13 @@ TRIED: dict[str, dict[str, Any]] = {
 """What was tried on the draws that it was tuned on."""
 DEVICES: dict[str, dict[str, Any]] = {
     "as assumed": {},
-    "four times the counts": {"device.encoder_resolution": 0.0015707963267948966 / 4},
+    "four times the counts": {"device.encoder.resolution": 0.0015707963267948966 / 4},
     "a third of the mass": {
         f"device.{name}": value / 3
         for name, value in (
-            ("proximal_mass", 0.05), ("proximal_inertia", 1.07e-4), ("distal_mass", 0.035),
-            ("distal_inertia", 1.17e-4), ("handle_mass", 0.12), ("handle_inertia", 8e-5),
-            ("rotor_inertia", 1.4e-5),
+            ("body.a_left_proximal.mass", 0.05), ("body.a_left_proximal.inertia", 1.07e-4),
+            ("body.a_left_distal.mass", 0.035), ("body.a_left_distal.inertia", 1.17e-4),
+            ("body.crank.mass", 0.12), ("body.crank.inertia", 8e-5), ("motor.inertia", 1.4e-5),
         )
     },
     "1024 Hz": {"haptics.rate": 1024},

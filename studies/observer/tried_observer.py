@@ -19,21 +19,10 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from hapticlink.components.component import Block, Component, Variable
-from hapticlink.components.device import pantograph
-from hapticlink.components.device.variables import (
-    ENCODERS,
-    F_HAND_OBSERVED,
-    GEOMETRY,
-    INERTIA,
-    X_START,
-    C,
-    M,
-    V,
-    X,
-    variables,
-)
+from hapticlink.components.device.models import device_model
+from hapticlink.components.device.variables import F_HAND_OBSERVED, X_START, C, M, V, X
 from hapticlink.components.port_space import PLANE
-from hapticlink.components.specs.device import Device
+from hapticlink.orchestrator import open_scene
 
 NAME, T = "tried_observer", 1 / 512
 
@@ -53,14 +42,17 @@ def riccati_gains(omega_n: float, order: int, period: float = T) -> np.ndarray:
 
 
 def tried_observer() -> Component:
-    """The observer of the default device."""
-    device = Device()
+    """The observer of the twin pantograph."""
+    device = open_scene.load("closed-loop").device
+    assert device is not None
+    model = device_model(device)
     own = ("dead_zone", "impulse", "grip")
     block = Block(
         inputs=[Variable("q", (4,), "rad"), Variable("tau", (4,), "N.m")],
         parameters=[
             X_START,
-            *variables(device, (*GEOMETRY, *INERTIA, *ENCODERS), "fixed"),
+            *model.parameters,
+            Variable("encoder_resolution", (), "rad", device.encoders[0].resolution),
             Variable("g", (4,), "1", 0.0),
             *(Variable(name, (), "1", 0.0) for name in own),
         ],
@@ -73,26 +65,26 @@ def tried_observer() -> Component:
     s, u, p = block.x, block.u, block.p
     x, v, F, rate = (s[f"{name}_observer"] for name in ("x", "v", "F", "dF"))
     h, g = s["period"], p["g"]
-    inertia, c = pantograph.motion(x, v, p)
-    a = ca.solve(inertia, pantograph.jacobian(x, p).T @ u["tau"] + F - c)
+    inertia, c = model.motion(x, v, p)
+    a = ca.solve(inertia, model.jacobian(x, p).T @ u["tau"] + F - c)
     x, F = x + h * v + h**2 / 2 * a, F + h * rate
     F -= h * p["grip"] * ca.vertcat((v + a / 100)[:2], 0)
     v += h * a
-    J, e = pantograph.jacobian(x, p), u["q"] - pantograph.base_angles(x, p)
+    J, e = model.jacobian(x, p), u["q"] - model.angles(x, p)
     dead = p["dead_zone"] * p["encoder_resolution"]
     e = e - ca.fmin(ca.fmax(e, -dead), dead)
     e = ca.solve(J.T @ J, J.T @ e) * (h > 0)
     impulse = p["impulse"] * inertia @ (g[1] * e) / ca.if_else(h > 0, h, 1)
     x, v = x + g[0] * e, v + g[1] * e
     F, rate = F + inertia @ (g[2] * e), rate + inertia @ (g[3] * e)
-    inertia, c = pantograph.motion(x, v, p)
+    inertia, c = model.motion(x, v, p)
     none = ca.SX.zeros(3)
     return block.component(
         NAME,
         "Observers that were tried",
         "sampled",
         initial={
-            "x_observer": pantograph.pose_from_angles(u["q"], p["x_start"], p),
+            "x_observer": model.place_from_angles(u["q"], p["x_start"], p),
             **{f"{name}_observer": none for name in ("v", "F", "dF")},
             "period": ca.SX(0),
         },

@@ -195,7 +195,7 @@ def _order_of_calls(runs: Runs, folder: Path) -> Entry:
         most = jumps[system, "Jacobi, printed gains"]
         row[1].set_title(f"the torque jumps by up to {most:.2g} N.m a tick", fontsize="medium")
     axes[0].legend(fontsize="small")
-    unlimited = IDEAL_6.run(runs, ON, jacobi, "device.torque_limit=500.0").record.end
+    unlimited = IDEAL_6.run(runs, ON, jacobi, "device.motor.torque_limit=500.0").record.end
     found = "; ".join(
         f"{system.name}: by up to {jumps[system, 'Jacobi, printed gains']:.2g} N.m a tick "
         f"({jumps[system, 'Gauss-Seidel, printed gains']:.1e} under Gauss-Seidel, "

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hapticlink.analysis.findings.workspace import lines
-from hapticlink.components.specs.device import Device
 from hapticlink.visualization.mechanism.workspace_drawing import draw
+from tests.devices import device
 from tests.shared_fixtures import status
 
 FAR = ("--set", "linkage.start.float=[0.22, 0.0, 0.0]")
@@ -25,7 +25,7 @@ def test_info_tells_and_draws_it(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_a_start_outside_is_told_by_info_and_by_a_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert OUTSIDE in list(lines(Device(), (0.22, 0.0, 0.0)))[-1]
+    assert OUTSIDE in list(lines(device(), (0.22, 0.0, 0.0)))[-1]
     assert status("run", "single-body", "--no-figures", "--out", tmp_path, *FAR) == 0
     assert OUTSIDE in capsys.readouterr().out
 
@@ -49,10 +49,10 @@ def test_a_start_inside_a_contact_is_told_by_info_and_by_a_run(
 
 def test_the_drawing_shows_the_device_at_the_start_with_units() -> None:
     start = (0.04, 0.01, 0.5)
-    (axes,) = draw(Device(), start, "title").axes
+    (axes,) = draw(device(), start, "title").axes
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_title()) == ("x (m)", "y (m)", "title")
     lines = {line.get_label(): np.transpose(line.get_data()) for line in axes.get_lines()}
     np.testing.assert_allclose(lines["handle where the scene starts"], [start[:2]])
     half = 0.04 * np.array([np.cos(0.5), np.sin(0.5)])
-    ends = [np.subtract(start[:2], half), np.add(start[:2], half)]
-    np.testing.assert_allclose(lines["crank"], ends)
+    crank = [start[:2] + way * half for way in (-1, 0, 1)]
+    np.testing.assert_allclose(lines["body of the handle"], crank)

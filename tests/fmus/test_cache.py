@@ -161,7 +161,7 @@ def test_a_cache_that_cannot_be_written_is_told_and_done_without(place, room, ca
 
 def test_processes_of_two_machines_end_with_one_whole_file(place, room, monkeypatch):
     """Their locks do not see each other."""
-    monkeypatch.setattr(cache, "_exclusively", lambda *_: nullcontext())
+    monkeypatch.setattr(cache, "exclusively", lambda *_: nullcontext())
     paths, together = [], threading.Barrier(4)
 
     def race() -> None:

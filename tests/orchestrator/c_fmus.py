@@ -101,6 +101,61 @@ def event_fmu3(folder: Path, varies: bool = True, token: str = "") -> Path:
     return packed(folder / "events.fmu", "event_fmu3.c", description)
 
 
+OUTPUTS = ("falls", "alarms", "seen", "completed", "entered", "beyond")
+PARAMETERS = {"k": 2.0, "level": 0.5, "top": 1.0, "every": 0.0, "w": 0.0, "mode": 0.0, "from": 0.1}
+
+
+def equations_fmu(folder: Path, fmi: str = "2", completes: bool = False) -> Path:
+    """The FMU of equations_fmu.c, for model exchange. completes: it is told of completed steps."""
+    about = [
+        ("x", "output", "continuous", "exact", 1.0),
+        ("der(x)", "local", "continuous", "calculated", None),
+        ("u", "input", "continuous", None, 0.0),
+        *((n, "parameter", "tunable", "exact", start) for n, start in PARAMETERS.items()),
+        *((name, "output", "discrete", "calculated", None) for name in OUTPUTS),
+    ]
+    rows = []
+    for k, (name, causality, variability, initial, start) in enumerate(about):
+        if name == "w":
+            causality, variability, initial = "input", "discrete", None
+        inner = "".join(
+            f' {key}="{value}"'
+            for key, value in (
+                ("start", start),
+                ("derivative", (k if fmi == "2" else 0) if name == "der(x)" else None),
+            )
+            if value is not None
+        )
+        outer = (
+            f'name="{name}" valueReference="{k}" causality="{causality}" '
+            f'variability="{variability}"' + (f' initial="{initial}"' if initial else "")
+        )
+        if fmi == "2":
+            rows.append(f"<ScalarVariable {outer}><Real{inner}/></ScalarVariable>")
+        else:
+            rows.append(f"<Float64 {outer}{inner}/>")
+    shown = (0, *range(len(about) - len(OUTPUTS), len(about)))
+    if fmi == "2":
+        outputs = "".join(f'<Unknown index="{k + 1}"/>' for k in shown)
+        text = description2(
+            "equations", "".join(rows), outputs, canGetAndSetFMUstate="true",
+            completedIntegratorStepNotNeeded=str(not completes).lower(),
+        )  # fmt: skip
+        derivatives = '</Outputs><Derivatives><Unknown index="2"/></Derivatives>'
+        text = text.replace("</Outputs>", derivatives)
+        text = text.replace('guid="', 'numberOfEventIndicators="1" guid="')
+    else:
+        text = description3(
+            "equations", "".join(rows), shown, canGetAndSetFMUState="true",
+            needsCompletedIntegratorStep=str(completes).lower(),
+        )  # fmt: skip
+        more = '<ContinuousStateDerivative valueReference="1"/>'
+        last = '<EventIndicator valueReference="0"/></ModelStructure>'
+        text = text.replace("</ModelStructure>", more + last)
+    text = text.replace("CoSimulation", "ModelExchange")
+    return packed(folder / "equations.fmu", "equations_fmu.c", text, f"-DFMI={fmi}")
+
+
 TOLD = ("stop", "tolerance", "ramp", "forward")
 
 

@@ -9,10 +9,16 @@ import pytest
 import hapticlink as hl
 from benchmarks import sweep
 
+FORMS = [
+    ("sweep", 12.0, "3"),
+    ("one by one", 15.0, "6"),
+    ("runs alone", 36.0, "6"),
+    ("FMPy", 18.0, ""),
+]
 ROWS = [
     {"key": key, "form": form, "point_ms": f"{point}", "loop_ms": loop}
     for key in sweep.KEYS
-    for form, point, loop in (("sweep", 12.0, "6"), ("runs alone", 36.0, "6"), ("FMPy", 18.0, ""))
+    for form, point, loop in FORMS
     if form != "FMPy" or key in ("gains", "hand", "start")
 ]
 IMPORTS = {"key": "imports", "form": "a worker", "point_ms": "600", "loop_ms": ""}
@@ -21,7 +27,8 @@ IMPORTS = {"key": "imports", "form": "a worker", "point_ms": "600", "loop_ms": "
 def test_its_page_has_the_ratios_of_its_rows() -> None:
     page = sweep._page([*ROWS, IMPORTS], "hapticlink bench sweep", 0.5)
     assert "takes 2.00 to 2.00 times what its event loop takes" in page
-    assert "FMPy takes 1.50 to 1.50 times as long for one" in page
+    assert "eight runs side by side go through 2.00 to 2.00 times as fast" in page
+    assert "FMPy takes 1.50 to 1.50 times as long for a point" in page
     assert "as long as 50 points" in page
     assert "load average of 0.5" in page
     assert "| rates | runs alone | 36.0 | 6.00 |" in page

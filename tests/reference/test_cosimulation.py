@@ -60,7 +60,7 @@ def test_two_formulations_and_integrators_agree(name):
     [
         (LOOP, "controller.topology=false", 0.25),
         (LOOP, "controller.bias=full", 0.25),
-        (LOOP, "device.handle_mass=0.121", 1.0),  # felt from the change of mode on
+        (LOOP, "device.body.crank.mass=0.121", 1.0),  # felt from the change of mode on
         (CONTACT, "controller.bias=none", 0.25),
         (CONTACT, "controller.contact=false", 1.0),
         (CONTACT, "contacts.damping=250.0", 1.0),

@@ -33,7 +33,8 @@ REFUSING = (
 CLAIMS = re.compile(
     r"\b(stable|unstable|marginal|passive|margins?|remedy|diverge[sd]?|generat\w+|dissipat\w+|"
     r"drifts?|vibrat\w+|grows?|decays?|at least|at most|up to|always|never|none|nothing|no|"
-    r"every\w*|all|only|cannot|by itself|because|enough|the same|agree|steady|warning)\b",
+    r"every\w*|all|only|cannot|by itself|because|enough|the same|agree|steady|warning|less|than|"
+    r"whatever|would|decides?|follows|down to|not held|not seen)\b",
     re.IGNORECASE,
 )
 WORDS = 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 from unittest.mock import Mock
@@ -11,10 +12,12 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.findings.report_premises import describe_experiment
-from hapticlink.analysis.findings.summary import describe_work
+from hapticlink.analysis.findings.summary import _lacking, _percent, describe_work
 from hapticlink.analysis.stability.frozen_nonlinearities import describe_switches
 from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
+from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.tune.tuning_result import Tuned
@@ -31,8 +34,8 @@ def verdict(*cases: tuple[str, str, float, str, str]) -> Stability:
         for pose, hand, growth, said, kind in cases
     )
     return Stability(
-        "", Mock(), (), dict.fromkeys(HANDS), of, {}, max(of, key=lambda c: (c.rank, c.growth)),
-        Margin(2.0, None, None), (), (),
+        "", Bounds(), (), dict.fromkeys([case.hand for case in of]), of, {},
+        max(of, key=lambda c: (c.rank, c.growth)), Margin(2.0, None, None), (), (),
     )  # fmt: skip
 
 
@@ -46,10 +49,23 @@ def test_a_verdict_of_drift_names_the_hands_that_drift() -> None:
         "drifts slowly in 1 of 3 hands, and marginal in 1, 1 pose: drift of 0.4 Hz "
         "grows at 0.08 1/s in light touch at 0 s"
     )
+    assert found.record()["worst"]["hand"] == "light touch"
     shakes = verdict(drifts, marginal, ("0 s", "stiff arm", 0.5, "unstable", "oscillation"))
     assert shakes.finding.startswith("unstable: oscillation of 0.4 Hz grows at 0.5 1/s")
     calm = verdict(("0 s", "light touch", -0.1, "stable", "drift"), marginal)
     assert calm.finding.startswith("stable in 1 of 2 hands and marginal in the others, 1 pose")
+
+
+def test_a_free_handle_in_which_nothing_grows_may_come_to_rest() -> None:
+    """Under a constant wrench, where its linkage is stretched."""
+
+    def said(growth: float, word: str) -> str:
+        held = ("0 s", "light touch", -1.0, "stable", "oscillation")
+        return verdict(held, ("0 s", FREE, growth, word, "drift")).finding
+
+    assert said(-0.5, "stable").startswith("not held: in free air small motions do not grow; ")
+    assert "small motions neither grow nor decay; " in said(0.0, "marginal")
+    assert "in free air it drifts at 0.1 1/s" in said(0.1, "unstable")
 
 
 def test_a_verdict_says_for_what_it_is_and_what_it_left_out() -> None:
@@ -93,12 +109,6 @@ def holding(x: float, y: float, theta: float) -> dict[str, Any]:
     ("scene", "broken", "remedied", "said"),
     [
         ("closed-loop-ideal", holding(0.08, *START[1:]), holding(*START), "begins with a pull of"),
-        (
-            "closed-loop-ideal",
-            holding(*START[:2], START[2] + math.tau),
-            holding(*START),
-            "begins a whole turn from the handle's angle",
-        ),
         (
             "obstacles",
             {"contacts.stiffness": 1e8},
@@ -211,3 +221,34 @@ def test_what_differs_from_the_report_is_named_and_nothing_else() -> None:
     assert "no encoders and no observer" in said("closed-loop", {"sensing": "ideal"})
     assert "pulled at every joint" in said("closed-loop", {"graphics.sync": "joint"})
     assert said("closed-loop-direct", {}) == ""
+
+
+@pytest.mark.parametrize(("limit", "there"), [(0.02, True), (5.0, False)])
+def test_a_hand_feels_less_only_where_motors_reach_their_limit(limit: float, there: bool) -> None:
+    options = {"device.motor.torque_limit": limit, "duration": 0.5, "stop_when": ""}
+    run = hl.run("closed-loop-ideal", options, figures=False)
+    assert ("the hand felt less than the controller asked for" in str(run)) == there
+
+
+def test_the_workspace_is_not_seen_only_without_its_margin() -> None:
+    run = hl.run("closed-loop-ideal", {"duration": 0.02}, figures=False)
+    swapped = replace(run.record, replaced={"haptic_device": Mock()})
+    told = "haptic_device has no workspace_margin: that the handle leaves its workspace is not seen"
+
+    def said(names: Sequence[str]) -> bool:
+        kept = run.tables["haptics"]
+        rows = kept.rows[:, [kept.columns.index(name) for name in names]]
+        tables = {**run.tables, "haptics": replace(kept, columns=tuple(names), rows=rows)}
+        return told in _lacking(Mock(record=swapped, tables=tables))
+
+    columns = run.tables["haptics"].columns
+    assert not said(columns)
+    assert said([name for name in columns if name != "haptic_device.workspace_margin"])
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(0.0234, "about 2.3 %"), (8.4, "about 840 %"), (12.0, "more than 1000 %")],
+)
+def test_a_change_by_a_step_is_a_number_up_to_a_bound(share: float, said: str) -> None:
+    assert _percent("about", share) == said

@@ -21,7 +21,8 @@ export function text(value, unit) {
   if (unit === "count" || !size) return unit === "count" ? String(value) : `0 ${unit}`;
   if (unit === "1") return value.toFixed(2);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
-  return `${size && size < 0.01 ? value.toExponential(0) : value.toFixed(digits)} ${unit}`;
+  const [small, large] = [size < 0.01, size >= 1e4];
+  return `${small || large ? value.toExponential(large ? 1 : 0) : value.toFixed(digits)} ${unit}`;
 }
 
 // A colour of the page, which differs in the dark.

@@ -1,5 +1,6 @@
 // How a run ended that did not go on: its cause in a line, and the last moments in slow motion.
 const LAST = 0.2, SLOWER = 10; // s that are shown again, and how much slower
+export const DIVERGED = /not finite|diverge/i; // in the cause of a run that did
 
 export class Ending {
   constructor(host, again) {
@@ -18,7 +19,7 @@ export class Ending {
 
   // Says why, and which of two runs it was; the page goes on when the last moments have been shown.
   show(why, run) {
-    const diverged = /not finite|diverge/i.test(why), t = this.frames.at(-1)?.t ?? 0;
+    const diverged = DIVERGED.test(why), t = this.frames.at(-1)?.t ?? 0;
     const word = document.createElement("b");
     const ended = `${diverged ? "diverged" : "ended"} at ${t.toFixed(2)} s`;
     word.textContent = run ? `${run} ${ended}` : ended[0].toUpperCase() + ended.slice(1);

@@ -1,5 +1,6 @@
 // What a scene shows first whose mechanism runs at the graphics rate: that rate, what it does to the handle, and a remedy.
 import { RATES } from "./controls.js";
+import { DIVERGED } from "./ending.js";
 import { scaled } from "./presets.js";
 import { set } from "./settings.js";
 import { Swings } from "./swings.js";
@@ -21,6 +22,7 @@ export function firstMinute(controls) {
 // What is said of the handle, and in which light: of its vibration, the hand's force, whether it was watched for long
 // enough, and whether the run has ended.
 export function felt(vibration, force, watched, ended) {
+  if (DIVERGED.test(ended)) return ["The motion grew beyond all bounds: see the slow motion. Then it begins anew.", "red"];
   if (ended) return ["The run has ended: the line above the picture says why.", "red"];
   if (vibration) return [`The handle vibrates (red trace): ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`, "red"];
   if (!force.some(Boolean)) return ["No hand pulls: press on the picture and drag.", ""];

@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from itertools import cycle
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from hapticlink.analysis.findings.forces import WRENCHES, torques, wrenches
+from hapticlink.analysis.findings.forces import (
+    WRENCHES,
+    motor_loads,
+    torque_limits,
+    torques,
+    wrenches,
+)
 from hapticlink.analysis.findings.tracking import UserSignals, find_users
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
@@ -36,10 +40,18 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     largest, (_, force, _) = max(drawn.items(), key=lambda item: item[1][1].max())
     title = f"The largest force is that of the {largest}: {short(force.max())} N"
     labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]
-    limits = {user: device.torque_limit for user, device in devices.items()}
-    if driven:
-        share = 100 * max(np.abs(tau).max() / limits[user] for user, (_, *tau) in driven.items())
-        title += f"; motors reach {short(share)} % of their torque limit"
+    limits = {
+        user: torque_limits(results, device, UserSignals.of(user))
+        for user, device in devices.items()
+    }
+    loads = [
+        load.max(initial=0.0)
+        for user, device in devices.items()
+        for _, load in [motor_loads(results, device, UserSignals.of(user)) or (None, None)]
+        if load is not None
+    ]
+    if loads:
+        title += f"; motors reach {short(100 * max(loads))} % of their torque limit"
     figure, axes = titled_axes(results, title, "time (s)", *labels)
     styles = dict(zip([user.name for user in find_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
@@ -54,9 +66,11 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
         for i, each in enumerate(tau):
             label = None if user else f"motor {i + 1}"
             axes[2].plot(time, each, lw=1, color=CURVES[i], ls=styles[user], label=label)
-        for sign in (-1, 1):
-            label = None if user or sign < 0 else "limit"
-            axes[2].axhline(sign * limits[user], color="k", lw=0.8, ls="--", label=label)
+        known = limits[user]
+        ends = () if known is None else {sign * limit for limit in known for sign in (-1, 1)}
+        for end in sorted(ends):
+            label = None if user or end != max(ends) else "limit"
+            axes[2].axhline(end, color="k", lw=0.8, ls="--", label=label)
     if driven:
         legend_above_curves(axes[2], columns=5)
     return figure

@@ -21,6 +21,7 @@ from hapticlink.analysis.findings.forces import WRENCHES, touching, wrenches
 from hapticlink.analysis.findings.tracking import (
     constraint_counts,
     count_constrained,
+    find_handle,
     find_users,
     of_block,
     of_port,
@@ -39,7 +40,7 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
-from hapticlink.orchestrator.results.recorded_scene import all_devices, scene_part
+from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import (
@@ -89,7 +90,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
     counted = count_constrained(results)
     # an SSP has the block, but not its description
-    linkage, devices = scene_part(results, "linkage", Linkage), all_devices(results)
+    linkage, devices = scene_part(results, "linkage", Linkage), described_devices(results)
     size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
     if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
         q = table[JOINT_COORDINATES]
@@ -100,7 +101,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if of_port(results, POINT_POSE):
         if "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
-        if of_port(results, HANDLE_POSE):
+        if of_port(results, find_handle(results)):
             drawn_by["distance"] = partial(_distance, results)
     if forced:
         drawn_by["forces"] = partial(forces, results, devices)
@@ -126,7 +127,7 @@ def files(results: Results, formats: Sequence[str]) -> Iterator[tuple[str, bytes
 def _mechanism(results: Results, linkage: Linkage, q: Vector, port: UserPort | None) -> Figure:
     marked = episodes(results)
     figure, axes = titled_axes(results, _finding(results, marked, port), "x (mm)", "y (mm)")
-    contacts, devices = scene_part(results, "contacts", Contacts), all_devices(results)
+    contacts, devices = scene_part(results, "contacts", Contacts), described_devices(results)
     starts: list[Vector] = []
     ends: list[Vector] = []
     for (label, style, path), colour in zip(_paths(results), cycle(CURVES)):
@@ -159,7 +160,7 @@ def _finding(results: Results, marked: Sequence[Episode], port: UserPort | None)
     """The tracking error, how far the operational point moved, how often the number of constrained
     directions was unusual, and what the rendering generated."""
     parts = [f"motion of the operational point up to {short(_reach(results))} mm from its start"]
-    if of_port(results, HANDLE_POSE):
+    if of_port(results, find_handle(results)):
         time, apart, _ = pose_error(results)
         at = short(float(time[apart.argmax()]))
         parts.insert(0, f"tracking error up to {short(apart.max())} mm, at {at} s")
@@ -175,7 +176,7 @@ def _finding(results: Results, marked: Sequence[Episode], port: UserPort | None)
 
 def _reach(results: Results) -> float:
     """How far (mm) the operational point, or the handle without it, was from its start."""
-    signal = POINT_POSE if of_port(results, POINT_POSE) else HANDLE_POSE
+    signal = POINT_POSE if of_port(results, POINT_POSE) else find_handle(results)
     _, path = _place(results, signal)
     return float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0))
 
@@ -195,7 +196,7 @@ def _arrow(results: Results, axes: Axes) -> None:
 
 def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
     """The largest force of the hand (N), when (s), its components and where it acted (m)."""
-    force, handle = of_port(results, HAND_WRENCH), of_port(results, HANDLE_POSE)
+    force, handle = of_port(results, HAND_WRENCH), of_port(results, find_handle(results))
     handle = handle or of_port(results, POINT_POSE)
     if not (force and handle):
         return None
@@ -241,7 +242,7 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
         (label, style, curve(*_place(results, signal))[1])
         for signal, label, style in (
             (POINT_POSE, "operational point x_S", "-"),
-            (HANDLE_POSE, "handle x_D", "--"),
+            (find_handle(results), "handle x_D", "--"),
             *further,
         )
         if of_port(results, signal)
@@ -250,7 +251,7 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
 
 def _trajectories(results: Results) -> Figure:
     paths = _paths(results)
-    if of_port(results, HANDLE_POSE):
+    if of_port(results, find_handle(results)):
         apart = short(pose_error(results).distance_mm.max())
         title = f"Handle and operational point at most {apart} mm apart"
     else:

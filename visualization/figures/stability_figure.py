@@ -15,16 +15,17 @@ COLOURS = {"stable": "tab:green", "marginal": "0.6", "unstable": "tab:red", "dri
 
 
 def draw(found: Stability) -> Figure:
-    """A table of growth rates, hands by poses, coloured by the verdict of each."""
+    """A table of growth rates, hands by poses, with the verdict of each that is not stable."""
     poses = list(dict.fromkeys(case.pose for case in found.cases))
     hands = list(dict.fromkeys(case.hand for case in found.cases))
-    figure = Figure(figsize=(3.2 + 1.5 * len(poses), 1.6 + 0.36 * len(hands)), layout="constrained")
+    figure = Figure(figsize=(3.2 + 1.5 * len(poses), 1.6 + 0.42 * len(hands)), layout="constrained")
     axes: Axes = figure.subplots()
     for case in found.cases:
         said = "drift" if case.drifts else case.verdict
         x, y = poses.index(case.pose), hands.index(case.hand)
         axes.fill_between([x, x + 1], y, y + 1, color=COLOURS[said], alpha=0.45, lw=0)
         text = f"{case.growth:.2g} 1/s" + (f", {case.hertz:.2g} Hz" if case.hertz else "")
+        text += f"\n{said}" if said != "stable" else ""
         axes.text(x + 0.5, y + 0.5, plain(text), ha="center", va="center", fontsize="small")
     axes.set_xticks(np.arange(len(poses)) + 0.5, [fill(pose, 16) for pose in poses])
     axes.set_yticks(np.arange(len(hands)) + 0.5, hands)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from hapticlink.analysis.transparency.mobility_at_hand import FORCE, HERTZ, Transparency
 from hapticlink.orchestrator.results.numbers import short
+from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import headline
 
 
@@ -20,14 +21,16 @@ def draw(found: Sequence[Transparency]) -> Figure:
     figure = Figure(figsize=(4.2 * (2 + shown), 3.8), layout="constrained")
     felt, error, *third = figure.subplots(1, 2 + shown)
     for i, pose in enumerate(found):
+        colour = CURVES[i % len(CURVES)]
         for j, direction in enumerate(pose.free):
-            style = {"color": f"C{i}", "ls": ("-", "--", ":")[j]}
+            style = {"color": colour, "ls": ("-", "--", ":")[j]}
             name = f"{pose.pose}, {direction.inertia:.3g} kg"
             felt.semilogx(HERTZ, direction.felt.real / direction.inertia, label=name, **style)
             error.loglog(HERTZ, 100 * direction.error, **style)
         for constraint in pose.constrained if shown else ():
-            third[0].loglog(HERTZ, constraint.stiffness, color=f"C{i}", label=pose.pose)
+            third[0].loglog(HERTZ, constraint.stiffness, color=colour, label=pose.pose)
     felt.axhspan(1 - FORCE, 1 + FORCE, color="0.9", zorder=0)
+    felt.text(HERTZ[0], 1.01 - FORCE, "within what a person can tell", fontsize="small")
     felt.set_ylabel("felt inertia / that of the mechanism")
     felt.legend(fontsize="small")
     error.axhline(100 * FORCE, color="tab:red", lw=1.0)

@@ -11,9 +11,10 @@ from matplotlib.lines import Line2D
 from hapticlink.analysis.maps.z_width import AT_LEAST, PASSIVE, QUIET, STABLE
 from hapticlink.analysis.sweep.grid import Axis, number
 from hapticlink.analysis.sweep.row import Row
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.curve_colours import CURVES
-from hapticlink.visualization.figure_axes import plain
-from hapticlink.visualization.figures.sweep_figure import axis
+from hapticlink.visualization.figure_axes import headline, plain
+from hapticlink.visualization.figures.sweep_figure import axis, unit, words
 
 STYLES = {
     STABLE: ("-", "stable in its own hand"),
@@ -61,9 +62,28 @@ def draw(rows: Sequence[Row], key: str, axes: Sequence[Axis]) -> Figure:
     across, up = (axis(name.replace(".start.", ".")) for name in (x.key, key))
     panel.set(xlabel=across, ylabel=f"largest {up}", yscale="log")
     panel.grid(visible=True, which="both", lw=0.3)
+    headline(panel, finding(rows, [a.key for a in axes]), 90)
     columns = 1 if any(len(str(one.get_label())) > WIDEST for one in handles) else 2
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize="small")
     return figure
+
+
+def finding(rows: Sequence[Row], keys: Sequence[str]) -> str:
+    """A title with the smallest and the largest value with which it is stable, each with its point,
+    and at how many points nothing that was tried is."""
+    limits = [row for row in rows if row.get(f"largest_{STABLE}")]
+    few = f"nothing stable found at {len(rows) - len(limits)} of {len(rows)} points"
+    if not limits:
+        return few.capitalize()
+
+    def said(row: Row) -> str:
+        point = ", ".join(f"{words(key)} = {row[key]} {unit(key)}".rstrip() for key in keys)
+        at_least = "at least " if row[STABLE] == AT_LEAST else ""
+        return f"{at_least}up to {short(row[f'largest_{STABLE}'])} at {point}"
+
+    low, high = (end(limits, key=lambda row: row[f"largest_{STABLE}"]) for end in (min, max))
+    parts = [f"Stable {said(low)}", *([said(high)] if high is not low else [])]
+    return "; ".join([*parts, *([few] if len(limits) < len(rows) else [])])
 
 
 def _place(x: Axis, row: Row) -> float:

@@ -12,7 +12,11 @@ from hapticlink.analysis.findings import labels
 from hapticlink.components.specs.linkage import NO_POINT
 from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, MECHANISM, block_of_user
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.changes import OPERATIONAL_POINT, choices_of_slower
+from hapticlink.orchestrator.system.changes import (
+    OPERATIONAL_POINT,
+    choices_of_slower,
+    result_after,
+)
 from hapticlink.orchestrator.system.springs import find_limited_gains
 from hapticlink.orchestrator.system.system import System
 from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
@@ -57,8 +61,10 @@ class Offered:
         of = dict.fromkeys(labels.block(f.name) or f.name for f in fmus)
         self._of = " and ".join(of)
         self.rate = scene.graphics.rate if scene.graphics and fmus else None
-        haptics = 1 / (system.timeline.clocks[0].longest * system.timeline.base)
-        self._ranges = {**ranges, "graphics": (ranges["graphics"][0], float(haptics))}
+        most = float(1 / (system.timeline.clocks[0].longest * system.timeline.base))
+        if late := result_after(system, CLOCK):
+            most = min(most, 1 / late)
+        self._ranges = {**ranges, "graphics": (ranges["graphics"][0], most)}
 
     @property
     def own_rate(self) -> float | None:

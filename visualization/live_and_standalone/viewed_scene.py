@@ -9,6 +9,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import HAND, block_of_user
+from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -19,9 +20,10 @@ DURATION = 600.0
 
 
 def load_viewed_scene(name: str, options: Options = (), duration: float = DURATION) -> Scene:
-    """The scene with a spring hand for each user that pulls nowhere yet, of compiled FMUs if the
-    options say nothing else, and without its end at the border of the workspace. Raises InputFault
-    for a scene without a linkage, or one that has an FMU of the user's in place of a hand."""
+    """The scene with a spring hand for each user without a board that pulls nowhere yet, of
+    compiled FMUs if the options say nothing else, and without its end at the border of the
+    workspace. Raises InputFault for a scene without a linkage, or one that has an FMU of the user's
+    in place of a hand."""
     if open_scene.load(name, options).linkage is None:
         raise InputFault(
             f"{name}: has no [linkage], so that there is nothing to take hold of; view shows "
@@ -40,11 +42,19 @@ def load_viewed_scene(name: str, options: Options = (), duration: float = DURATI
         "target": [[0.0, 0.0, 0.0, 0.0]],
     }
     record = {"signals": "all"}  # what is not recorded is not read from its FMU
-    changes: dict[str, object] = {"hand": hand, "duration": duration, "record": record}
-    changes |= {f"hands.{user}": hand for user in read.devices}
+    changes: dict[str, object] = {"duration": duration, "record": record}
+    moved = [user for user in ("", *read.devices) if not driver_of(read, user)]
+    changes |= {f"hands.{user}" if user else "hand": hand for user in moved}
     if read.stop_when is None and read.ends_when:
         changes["stop_when"] = ""
     return open_scene.load(read, changes)
+
+
+def simulated(scene: Scene) -> Scene:
+    """The scene without boards, as a verdict takes it."""
+    boards = {f"{'devices.' + u if u else 'device'}.driver.port": "" for u in scene.all_devices
+              if driver_of(scene, u)}  # fmt: skip
+    return open_scene.load(scene, boards) if boards else scene
 
 
 def pack_scene(scene: Scene) -> bytes:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.real_time_session import LiveRun
+from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.system.changes import OPERATIONAL_POINT, choices_between_rates
 from hapticlink.visualization.live_and_standalone.offered_controls import (
     CLOCK,
@@ -105,6 +106,8 @@ class Controls:
 
     def _pull(self, user: str, at: tuple[float, float] | None) -> None:
         _require(user, self._pulling)
+        if driver_of(self._live.scene, user):  # which somebody's own hand moves
+            return
         if at is not None:
             self._live.set(target(user), (*at, 0.0))
         pulling = at is not None

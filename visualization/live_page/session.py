@@ -15,11 +15,12 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
+from hapticlink.orchestrator.scene.blocks import described_devices, driver_of
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.visualization.live_and_standalone import first_messages
 from hapticlink.visualization.live_and_standalone.offered_controls import Settings, target
-from hapticlink.visualization.live_and_standalone.viewed_scene import pack_scene
+from hapticlink.visualization.live_and_standalone.viewed_scene import pack_scene, simulated
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.frames import FrameReader
@@ -76,7 +77,7 @@ class LiveSession:
         """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has
         ended, which raises Fault."""
         scene = self._scene
-        drawing = (scene.linkage, scene.all_devices, scene.contacts)
+        drawing = (scene.linkage, described_devices(scene), scene.contacts)
         self._say("opening", title=scene.title, picture=drawing)
         with self._before:  # it ends where the first run begins
             took = self._before.enter_context(record_duration(f"{scene.title}: FMUs of its page"))
@@ -148,8 +149,9 @@ class LiveSession:
         self._frames, self._controls = FrameReader(live), Controls(live, self._settings)
         self._controls.restore()
         scene = self._scene
-        self._held = {target(user): at for user, at in self._frames.handles(live).items()}
-        self._packed = pack_scene(scene)
+        at = self._frames.handles(live)
+        self._held = {target(user): at[user] for user in at if not driver_of(scene, user)}
+        self._packed = pack_scene(simulated(scene))
         self._link.send(first_messages.describe_viewed_run(scene, live.system, live.energies()))
         self._tell_controls()
         if self._state["paused"]:

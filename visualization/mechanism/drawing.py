@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hapticlink.orchestrator.scene.scene import Scene
+    from hapticlink.orchestrator.scene.blocks import described_devices
+from hapticlink.orchestrator.scene.scene import Scene
 
 Coordinates = Sequence[float] | NDArray[np.float64]
 """Joint coordinates of a linkage (m, rad)."""
@@ -102,8 +103,9 @@ def figure(scene: Scene, q: Coordinates) -> Figure:
     drawn = Figure(figsize=(6.4, 5.6), layout="constrained")
     axes = drawn.add_subplot()
     assert scene.linkage is not None
-    draw(axes, scene.linkage, q, None, scene.contacts, scene.device)
-    picture = Picture(scene.linkage, scene.all_devices, None)
+    devices = described_devices(scene)
+    draw(axes, scene.linkage, q, None, scene.contacts, devices.get(""))
+    picture = Picture(scene.linkage, devices, None)
     arms = (mark for mark in picture.marks if mark.role == "device")
     paint(axes, arms, picture.at_rest(q))
     headline(axes, f"{scene.title} at the start", 70)

@@ -37,7 +37,7 @@ SHOWN = {
 """By name in a frame, the output that it is, the first that the scene has."""
 OF_USER = {
     "x": (POINT_POSE,),
-    "handle": (HANDLE_POSE, POINT_POSE),
+    "handle": (HANDLE_POSE, *MEASURED_HANDLE_POSES, POINT_POSE),
     "F_hand": (HAND_WRENCH,),
     "F_drift": (DRIFT_WRENCH,),
     "F_constraint": (TOPOLOGY_WRENCH,),

@@ -6,14 +6,16 @@ It is the one description of figures, live page, replays and animations. Their p
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.episodes import EPISODES
+from hapticlink.components.device.workspace import drawn_lines
 from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Body, Linkage
 
 Point = Sequence[float]
@@ -104,15 +106,16 @@ class Mark(NamedTuple):
 
 
 def marks(
-    linkage: Linkage, contacts: Contacts | None = None, devices: Iterable[str] = ()
+    linkage: Linkage, contacts: Contacts | None = None, devices: Mapping[str, Device] | None = None
 ) -> list[Mark]:
-    """All that frames of a linkage can show, from back to front; devices: the users who have one,
-    by their points, the first one's name is empty."""
+    """All that frames of a linkage can show, from back to front; devices: of the users who have
+    one, by their points, the first one's name is empty."""
+    devices = devices or {}
     users = ["", *(point.name for point in linkage.point)]
     users = [user for user in users if not user or user in [*devices]]
     return [
         *obstacles(contacts),
-        *(mark for user in devices for mark in _arms(user)),
+        *(mark for user, device in devices.items() for mark in _arms(user, device)),
         *(_directions(user) for user in users),
         *_slides(linkage),
         *_springs(linkage),
@@ -272,14 +275,16 @@ def _points(linkage: Linkage) -> Iterator[Mark]:
                    label=f"point {point.name}")  # fmt: skip
 
 
-def _arms(user: str) -> Iterator[Mark]:
-    """Of each arm base joint, elbow and crank end."""
+def _arms(user: str, device: Device) -> Iterator[Mark]:
+    """Each link of a device, from pin to pin."""
     saturated = state("saturated", user)
     for stroke, when in (("#bfbfbf", ""), (KINDS["saturated"][0], saturated)):
-        for i in range(0, 12, 3):
-            at = (*(Place((*_of(user), "arms", i + k)) for k in range(3)),)
-            label = "" if i or user or when else "arms of the device"
+        first = 0
+        for line in drawn_lines(device):
+            at = (*(Place((*_of(user), "arms", first + k)) for k in range(len(line))),)
+            label = "" if first or user or when else "arms of the device"
             yield Mark("device", "line", at, stroke, width=1.8, label=label, when=when)
+            first += len(line)
 
 
 def _directions(user: str) -> Mark:

@@ -1,6 +1,6 @@
-"""What is drawn of a frame: poses of the bodies and of the devices' arms, directions, forces in cut
-joints, and what happens in it. All are CasADi functions of the raw signals, so that a page without
-Python evaluates the same, as C."""
+"""What is drawn of a frame: poses of the bodies and of the devices' links, directions, forces in
+cut joints, and what happens in it. All are CasADi functions of the raw signals, so that a page
+without Python evaluates the same, as C."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.episodes import FULL_TORQUE
 from hapticlink.components.device.motors_and_encoders import torque_function
-from hapticlink.components.device.workspace import link_function
+from hapticlink.components.device.workspace import line_function
 from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
@@ -83,7 +83,7 @@ class Picture:
             self.parts.append(_state(user, "contacts", {"gap": gap, "F_env": force}, touching))
         for user, device in devices.items():
             self.parts.append(
-                Part(user, "arms", ("handle",), device.space.pose.shape, link_function(device))
+                Part(user, "arms", ("handle",), device.space.pose.shape, line_function(device))
             )
             self.parts.append(_is_saturated(user, device))
 
@@ -171,8 +171,6 @@ def _state(user: str, kind: str, needs: Mapping[str, ca.SX], holds: ca.SX) -> Pa
 def _is_saturated(user: str, device: Device) -> Part:
     """Whether a motor gives its largest torque."""
     force, pose = (ca.SX.sym(name, device.space.size) for name in ("F_motor", "measured"))
-    torques = torque_function(device)(force, pose)
-    most = FULL_TORQUE * device.torque_limit
-    return _state(
-        user, "saturated", {"F_motor": force, "measured": pose}, ca.norm_inf(torques) >= most
-    )
+    limits = ca.DM([motor.torque_limit for motor in device.motors])
+    loads = ca.norm_inf(torque_function(device)(force, pose) / limits)
+    return _state(user, "saturated", {"F_motor": force, "measured": pose}, loads >= FULL_TORQUE)

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hapticlink.components.device.workspace import Field, links, margin, workspace
+from hapticlink.components.device.workspace import (
+    Field,
+    drawn_lines,
+    lines,
+    margin,
+    motor_points,
+    workspace,
+)
+from hapticlink.components.dynamics.rendered_directions import rendered_directions
 from hapticlink.components.specs.device import Device
 from hapticlink.visualization.figure_axes import headline
 
@@ -29,19 +37,23 @@ def draw(device: Device, start: Pose, title: str) -> Figure:
     space = workspace(device)
     figure = Figure(figsize=(6.4, 5.4), layout="constrained")
     axes = figure.add_subplot()
-    shades = (
-        (space.some, "0.92", "handle at some theta"),
-        (space.every, "0.8", "handle at every theta"),
-    )
+    turns = len(space.theta) > 1
+    shades = [(space.some, "0.92", "handle at some theta" if turns else "handle")]
+    shades += [(space.every, "0.8", "handle at every theta")] if turns else []
     for field, shade, _ in shades:
-        axes.contourf(space.x, space.y, field.T, [0, math.inf], colors=[shade])
-    for i, arm in enumerate(links(device, start)):
-        color, label = (("C0", "arms of plane A"), ("C1", "arms of plane B"))[i // 2]
-        axes.plot(*arm.T, color=color, marker="o", ms=3, label=label if i % 2 == 0 else None)
-        motor = "motors" if i == 0 else None
-        axes.plot(*arm[0], color=color, marker="s", ls="", label=motor)
-    ends = links(device, start)[[0, 2], 2]
-    axes.plot(*ends.T, "k-", lw=3, label="crank")
+        if np.isfinite(field).any() and field.max() >= 0:
+            shown = np.where(np.isfinite(field), field, -1.0)
+            axes.contourf(space.x, space.y, shown.T, [0, math.inf], colors=[shade])
+    drawn = lines(device, start)
+    for line, places in zip(drawn, drawn_lines(device), strict=True):
+        held = any(body == device.handle.body for body, _ in places)
+        look: dict[str, Any] = {"color": "C0", "marker": "o", "ms": 3}
+        look = {"color": "k", "lw": 3} if held else look
+        text = "body of the handle" if held else "links"
+        known = axes.get_legend_handles_labels()[1]
+        axes.plot(*line.T, label=None if text in known else text, **look)
+    for i, at in enumerate(motor_points(device, start)):
+        axes.plot(*at, color="C0", marker="s", ls="", label=None if i else "motors")
     axes.plot(*start[:2], "wo", mec="k", label="handle where the scene starts")
     handles, labels = axes.get_legend_handles_labels()
     handles += [Patch(color=shade) for _, shade, _ in shades]
@@ -59,8 +71,10 @@ def beneath(axes: Axes, device: Device, limits: Field) -> None:
     drawing in mm."""
     x, y = (np.linspace(low, high, 41) for low, high in limits)
     theta = np.linspace(-math.pi, math.pi, 16, endpoint=False)
+    theta = theta if rendered_directions(device.handle).has_moments else theta[:1]
     poses = np.stack(np.meshgrid(x / 1e3, y / 1e3, theta, indexing="ij"), axis=-1)
     most = margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3]).max(axis=2)
     if most.min() < 0:
-        axes.contourf(x, y, most.T, [-math.inf, 0], colors=[BEYOND], zorder=-1)
+        shown = np.where(np.isfinite(most), most, -1.0)
+        axes.contourf(x, y, shown.T, [-math.inf, 0], colors=[BEYOND], zorder=-1)
         axes.plot([], [], "s", color=BEYOND, ms=9, label="outside the device's workspace")

@@ -23,7 +23,7 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_POSE, by_user
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector, load
-from hapticlink.orchestrator.results.recorded_scene import scene_part
+from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization.mechanism.frame_signals import candidates
 from hapticlink.visualization.mechanism.picture import PORT, Picture
 
@@ -75,6 +75,8 @@ class Recorded:
         self.users = [user.name for user in find_users(results)[1:]]
         others = scene_part(results, "devices", Mapping[str, Device]) if self.users else {}
         devices = by_user(device if "handle" in self.signals else None, others or {})
+        described = described_devices(results)
+        devices = {user: own for user, own in devices.items() if user in described}
         self.picture = Picture(linkage, devices, self.contacts)
 
     @property

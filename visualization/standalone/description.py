@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 
 from hapticlink.orchestrator.base.signal_names import CHOSEN_POINT, MECHANISM_ENERGY
+from hapticlink.orchestrator.scene.blocks import described_devices
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.prepared_changes import LEAST_RATE, MOST_DELAY
@@ -36,7 +37,7 @@ class PageDescription:
     def __init__(self, program: Resolved, ports: Sequence[Port], name: str) -> None:
         scene, system = program.scene, program.system
         assert scene.linkage
-        picture = Picture(scene.linkage, scene.all_devices, scene.contacts)
+        picture = Picture(scene.linkage, described_devices(scene), scene.contacts)
         places, offered = _places(program), Offered(scene, system, ranges=PREPARED)
         parts = [p for p in picture.parts if {*p.needs} <= {*places.get(p.user, {})}]
         self.drawing = _drawing(parts, places)

@@ -46,7 +46,7 @@ static int beyond_samples(const Hold *h, const Loop *l, double s, double *value)
 int value_ahead(Hold *h, const Loop *l, int64_t tick, double ahead, double *value) {
     const int64_t last = h->count - 1, *t = h->stamps + last;
     const double past = (double)(tick - *t) + ahead, second = l->numerator / l->denominator;
-    if (past > 0.0 || last == 0) return beyond_samples(h, l, past > 0.0 ? past * second : 0.0, value);
+    if (past >= 0.0 || last == 0) return beyond_samples(h, l, past > 0.0 ? past * second : 0.0, value);
     if (h->relation == WITH_RATE) return value_hermite(h, l, tick, ahead, value);
     if (h->relation == ALONE) return value_first_order(h, l, tick, ahead, value);
     const double *v = h->samples + last * h->width, *v1 = v - h->width, *x = v + h->n, *x1 = v1 + h->n;

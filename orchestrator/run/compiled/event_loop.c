@@ -66,7 +66,7 @@ enum { STRIDE = 64 };
 
 /* The same, without a pace. Reading the clock takes as long as the events of small FMUs, so that it is
  * read once in `stride` events, of which there are more the shorter they are. */
-static int turn_is_due_by_now(Events *e) {
+int turn_is_due_by_now(Events *e) {
     const int signalled = signal_came();
     if (!signalled && ++e->unread < e->stride) return 0;
     const int64_t time = now(), took = time - e->read;
@@ -97,7 +97,7 @@ static int late_event(Loop *l, Events *e) {
 
 /* The next event: e->tick and e->key (whether it is the first; 2 dticks + final of each clock that
  * fires, 0 of the others). DONE after the last. */
-static int next_event(Loop *l, Events *e) {
+int next_event(Loop *l, Events *e) {
     for (;;) {
         for (int64_t i = 0; i < e->n_clocks; i++) {
             Clock *c = e->clocks + i;
@@ -136,7 +136,7 @@ static int next_event(Loop *l, Events *e) {
     }
 }
 
-static void complete(Events *e) {
+void complete_event(Events *e) {
     for (int64_t i = 0; i < e->n_clocks; i++) {
         Clock *c = e->clocks + i;
         if (c->next == c->at) continue;
@@ -159,7 +159,7 @@ int hapticlink_events(Loop *l, Events *e) {
         }
         const int code = hapticlink_block(l, &e->at, e->tick);
         if (code != DONE) return code;
-        complete(e);
+        complete_event(e);
         if (!e->pace) {
             if (turn_is_due_by_now(e)) return PAUSE;
             continue;

@@ -159,24 +159,36 @@ int fmu_save(const Fmu *f, void *get_state, void **state) {
     return ((GetState)get_state)(f->fmu, state);
 }
 
-int fmu_step(Fmu *f, double time, double end, double size, At *at) {
+/* Notes a step that begins. */
+void fmu_begin_step(const Fmu *f, double time, double end, double size) {
     StepState *p = f->place;
     p->time = p->begin = time;
     p->size = size;
     p->end = end;
-    if (p->waiting <= time) return SETTLE;
-    if (p->ended) return CALL;
-    const int64_t begin = f->untimed ? 0 : now();
+}
+
+/* Notes how a step ended, which took `took` ns. */
+int fmu_end_step(Fmu *f, int status, int64_t took, At *at) {
+    StepState *p = f->place;
     at->what = -1;
-    at->status = fmu_do_step(f, time, size);
-    if (!f->untimed) p->step_time += 1e-9 * (double)(now() - begin);
+    at->status = status;
+    if (!f->untimed) p->step_time += 1e-9 * (double)took;
     if (f->kind.python && exception_left()) return RAISED;
     if (++f->n_steps == ALL && p->step_time < 1e-9 * SHORT * ALL) {
         f->untimed = 1;
         p->step_time = 0.0;
     }
     const int cut = f->kind.fmi == 3 && (*f->terminate || *f->early);
-    if (cut || !fmu_succeeded(at->status)) return STEPPED;
-    p->time = end;
+    if (cut || !fmu_succeeded(status)) return STEPPED;
+    p->time = p->end;
     return 0;
+}
+
+int fmu_step(Fmu *f, double time, double end, double size, At *at) {
+    fmu_begin_step(f, time, end, size);
+    if (f->place->waiting <= time) return SETTLE;
+    if (f->place->ended) return CALL;
+    const int64_t begin = f->untimed ? 0 : now();
+    const int status = fmu_do_step(f, time, size);
+    return fmu_end_step(f, status, f->untimed ? 0 : now() - begin, at);
 }

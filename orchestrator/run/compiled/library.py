@@ -30,6 +30,7 @@ def load() -> ctypes.CDLL:
     pointer, integer, number = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
     for name, arguments in {
         "events": (pointer, pointer),
+        "lanes": (pointer,),
         "block": (pointer, pointer, integer),
         "push": (pointer, pointer, integer, integer),
         "value": (pointer, pointer, integer, number, pointer),

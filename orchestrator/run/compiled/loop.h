@@ -344,6 +344,21 @@ typedef struct {
     At at;
 } Events;
 
+/* Takes a step of `n` instances at once; `taken` says which have taken it: fmus/native/lanes.cpp. */
+typedef void StepOfLanes(void *const *instances, int64_t n, double start, double size, int64_t *taken);
+
+enum { MOST_LANES = 8 };
+
+/* Runs of one plan that go through their events together: lanes.c. Which of them the loop returned for;
+ * codes that others wait to return. */
+typedef struct {
+    int64_t n, lane;
+    Loop **loops /* [n] */;
+    Events **events /* [n] */;
+    void **steps /* [n_fmus] */;          /* a StepOfLanes of each FMU, or NULL */
+    int64_t waiting[8];
+} Lanes;
+
 /* Why the loop returns to Python. */
 enum {
     DONE,
@@ -368,6 +383,21 @@ static inline double tick_time(const Loop *l, int64_t tick) { /* s */
     return (double)tick * l->numerator / l->denominator;
 }
 
+/* When a step begins and ends (s): from part `first` to part `last` of `parts` of a tick each, from 0 on. */
+typedef struct {
+    int64_t first, last, parts;
+    double begin, end;
+} StepTimes;
+
+/* Those of operation STEP at a tick, computed where they are others than those of the step before. */
+static inline void locate_step(const Loop *l, const Op *op, int64_t tick, StepTimes *s) {
+    const int64_t first = tick * op->c + op->b, last = first + op->d;
+    if (first == s->first && last == s->last && op->c == s->parts) return;
+    const double whole = l->denominator * (double)op->c;
+    *s = (StepTimes){first, last, op->c, (double)first * l->numerator / whole,
+                     (double)last * l->numerator / whole};
+}
+
 #ifndef EXPORT
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
@@ -383,6 +413,7 @@ static inline int fmu_succeeded(int status) {
 
 /* Those that Python calls: library.py. */
 EXPORT int hapticlink_events(Loop *l, Events *e);
+EXPORT int hapticlink_lanes(Lanes *s);
 EXPORT int hapticlink_block(Loop *l, At *at, int64_t tick);
 EXPORT int hapticlink_push(Hold *h, const double *sample, int64_t published, int64_t arrival);
 EXPORT int hapticlink_value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
@@ -403,9 +434,15 @@ int fmu_get(const Fmu *f, int64_t judged, At *at);
 int fmu_set(const Setter *s, const double *board, At *at);
 int fmu_do_step(const Fmu *f, double time, double size);
 int fmu_save(const Fmu *f, void *get_state, void **state);
+void fmu_begin_step(const Fmu *f, double time, double end, double size);
+int fmu_end_step(Fmu *f, int status, int64_t took, At *at);
 int fmu_step(Fmu *f, double time, double end, double size, At *at);
+int fmu_step_with_halves(Fmu *f, double time, double end, double size, int due, At *at);
 int fmu_checked_step(Fmu *f, double time, double end, double size, At *at);
 int push_sample(const Loop *l, Hold *h, int64_t stamp, int64_t arrival);
+int next_event(Loop *l, Events *e);
+void complete_event(Events *e);
+int turn_is_due_by_now(Events *e);
 int further_points(Clock *c); /* of a clock whose rate was changed; 0 for others */
 int meter_sample(Meter *m, const double *board, int64_t stamp);
 int meter_move(Meter *m, const double *board, int64_t tick);

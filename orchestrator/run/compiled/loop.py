@@ -64,12 +64,16 @@ class Events:
             if clock.name in sides:
                 self._clocks[i].fill(side=sides[clock.name].c)
 
-    def again(self) -> Events:
-        """The same events, from the first one on."""
-        events = Events(self._machine, self._timeline, self._block)
-        events._kinds = self._kinds
-        events.prepare(())
-        return events
+    def begin_again(self) -> None:
+        """Stand at the first event again, with the kinds of events that are known."""
+        c = self._c
+        c.fill(tick=0, events=0, kind=0)
+        c.at.op = -1
+        for i, clock in enumerate(self._clocks):
+            if self._given[i]:
+                self._given[i] = clock.at = 0
+                self._next_window(i)
+            clock.fill(at=0, next=0, last=0)
 
     @property
     def complete(self) -> int:
@@ -85,18 +89,32 @@ class Events:
         loop, here = ctypes.addressof(machine.loop), ctypes.addressof(c)
         c.halt, halted = next(halts, _NO_HALT)
         while code := machine.code(c.at, machine.library.events, loop, here):
-            if code == structures.KIND:
-                self._new_kind()
-            elif code == structures.STARTS:
-                self._next_window(c.at.what)
-            elif code == structures.PAUSE:
+            if code == structures.PAUSE:
                 turn(c.tick)
             elif code == structures.HALT:
                 halted()
                 c.halt, halted = next(halts, _NO_HALT)
             else:
-                machine.serve(code, c.at, c.tick)
+                self.serve(code)
         turn(c.tick)
+
+    def serve(self, code: int) -> None:
+        """Do what the loop returned for, so that it can go on."""
+        if code == structures.KIND:
+            self._new_kind()
+        elif code == structures.STARTS:
+            self._next_window(self._c.at.what)
+        else:
+            self._machine.serve(code, self._c.at, self._c.tick)
+
+    @property
+    def c(self) -> structures.Events:
+        """The structure that the loop works on."""
+        return self._c
+
+    def has_kinds_of(self, other: Events) -> bool:
+        """Whether kinds of events, and their operations, have the same numbers."""
+        return [*self._kinds.items()] == [*other._kinds.items()]
 
     @property
     def next(self) -> int:
@@ -176,6 +194,7 @@ class Events:
     def prepare(self, kinds: Iterable[Event]) -> None:
         """Add the operations of kinds of events, those of `coming` before they occur."""
         self._kinds |= {kind: self._block(kind) for kind in kinds}
+        self._machine.publish()
         keys = [key_of(self._timeline, kind) for kind in self._kinds]
         blocks = np.array([*self._kinds.values()], np.int64)
         self._c.fill(keys=np.array(keys, np.int64), kinds=blocks, n_kinds=len(keys))
@@ -209,10 +228,25 @@ class CompiledLoop:
         self._take(plan)
         self.events.prepare(self.events.coming())
 
+    def goes_with(self, other: CompiledLoop) -> bool:
+        """Whether both have the same operations, under the same numbers."""
+        mine, its = self._machine, other._machine
+        return mine.has_operations_of(its) and self.events.has_kinds_of(other.events)
+
+    @property
+    def structure(self) -> structures.Loop:
+        """What the compiled loop works on."""
+        return self._machine.loop
+
+    @property
+    def fmus(self) -> list[str]:
+        """The FMUs that operations refer to, by number."""
+        return self._machine.names("fmu")
+
     def begin_again(self) -> None:
         """Stand at the first event, with the kinds of events that are known."""
         self._machine.begin_again()
-        self.events = self.events.again()
+        self.events.begin_again()
 
     def run(self, turn: Callable[[int], object], halts: Iterator[Halt] = NO_HALTS) -> None:
         """As `Events.run`."""

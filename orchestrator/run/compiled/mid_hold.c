@@ -11,7 +11,8 @@
  * and e_1 is linear in F. Then W = e'^T Lambda e'/2 + e^T K e does not grow over a step, whatever K, B >= 0 and H:
  * dW = - integral e'^T B e' dt - de^T B de/H.
  *
- * beside: x_far, x_near, v_far, v_near (n each), Lambda^-1 (n x n, row by row). memory: F; begun, span: since which tick. */
+ * beside: x_far, x_near, v_far, v_near (n each), Lambda^-1 (n x n, row by row). memory: F; begun, span: since which tick,
+ * until a later sample, so that what the hold is between two steps does not depend on how long ago the last one was. */
 
 #include "loop.h"
 #include "hold_table.h"
@@ -114,6 +115,11 @@ static void middle(const Hold *h, const Loop *l, double H, double *F) {
         }
     }
     solve(system, F, n);
+}
+
+int push_mid(Hold *h, const double *y, int64_t stamp, int64_t arrival) {
+    if (stamp > h->span) h->begun = h->span = 0;
+    return push_samples(h, y, stamp, arrival);
 }
 
 /* The same for all parts of a step, the first of which is asked for at its middle. */

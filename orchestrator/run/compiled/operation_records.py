@@ -85,19 +85,26 @@ class Machine:
         of_objects = {f"n_{kind}s": len(indices) for kind, indices in self._indices.items()}
         return {**of_objects, "n_ops": len(self._instructions), "n_points": len(self._points)}
 
+    def has_operations_of(self, other: Machine) -> bool:
+        """Whether the operations are those of another simulation, and the numbers of objects."""
+        return self._indices == other._indices and self._instructions == other._instructions
+
     # --- records --------------------------------------------------------------------------
 
     def block(self, sequence: Sequence[Instruction]) -> tuple[int, int]:
-        """Adds a sequence of instructions; the indices of its first, and of the one after its
-        last."""
+        """Adds a sequence of instructions, which the loop sees after `publish`; the indices of its
+        first, and of the one after its last."""
         first = len(self._instructions)
         self._instructions += sequence
         for instruction in sequence:  # kinds of events share most of theirs
             if instruction not in self._records:
                 self._records[instruction] = self._record(instruction)
             self._ops.append(self._records[instruction])
-        self.loop.fill(ops=(Op * len(self._ops))(*self._ops))
         return first, len(self._instructions)
+
+    def publish(self) -> None:
+        """Let the loop see all that was added."""
+        self.loop.fill(ops=(Op * len(self._ops))(*self._ops))
 
     def forget_operations(self) -> None:
         """Be without operations, but with all that they work on."""
@@ -107,6 +114,7 @@ class Machine:
     def joined(self, sequence: Sequence[Instruction]) -> Call:
         """One call that carries out a sequence of instructions at a tick."""
         first, last = self.block(sequence)
+        self.publish()
         position, run = structures.At(), self.library.block
         loop, here = ctypes.addressof(self.loop), ctypes.addressof(position)
 

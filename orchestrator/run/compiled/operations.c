@@ -67,8 +67,7 @@ static int record(const Loop *l, Table *t, int64_t tick) {
 /* Carries out the operations from at->op to at->last at a tick, for the loop or within an operation
  * of Python's. Returns DONE, or a code for operation at->op. */
 int hapticlink_block(Loop *l, At *at, int64_t tick) {
-    int64_t known[3] = {INT64_MIN, 0, 0}; /* start, end and parts of the step before */
-    double begins = 0.0, ends = 0.0;
+    StepTimes step = {.first = INT64_MIN}; /* of the step before */
     for (; at->op < at->last; at->op++) {
         const Op *op = l->ops + at->op;
         int code = 0;
@@ -77,15 +76,9 @@ int hapticlink_block(Loop *l, At *at, int64_t tick) {
         case GET: code = fmu_get(l->fmus + op->a, op->b, at); break;
         case SET: code = fmu_set(l->setters + op->a, l->values, at); break;
         case STEP: {
-            const int64_t start = tick * op->c + op->b, end = start + op->d;
-            if (start != known[0] || end != known[1] || op->c != known[2]) {
-                const double whole = l->denominator * (double)op->c;
-                begins = (double)start * l->numerator / whole;
-                ends = (double)end * l->numerator / whole;
-                known[0] = start, known[1] = end, known[2] = op->c;
-            }
+            locate_step(l, op, tick, &step);
             Fmu *f = l->fmus + op->a;
-            code = (op->c == 1 && f->check ? fmu_checked_step : fmu_step)(f, begins, ends, op->x, at);
+            code = (op->c == 1 && f->check ? fmu_checked_step : fmu_step)(f, step.begin, step.end, op->x, at);
             break;
         }
         case PUSH: code = push_sample(l, l->holds[op->a], tick + op->b, tick + l->late); break;

@@ -81,7 +81,12 @@ int fmu_checked_step(Fmu *f, double time, double end, double size, At *at) {
     if (f->place->ended) return CALL;
     if (*c->count == c->room) return GROW;
     const int due = hapticlink_check_due(c, f->outputs);
-    if (!due) return fmu_step(f, time, end, size, at);
+    return due ? fmu_step_with_halves(f, time, end, size, due, at) : fmu_step(f, time, end, size, at);
+}
+
+/* A step, and before it the same in two halves; `due`: as hapticlink_check_due. */
+int fmu_step_with_halves(Fmu *f, double time, double end, double size, int due, At *at) {
+    Check *c = f->check;
     if (!fmu_succeeded(at->status = fmu_save(f, c->get_state, c->state))) {
         at->what = -1;
         return UNSAVED;

@@ -5,8 +5,8 @@ integrator stays far below the energies involved; a gain of more than these mean
 
 The loop: sum of generated <= work of the hands as ideal sources + E(0) - E(t), what the mechanism
 has given back of what it had stored and of its motion. Sampling and holding that generate more
-energy than was ever put in indicate an unstable loop. Where drives put in energy that is not known,
-it is not judged.
+energy than was ever put in indicate an unstable loop. Where drives, or a hand on a board, put in
+energy that is not known, it is not judged.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ class Balance:
         in, else ""."""
         generated, by_hands = sum_energies(self._system, booked)
         put_in = by_hands + max(self.begun - self._energy(), 0.0)
-        if self._system.energy.driven or generated <= put_in + LEAST:
+        held = any(fmu.driver for fmu in self._system.fmus)  # by a hand whose work nobody knows
+        if held or self._system.energy.driven or generated <= put_in + LEAST:
             return ""
         generation = f"sampling and holding generated {generated:.3g} J, where "
         if put_in:

@@ -10,7 +10,7 @@ from itertools import chain, islice
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
 from hapticlink.orchestrator.base.errors import COUNTED
 from hapticlink.orchestrator.scene.blocks import blocks as plan_blocks
-from hapticlink.orchestrator.scene.checks import blocks, contacts, fmus, linkage, numbers
+from hapticlink.orchestrator.scene.checks import blocks, contacts, devices, fmus, linkage, numbers
 from hapticlink.orchestrator.scene.conditions import parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
@@ -32,6 +32,7 @@ def check_scene(scene: Scene) -> list[Problem]:
         blocks.check_needed_tables(scene),
         fmus.check_fmus(scene, planned),
         shapes,
+        devices.check_devices(scene),
         numbers.check_numbers(scene),
         blocks.check_blocks(scene, planned),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hapticlink.orchestrator.scene.blocks import Blocks, from_graphics
+from hapticlink.orchestrator.scene.blocks import Blocks, driver_of, from_graphics
 from hapticlink.orchestrator.scene.checks.linkage import points
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
@@ -51,6 +51,7 @@ def check_needed_tables(scene: Scene) -> Iterator[Problem]:
     if scene.sensing == "encoders" and not scene.device:
         yield ("sensing",), "'encoders' are the device's: add [device], or take sensing out"
     yield from _observers(scene)
+    yield from _boards(scene)
     if not scene.graphics:
         if scene.mechanism_at == "graphics":
             yield ("mechanism_at",), "there is no graphics rate: add [graphics] with its rate"
@@ -61,6 +62,30 @@ def check_needed_tables(scene: Scene) -> Iterator[Problem]:
                 "the controller needs Lambda_inv and P_c: add [graphics], or take "
                 "directions_from = 'mechanism'",
             )
+
+
+SLOWEST_BOARD = 200.0
+"""Haptic rate (Hz) with a board: torques are zero within a tick, at most 5 ms, of a signal."""
+
+
+def _boards(scene: Scene) -> Iterator[Problem]:
+    """A problem for each board of which torques and angles would not be those of its device."""
+    for user, device in scene.all_devices.items():
+        if not driver_of(scene, user):
+            continue
+        table: Path = ("devices", user) if user else ("device",)
+        if scene.sensing != "encoders":
+            yield ("sensing",), "a board has encoders: take sensing = 'encoders'"
+        elif not device.observer.beside:
+            message = "a board has no observer in it: take beside = true"
+            yield (*table, "observer", "beside"), message
+        rate = scene.haptics.rate
+        if isinstance(rate, float | int) and rate < SLOWEST_BOARD:
+            message = (
+                f"{rate:g} Hz: a board is to be without torque within 5 ms of a signal, which is "
+                f"looked for once a tick: take {SLOWEST_BOARD:g} Hz or more"
+            )
+            yield ("haptics", "rate"), message
 
 
 def _observers(scene: Scene) -> Iterator[Problem]:

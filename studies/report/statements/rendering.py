@@ -140,10 +140,10 @@ def _device(runs: Runs) -> Iterator[Statement]:
     yield tested(
         "4.2.1",
         "two motors at the base joints drive each pantograph, as torque sources",
-        f"four torques, limited to {scene['device']['torque_limit']} N.m (assumed)",
+        f"four torques, limited to {scene['device']['motor']['torque_limit']} N.m (assumed)",
         "components/device/test_pantograph.py",
     )
-    degrees = np.degrees(scene["device"]["encoder_resolution"])
+    degrees = np.degrees(scene["device"]["encoder"]["resolution"])
     yield compare(
         "4.2.1",
         "encoders at the base joints resolve 0.09 degrees",

@@ -39,7 +39,7 @@ def test_a_copy_that_folds_is_marked_in_as_many_frames_as_its_output_says() -> N
 @pytest.mark.parametrize(("limit", "there"), [(0.02, True), (5.0, False)])
 def test_motors_that_are_too_weak_are_marked(limit: float, there: bool) -> None:
     r = hl.run(
-        "closed-loop-ideal", {"device.torque_limit": limit, "duration": 1.0, "stop_when": ""}
+        "closed-loop-ideal", {"device.motor.torque_limit": limit, "duration": 1.0, "stop_when": ""}
     )
     assert bool(of("saturated", episodes(r))) == there
 

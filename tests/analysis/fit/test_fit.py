@@ -16,13 +16,20 @@ from hapticlink.analysis.fit.arm_fit import NAMES, fit_arm
 from hapticlink.analysis.fit.device_fit import fit_device
 from hapticlink.analysis.fit.estimate import Estimate, standard_deviations
 from hapticlink.analysis.fit.log import Log
-from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand
 from tests.analysis.fit import device_log
+from tests.devices import device as device_of
 from tests.shared_fixtures import status
 
 STILL = ((0.0, 0.0, 0.0, 0.0),)
-DEVICE = Device(handle_mass=0.19, handle_inertia=1.5e-4, motor_damping=2e-3, motor_friction=6e-3)
+DEVICE = device_of(
+    keys={
+        "body.crank.mass": 0.19,
+        "body.crank.inertia": 1.5e-4,
+        "motor.damping": 2e-3,
+        "motor.friction": 6e-3,
+    }
+)
 ARM = ArmHand(
     mass=(1.4, 0.9, 0.003),
     stiffness=(150.0, 420.0, 0.8),
@@ -61,7 +68,7 @@ def csv(log: Log, path: Path) -> Path:
 
 def test_a_device_of_which_every_start_is_wrong(log: Log) -> None:
     """Handle half or twice as heavy and no friction; encoders that count, a noisy force sensor."""
-    wrong = Device(handle_mass=0.4, handle_inertia=6e-5)
+    wrong = device_of(keys={"body.crank.mass": 0.4, "body.crank.inertia": 6e-5})
     estimates, counts = fit_device(log, wrong)
     for estimate in estimates:
         assert abs(estimate.value - truth(estimate)) < max(
@@ -116,14 +123,14 @@ def test_a_log_without_motion_in_an_axis_has_no_estimates_there(log: Log) -> Non
 def test_the_command_writes_what_a_scene_takes(log: Log, tmp_path: Path, capsys) -> None:
     path = csv(log, tmp_path / "shaken.csv")
     out = tmp_path / "fit"
-    assert status("fit", path, "--device", "handle_mass", "--out", out, "--json") == 0
+    assert status("fit", path, "--device", "body.crank.mass", "--out", out, "--json") == 0
     record = json.loads(capsys.readouterr().out)
     assert record["parameters"] == json.loads((out / "fit.json").read_text())["parameters"]
     scene = tmp_path / "mine.toml"
     scene.write_text('extends = "closed-loop-ideal"\n' + (out / "fitted.toml").read_text())
     read = hl.scene(scene)
-    fitted = record["parameters"]["device.handle_mass"]["value"]
-    assert read.device.handle_mass == pytest.approx(fitted, rel=1e-12)
+    fitted = record["parameters"]["device.body.crank.mass"]["value"]
+    assert read.device.body[0].mass == pytest.approx(fitted, rel=1e-12)
     assert read.hand.type == "arm"
 
 
@@ -133,16 +140,16 @@ def test_a_run_whose_hand_is_held_is_fitted_without_bias(tmp_path: Path) -> None
     arm = {name: getattr(ARM, name) for name in NAMES}
     options = {
         "duration": 2.0,
-        "device.handle_mass": 0.2,
-        "device.motor_damping": 2e-3,
+        "device.body.crank.mass": 0.2,
+        "device.motor.damping": 2e-3,
         "hand": {"type": "arm", "target": [[0, 0.0445477, 0.0148492, -0.785398]], **arm},
         "at": [{"time": 0.0, "noise": {"controller.x_D": 0.02}}],
     }
     hl.run("closed-loop-ideal", options, out=tmp_path, figures=False)
-    found = hl.fit(tmp_path, device=["handle_mass", "motor_damping"])
+    found = hl.fit(tmp_path, device=["body.crank.mass", "motor.damping"])
     value = {e.key: e.value for e in found.estimates}
-    assert value["device.handle_mass"] == pytest.approx(0.2, rel=1e-6)
-    assert value["device.motor_damping"] == pytest.approx(2e-3, rel=1e-3)
+    assert value["device.body.crank.mass"] == pytest.approx(0.2, rel=1e-6)
+    assert value["device.motor.damping"] == pytest.approx(2e-3, rel=1e-3)
     for name in NAMES:
         fitted = [value[f"hand.{name}[{axis}]"] for axis in range(3)]
         assert fitted == pytest.approx(arm[name], rel=0.01), name
@@ -151,8 +158,8 @@ def test_a_run_whose_hand_is_held_is_fitted_without_bias(tmp_path: Path) -> None
 
 def test_what_a_run_cannot_say_is_left_out_in_words(tmp_path: Path) -> None:
     hl.run("closed-loop-ideal", {"duration": 0.6}, out=tmp_path, figures=False)
-    found = hl.fit(tmp_path, device=["handle_mass"])
-    assert [e.key for e in found.estimates] == ["device.handle_mass"]
+    found = hl.fit(tmp_path, device=["body.crank.mass"])
+    assert [e.key for e in found.estimates] == ["device.body.crank.mass"]
     assert found.left_out == ('hand: type = "constant" in this run, no arm to be fitted',)
     assert "[hand]" not in found.scene()
 
@@ -242,7 +249,7 @@ def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> N
     path.write_text("\n".join(lines[:300] + lines[303:]))
     with pytest.raises(hl.InputFault, match=r"row 300 comes 0\.0078"):
         hl.fit(path)
-    with pytest.raises(hl.InputFault, match="'crank' cannot be fitted; rotor_inertia"):
+    with pytest.raises(hl.InputFault, match=r"'crank' cannot be fitted; body\.crank\.mass"):
         hl.fit(csv(log, path), device=["crank"])
 
 

@@ -14,6 +14,7 @@ from hapticlink.analysis.maps import z_width
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.commands import stability
 from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
+from hapticlink.visualization.figures.z_width_figure import finding
 from tests.analysis.stability.own_hand import DAMPED as WALL
 
 M, D, T, QUANTUM, FRICTION = 0.3, 5.0, 1 / 512, 1e-4, 0.05
@@ -166,3 +167,24 @@ def test_where_nothing_is_stable_the_verdicts_are_told(tmp_path: Path) -> None:
     )
     assert (row["largest_stable"], row["stable"]) == (0.0, "none")
     assert row["message_stable"] == "all that was tried is unstable"
+
+
+def test_a_figure_says_what_was_found() -> None:
+    rows = [
+        {"haptics.rate": rate, "stable": kind, "largest_stable": value}
+        for rate, kind, value in (
+            (256, "none", 0.0),
+            (512, "limit", 1021.3),
+            (1024, "limit", 2050.0),
+        )
+    ]
+    assert finding(rows, ["haptics.rate"]) == (
+        "Stable up to 1020 at rate of the haptic loop = 512 Hz; up to 2050 at rate of the haptic "
+        "loop = 1024 Hz; nothing stable found at 1 of 3 points"
+    )
+    rows[2]["stable"] = "at least"
+    assert "; at least up to 2050 at " in finding(rows, ["haptics.rate"])
+    assert finding(rows[1:2], ["haptics.rate"]) == (
+        "Stable up to 1020 at rate of the haptic loop = 512 Hz"
+    )
+    assert finding(rows[:1], ["haptics.rate"]) == "Nothing stable found at 1 of 1 points"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hapticlink.analysis.search.acceptance import TRACKED, AcceptanceLimits
-from hapticlink.components.specs.device import Device
+from tests.devices import device
 
 LIMITS = AcceptanceLimits(42.0)
 
@@ -53,7 +53,7 @@ def test_limits_are_the_end_the_error_and_a_quarter_of_the_work(numbers: Any, wh
 
 def test_the_distance_is_a_fifth_of_what_the_device_reaches_at_every_angle() -> None:
     """The workspace of the report's device is 201 mm high, where 55 mm is no tracking."""
-    assert AcceptanceLimits.of(Device()).distance_mm == pytest.approx(0.2 * 201.0, rel=0.01)
+    assert AcceptanceLimits.of(device()).distance_mm == pytest.approx(0.2 * 201.0, rel=0.01)
 
 
 def test_a_run_that_keeps_the_limits_is_a_measure_and_a_wild_one_is_none() -> None:

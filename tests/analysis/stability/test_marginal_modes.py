@@ -1,4 +1,5 @@
-"""What a mode that is marginal, by a large uncertainty, counts for in a margin."""
+"""What a mode that is marginal, by a large uncertainty, counts for in a margin, and how uncertain
+eigenvalues that coincide are."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import numpy as np
 import pytest
 
 from hapticlink.analysis.stability.hand_cases import SLIGHT, Bounds, InHands
-from hapticlink.analysis.stability.modes import Mode
+from hapticlink.analysis.stability.modes import Linearisation, Mode, modes, verdict
 
 
 class OfGrowth(InHands):
@@ -41,3 +42,16 @@ def test_what_grows_within_its_uncertainty_ends_a_margin(
 ) -> None:
     worst = OfGrowth(*changed).worst({"a": None}, Bounds(), OfGrowth(*own).slow)
     assert (worst > 0.0) == ends
+
+
+@pytest.mark.parametrize(("error", "said"), [(1e-9, "stable"), (0.05, "marginal")])
+def test_eigenvalues_that_coincide_are_as_uncertain_as_errors_move_them(
+    error: float, said: str
+) -> None:
+    """Those of [[.8, 1], [0, .8]] move to .8 +- sqrt(error (1 + error)) and a little further; by
+    the first order, to infinity."""
+    A, E = np.array([[0.8, 1.0], [0.0, 0.8]]), np.full((2, 2), error)
+    (first, *_) = modes(Linearisation(np.zeros(2), np.zeros(2), np.eye(2), A, E), 1.0)
+    assert abs(first.z) == pytest.approx(0.8, abs=1e-6)
+    assert first.uncertainty == pytest.approx(np.sqrt(error), rel=0.25)
+    assert verdict(abs(first.z), first.uncertainty) == said

@@ -24,6 +24,10 @@ from tests.orchestrator.holds.test_laws import LAWS
 
 POINT = (0.044493, 0.014823, -0.788148)
 FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5.0, 0.01]}
+NOTHING = np.zeros(0)
+"""What a hold reads that has nothing beside its samples."""
+EARLY: dict[str, Any] = {"hold": "model", "downsampling": "model", "graphics.rate": 64}
+EARLY |= {"directions_from": "mechanism", "controller.bias": "full"}
 SCENE = {"graphics.rate": 60, "hand": {**FIRM, "target": [[0.0, *POINT]]}}  # frames of 8 or 9 ticks
 
 
@@ -38,11 +42,44 @@ def test_a_hold_goes_on_from_its_powers_to_the_interpolating_polynomial(name: st
     y, beside = samples[:, :n], samples[:, n:]
     block = StateBlock(hold.c)
     for tick in (51, 58):
-        powers = slopes_of_powers(hold, block, tick, 0.5) @ block.save().numbers
+        powers = slopes_of_powers(hold, block, NOTHING, tick, 0.5) @ block.save().numbers
         for dt in (0.0, 0.5, 9.5, 100.0):
             value = (advanced_powers(hold, dt) @ powers)[:n]
             expected = LAWS[name](stamps, y, beside, Fraction(tick) + Fraction(dt + 0.5))
             np.testing.assert_allclose(value, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("relation", ["WITH_RATE", "WITH_POSE", "ALONE"])
+def test_both_laws_of_an_early_step_go_on_from_their_powers(relation: str) -> None:
+    """Between the samples, and behind them, where efforts are read beside: along any direction the
+    slope at a later instant is that of the powers."""
+    n, draw = 2, np.random.default_rng(7)
+    bench, size = Bench(2 * n, Fraction(3, 7680)), 2 * n + n * n + n
+    further, signs = tuple(range(n, size)), np.repeat([1.0, -1.0], n)
+    beside = bench.reader(range(2 * n), signs)
+    hold = bench.hold("ahead", n, beside=beside, further=further, relation=relation)
+    bench.values[:] = draw.normal(size=2 * n)
+    for stamp in (0, 40):
+        hold.push(stamp, draw.normal(size=size), 0)
+    block = StateBlock(hold.c)
+    state = block.save()
+    along = draw.normal(size=len(state.numbers) + 2 * n)
+
+    def value(tick: int, ahead: float, way: float) -> Matrix:
+        size = len(state.numbers)
+        block.restore(state, state.numbers + way * along[:size])
+        bench.values[:] += way * along[size:]
+        moved: Matrix = hold.value(tick, ahead).copy()
+        block.restore(state, state.numbers)
+        bench.values[:] -= way * along[size:]
+        return moved
+
+    for tick in (7, 40, 52):
+        powers = slopes_of_powers(hold, block, bench.values, tick, 0.5) @ along
+        for dt in (0.0, 3.0, 25.0):
+            expected = (value(tick, 0.5 + dt, 1e-6) - value(tick, 0.5 + dt, -1e-6)) / 2e-6
+            told = (advanced_powers(hold, dt) @ powers)[:n]
+            np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-6)
 
 
 def leading(period: LinearPeriod) -> list[complex]:
@@ -58,6 +95,8 @@ def leading(period: LinearPeriod) -> list[complex]:
         {"hold": "second-order"},
         {"hold": "foh", "delays": {"virtual_mechanism.x -> controller.x_S": 3 / 512}},
         {"hold": "lead", "delays": {"controller.F_drift -> virtual_mechanism.F_drift": 7 / 1024}},
+        EARLY,
+        EARLY | {"computing_time": 3 / 512},
     ],
     ids=str,
 )
@@ -134,7 +173,7 @@ def test_behind_a_manifold_slopes_are_those_of_samples_that_keep_their_rank(matr
     far, tick, ahead = 1e-5, 41, 0.5
     there, back = pushed(far), pushed(-far)
     at = pushed(0.0)
-    powers = slopes_of_powers(at, StateBlock(at.c), tick, ahead)[:9]
+    powers = slopes_of_powers(at, StateBlock(at.c), NOTHING, tick, ahead)[:9]
     told = powers @ (numbers(there) - numbers(back))
     moved = there.value(tick, ahead) - back.value(tick, ahead)
     np.testing.assert_allclose(told, moved, atol=1e-3 * far)

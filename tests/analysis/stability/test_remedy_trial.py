@@ -12,7 +12,7 @@ from hapticlink.analysis.stability import remedy_trial
 from hapticlink.analysis.stability.hand_cases import Case, hardest_first
 from hapticlink.analysis.stability.modes import DRIFT
 from hapticlink.analysis.stability.poses import Pose
-from hapticlink.analysis.stability.remedy_trial import Remedy, Trial, find_best
+from hapticlink.analysis.stability.remedy_trial import Remedy, Trial, find_best, those_that_help
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.orchestrator.base.errors import InputFault
 
@@ -117,3 +117,10 @@ def test_the_hardest_pose_has_the_most_marginal_hands_then_what_grows_most() -> 
 
     cases = [case("a", -0.1, "stable"), case("b", 2.0, "unstable"), case("c", 0.0, "marginal")]
     assert hardest_first(cases) == ["c", "b", "a"]
+
+
+def test_what_grows_as_fast_as_without_it_is_no_remedy() -> None:
+    """Poses are those of the run with a change, in which it may do worse."""
+    calm, better, worse = (Remedy((), growth, growth < 0.0) for growth in (-0.2, 0.3, 0.47))
+    assert those_that_help([calm, better, worse], 0.391) == (calm, better)
+    assert those_that_help([replace(calm, growth=np.inf)], 0.391) == ()

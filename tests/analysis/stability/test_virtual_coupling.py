@@ -121,8 +121,8 @@ def test_growth_until_motors_saturate() -> None:
     assert 150 < growth < 200
     largest = []
     for limit_ in (0.5, 1.0):
-        kick = {"linkage.start_velocity.shoulder1": 1e-6, "device.torque_limit": limit_}
-        run = hl.run(loose, {**kick, "devices.left.torque_limit": limit_})
+        kick = {"linkage.start_velocity.shoulder1": 1e-6, "device.motor.torque_limit": limit_}
+        run = hl.run(loose, {**kick, "devices.left.motor.torque_limit": limit_})
         speed = np.abs(run["virtual_mechanism.qd"]).max(axis=1)
         small = np.flatnonzero((speed > 1e-5) & (speed < 0.1))
         rate = np.polyfit(small * T, np.log(speed[small]), 1)[0]

@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticlink.analysis.sweep import grid, pool, row, table
+from hapticlink.analysis.sweep import grid, pool, row, run_sweep, table
 from hapticlink.analysis.sweep import job as points_of
 from hapticlink.analysis.sweep.grid import Axis, listed, parse
 from hapticlink.analysis.sweep.job import Job
@@ -180,8 +180,8 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of rows, not of processes, each of which would import everything again."""
 
-    def one_by_one(work: pool.Work, jobs: Sequence[Job], count: int) -> Iterator[pool.Done]:
-        return ((job, work(job)) for job in jobs)
+    def one_by_one(work: pool.Work, batches: Sequence[pool.Batch], n: int) -> Iterator[pool.Done]:
+        return (done for batch in batches for done in zip(batch, work(batch), strict=True))
 
     monkeypatch.setattr(pool, "in_processes", one_by_one)
 
@@ -243,6 +243,25 @@ def test_a_process_of_many_runs_makes_each_as_a_process_of_its_own(
         process_cache.trim(1)
         assert len([*emptied_temporary_folder.iterdir()]) == 1
     assert not [*emptied_temporary_folder.iterdir()]
+
+
+def test_native_fmus_that_are_there_are_taken_for_the_same_rows(
+    bar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = [{"stop_when": f"virtual_mechanism.x[1] > {limit}"} for limit in (0.01, 0.02)]
+    made = points_of.jobs(bar, ("duration=0.1",), limits)
+
+    def rows(cache: str) -> list[row.Row]:
+        monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / cache))
+        found = run_sweep.sweep(made, tmp_path / f"{cache}-sweep", 1)
+        return [{k: v for k, v in each.items() if k != "run_time_s"} for each in found]
+
+    python = rows("python")
+    monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / "native"))
+    simulate(bar, tmp_path / "run", ("duration=0.1", "packaging=native"))
+    there = sorted((tmp_path / "native").rglob("*.fmu"))
+    assert rows("native") == python
+    assert sorted((tmp_path / "native").rglob("*.fmu")) == there
 
 
 @pytest.mark.usefixtures("in_this_process")

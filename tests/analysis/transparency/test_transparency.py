@@ -26,7 +26,7 @@ from hapticlink.orchestrator.scene.overrides import write_options
 T = 1 / 512
 LENGTH = 0.2
 W = 2 * np.pi * HERTZ
-ENCODERS = {"sensing": "encoders", "device.encoder_resolution": 1e-9}
+ENCODERS = {"sensing": "encoders", "device.encoder.resolution": 1e-9}
 
 
 def mobility() -> NDArray[np.float64]:

@@ -27,7 +27,7 @@ from hapticlink.orchestrator.scene.overrides import write_options
 from tests.analysis.stability.own_hand import linearised
 
 RECORDED = Path(__file__).parents[3] / "results" / "tune"
-NO_ENCODER = ("device.encoder_resolution=1e-12",)
+NO_ENCODER = ("device.encoder.resolution=1e-12",)
 """The map has no quantisation."""
 
 SLIDER = """

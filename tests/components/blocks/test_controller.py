@@ -11,8 +11,8 @@ from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.control import topology
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller
-from hapticlink.components.specs.device import Device
 from tests.blocks import Running
+from tests.devices import device as twin
 from tests.mechanisms import MOBILITY as LAMBDA_INV
 from tests.mechanisms import WRENCH
 
@@ -63,7 +63,7 @@ def constraint_map(P, length_scale=L):
 def test_device_at_rest_accelerates_like_the_mechanism():
     """(4.4) by (4.5) and the corrected (4.6): xdd = Lambda^-1 F_h, in the device's own block."""
     start = (-0.02, 0.01, 0.7)
-    device = Running(haptic_device(Device()), {"F_hand": F_HAND}, {"x_start": start})
+    device = Running(haptic_device(twin()), {"F_hand": F_HAND}, {"x_start": start})
     y = device.y
     u = block({"F_hand": F_HAND, "M": y["M"], "c": y["c"], "Lambda_inv": LAMBDA_INV}, **ALONE).y[
         "F_motor"
@@ -81,7 +81,7 @@ def test_device_at_rest_accelerates_like_the_mechanism():
 
 def test_moving_device_accelerates_like_the_mechanism():
     """With C_d v sent, the velocity does not show."""
-    device = Running(haptic_device(Device()), {"F_hand": F_HAND}).put(v_true=(0.2, -0.1, 6.0))
+    device = Running(haptic_device(twin()), {"F_hand": F_HAND}).put(v_true=(0.2, -0.1, 6.0))
     y, v = device.y, device.y["v"]
     assert np.abs(np.linalg.solve(y["M"], y["c"])).max() > 0.1
     inputs = {"F_hand": F_HAND, "M": y["M"], "c": y["c"], "Lambda_inv": LAMBDA_INV}

@@ -5,7 +5,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.hand import hand
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
+from hapticlink.components.specs.hand import (
+    ArmHand,
+    ConstantHand,
+    FingertipHand,
+    ProfileHand,
+    SpringHand,
+)
 from tests.blocks import Running, advance
 
 TABLE = ((0.5, 0.0, 1.0, 0.0), (1.0, 2.0, 1.0, 0.01), (1.5, 0.0, -1.0, 0.01))
@@ -61,7 +67,7 @@ def test_arm_follows_its_target_path():
 
     exact = solve_ivp(derivative, (0, 0.4), np.zeros(6), "DOP853", rtol=1e-11, atol=1e-14).y[:, -1]
     running = advance(Running(hand(spec)), 0.4)
-    np.testing.assert_allclose(running.x, exact, rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(running.x[:6], exact, rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(running.y["F"], kg * exact[:3] + bg * exact[3:], rtol=1e-5)
 
 
@@ -80,3 +86,36 @@ def test_a_spring_pulls_to_its_moving_target():
     rate = np.array([0.1, 0.2, 0.3])
     expected = [100, 200, 3] * (0.5 * rate - x) + [1, 2, 0.1] * (rate - v)
     np.testing.assert_allclose(block.y["F"], expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("kind", [SpringHand, ArmHand])
+def test_a_target_is_a_direction_which_begins_within_half_a_turn_of_the_handle(kind):
+    """Whole turns change nothing, and go on with the target's path."""
+    stiff = {"stiffness": (300.0, 300.0, 1.0)} if kind is SpringHand else {}
+    x, forces = (0.01, 0.02, 7.5), []
+    for turns in (0, 1, -2):
+        first = 7.3 + 2 * np.pi * turns
+        spec = kind(**stiff, target=((0.0, 0.0, 0.0, first), (0.5, 0.0, 0.0, first + 9.0)))
+        running = advance(Running(hand(spec), {"x": x}), 0.2)
+        forces.append(running.y["F"])
+    np.testing.assert_allclose(forces[1:], [forces[0]] * 2, rtol=1e-9)
+    assert abs(forces[0][2]) > 0.1
+
+
+def test_a_fingertip_is_an_arm_of_two_lengths_that_gives_no_moment():
+    spec = FingertipHand(target=((0.0, 0.0, 0.0, 0.0), (0.5, 0.05, -0.02, 3.0)))
+    finger = hand(spec)
+    lengths = (
+        (spec.mass, spec.mass, 1.0),
+        *(
+            (v, v, 0.0)
+            for v in (spec.stiffness, spec.damping, spec.pulp_stiffness, spec.pulp_damping)
+        ),
+    )
+    names = ("mass", "stiffness", "damping", "grip_stiffness", "grip_damping")
+    arm = hand(ArmHand(**dict(zip(names, lengths, strict=True)), target=spec.target))
+    found, whole = (advance(Running(block, {"x": (0.001, 0, 2.0)}), 0.3) for block in (finger, arm))
+    np.testing.assert_allclose(found.y["F"], whole.y["F"], rtol=1e-12, atol=1e-15)
+    assert found.y["F"][2] == 0.0
+    assert np.abs(found.y["F"]).max() > 0.01
+    assert [v.size for v in finger.states] == [2, 2]

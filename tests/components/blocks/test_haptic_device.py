@@ -1,6 +1,7 @@
 """The haptic device as a block: motion, sensing, and what it leaves out."""
 
 import typing
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -8,19 +9,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hapticlink.components.blocks.haptic_device import haptic_device
-from hapticlink.components.blocks.motor_map import motor_map
-from hapticlink.components.blocks.observer import observer
-from hapticlink.components.device import pantograph
-from hapticlink.components.device.motors_and_encoders import numbers
-from hapticlink.components.specs.device import Device, Observer
+from hapticlink.components.specs.device import Motor, Observer, Stops
 from hapticlink.components.specs.quantities import Quantity
 from tests.blocks import Running, advance
+from tests.devices import device as twin
+from tests.reference import twin_pantograph
 
 T = 1 / 512
 START = (-0.02, 0.01, 3.6)
-IDEAL = haptic_device(Device())
-ENCODERS = haptic_device(Device(), encoders=True)
-BESIDE = Device(observer=Observer(beside=True))
+IDEAL = haptic_device(twin())
+ENCODERS = haptic_device(twin(), encoders=True)
+BESIDE = replace(twin(), observer=Observer(beside=True))
 ALONE = haptic_device(BESIDE, encoders=True)
 
 
@@ -30,8 +29,8 @@ def at_start(component, **inputs):
 
 def base_jacobian(pose):
     at = ca.SX.sym("pose", 3)
-    p = {v.name: v.start for v in IDEAL.parameters}
-    return np.array(ca.Function("J", [at], [pantograph.jacobian(at, p)])(pose))
+    J = twin_pantograph.jacobian(at, twin_pantograph.NUMBERS)
+    return np.array(ca.Function("J", [at], [J])(pose))
 
 
 def test_starts_at_rest_at_x_start():
@@ -58,14 +57,14 @@ def test_a_device_without_observer_puts_out_what_encoders_count_and_motors_have_
     before = device.y["tau_applied"]
     for _ in range(64):
         device.step(T)
-    y, resolution = device.y, Device().encoder_resolution
+    y, resolution = device.y, twin_pantograph.NUMBERS["encoder_resolution"]
     np.testing.assert_array_equal(before, 0)
     np.testing.assert_array_equal(y["tau_applied"], torques)
     np.testing.assert_array_equal(y["counts"], np.rint(y["counts"]))
     np.testing.assert_array_equal(y["q"], resolution * y["counts"])
     assert 0 < np.abs(y["q"] - y["q_true"]).max() <= resolution / 2
     at = ca.SX.sym("pose", 3)
-    angles = ca.Function("q", [at], [pantograph.base_angles(at, numbers(Device()))])
+    angles = ca.Function("q", [at], [twin_pantograph.base_angles(at, twin_pantograph.NUMBERS)])
     np.testing.assert_allclose(y["q_true"], np.array(angles(y["x_true"])).ravel(), rtol=1e-15)
 
 
@@ -95,7 +94,7 @@ def test_held_torques_against_scipy():
     expected = solve_ivp(rate, (0, h), x0, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
     errors, substeps = [], (8, 16, 32)
     for n in substeps:
-        device = at_start(haptic_device(Device(substeps=n)), F_hand=wrench, F_motor=motor)
+        device = at_start(haptic_device(twin(substeps=n)), F_hand=wrench, F_motor=motor)
         device.put(v_true=x0[3:])
         device.step(h)
         errors.append(np.abs(device.x - expected).max())
@@ -151,7 +150,8 @@ def test_theta_is_continuous_over_many_turns():
 def test_observer_converges_to_a_constant_force(own):
     """The motors balance the hand: the device stays, and the observed force is the hand's."""
     component = haptic_device(
-        Device(encoder_resolution=1e-6, observer=Observer(**own, omega_n=50.0)), encoders=True
+        replace(twin(keys={"encoder.resolution": 1e-6}), observer=Observer(**own, omega_n=50.0)),
+        encoders=True,
     )
     hand = np.array([0.4, -0.3, 0.003])
     device = advance(at_start(component, F_hand=hand, F_motor=-hand), 1.0, 512)
@@ -164,7 +164,7 @@ def test_observer_converges_to_a_constant_force(own):
 def test_observer_follows_a_moving_device(law):
     """A free push for 0.2 s, encoders of 0.09 degrees: force to .1 N, velocity to 10 mm/s."""
     hand = np.array([-0.3, 0.1, -0.001])
-    device = at_start(haptic_device(Device(observer=Observer(law=law)), True), F_hand=hand)
+    device = at_start(haptic_device(replace(twin(), observer=Observer(law=law)), True), F_hand=hand)
     forces, velocities = [], []
     for k in range(120):
         device.step(T)
@@ -188,25 +188,24 @@ def test_workspace_margin_and_stop():
     assert np.isfinite(device.x).all()
 
 
-def declared():
-    """The unit of each key of the scene, by its name."""
-    found = {}
-    for record in (Device, Observer):
-        for name, hint in typing.get_type_hints(record, include_extras=True).items():
-            given = next(
-                (one for one in (hint, *typing.get_args(hint)) if hasattr(one, "__metadata__")),
-                hint,
-            )
-            beside = getattr(given, "__metadata__", ())
-            found.update((name, each.unit) for each in beside if isinstance(each, Quantity))
-    return found
-
-
 def test_a_parameter_has_the_unit_that_the_scene_s_key_declares():
-    component, keys = haptic_device(Device(motor_friction=0.01), encoders=True), declared()
-    units = {p.name: p.unit for p in component.parameters if p.name != "x_start"}
-    assert len(keys) == 26
-    assert units == {name: unit for name, unit in keys.items() if name != "substeps"}  # structure
-    for block in (observer(BESIDE), motor_map(BESIDE), ALONE):
-        own = {p.name: p.unit for p in block.parameters if p.name != "x_start"}
-        assert own.items() <= units.items()
+    rough = twin(keys={"motor.friction": 0.01})
+    keys = {
+        "rotor_inertia": (Motor, "inertia"),
+        "torque_limit": (Motor, "torque_limit"),
+        "motor_damping": (Motor, "damping"),
+        "motor_friction": (Motor, "friction"),
+        "stop_reach": (Stops, "reach"),
+        "stop_stiffness": (Stops, "stiffness"),
+        "stop_damping": (Stops, "damping"),
+    }
+    found = {p.name: p.unit for p in haptic_device(rough, encoders=True).parameters}
+    for name, (record, key) in keys.items():
+        hint = typing.get_type_hints(record, include_extras=True)[key]
+        quantities = [
+            each
+            for part in (hint, *typing.get_args(hint))
+            for each in getattr(part, "__metadata__", ())
+            if isinstance(each, Quantity)
+        ]
+        assert found[name] == quantities[0].unit

@@ -1,14 +1,17 @@
 """The observer as a block beside the device: what it puts out is that of the one within it, and the
 acceleration that of the motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.blocks.motor_map import motor_map
 from hapticlink.components.blocks.observer import observer
-from hapticlink.components.specs.device import Device, Observer
+from hapticlink.components.specs.device import Observer
 from tests.blocks import Running
+from tests.devices import device
 
 T = 1 / 512
 START = (-0.02, 0.01, 3.6)
@@ -44,7 +47,7 @@ class Beside:
 )
 def test_beside_the_device_it_sees_the_same_bits_at_any_steps(own):
     def spec(beside):
-        return Device(observer=Observer(**own, beside=beside))
+        return replace(device(), observer=Observer(**own, beside=beside))
 
     within = Running(haptic_device(spec(False), True), {"F_hand": HAND}, {"x_start": START})
     beside = Beside(spec(True), F_hand=HAND)
@@ -60,7 +63,7 @@ def test_beside_the_device_it_sees_the_same_bits_at_any_steps(own):
 
 
 def test_it_starts_at_rest_at_the_pose_of_its_angles():
-    seen = Beside(Device(observer=Observer(beside=True))).step(T, (0.0, 0.0, 0.0))
+    seen = Beside(replace(device(), observer=Observer(beside=True))).step(T, (0.0, 0.0, 0.0))
     np.testing.assert_allclose(seen["x"], START, atol=6e-3)
     for name in ("v", "a", "F_hand_observed", "c"):
         np.testing.assert_array_equal(seen[name], 0)
@@ -71,7 +74,7 @@ def test_the_acceleration_is_that_of_the_true_motion(law):
     """With fine encoders and known torques, against differences of the true velocity over a step,
     the acceleration in the middle of it."""
     spec = Observer(law=law, omega_n=50.0, beside=True)
-    system = Beside(Device(encoder_resolution=1e-9, observer=spec))
+    system = Beside(replace(device(keys={"encoder.resolution": 1e-9}), observer=spec))
     v, a = [], []
     for _ in range(240):
         a.append(system.step(T, MOTORS)["a"])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from hapticlink.components.dynamics.constrained_directions import ConstrainedDirections
 from hapticlink.components.dynamics.gradients import of_projector
+from hapticlink.components.dynamics.rendered_directions import WHOLE
 from hapticlink.components.specs.linkage import (
     Directions,
     FurtherPoint,
@@ -200,7 +201,7 @@ def test_gradients_hold_along_redundant_closures(turned, ratio):
 def test_between_equal_eigenvalues_the_projector_has_no_gradient():
     values, slope = ca.DM([1, 1, 3]), ca.DM(np.ones((9, 1)))
     eye = ca.SX.eye(3)
-    found = ConstrainedDirections(*[ca.SX()] * 2, {}, eye, ca.SX(values), eye, ca.SX(1))
+    found = ConstrainedDirections(*[ca.SX()] * 2, {}, WHOLE, eye, ca.SX(values), eye, ca.SX(1))
     gradient = ca.evalf(of_projector(found, ca.SX(slope))).full().reshape(3, 3)
     np.testing.assert_array_equal(gradient, [[0, 0, -0.5], [0, 0, 0], [-0.5, 0, 0]])
 

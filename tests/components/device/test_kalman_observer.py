@@ -2,6 +2,7 @@
 device of constant inertia, against closed forms."""
 
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -17,8 +18,10 @@ from hapticlink.components.device.kalman_observer import (
     bandwidth,
     gains,
 )
-from hapticlink.components.specs.device import Device, Observer
+from hapticlink.components.device.models import device_model
+from hapticlink.components.specs.device import Observer
 from tests.blocks import Running
+from tests.devices import device as twin
 
 MASS = 0.3
 H = np.eye(3)[:1]
@@ -60,8 +63,11 @@ def test_gains_are_those_of_the_riccati_equation(omega_n, period):
 class Mass:
     """A device of one direction, whose angle is the pose."""
 
-    def pose_from_angles(self, angles, guess, p, iterations=2):
-        return angles
+    def way_from_angles(self, angles, z, p):
+        return angles - z
+
+    def moved(self, z, dy, p):
+        return z + dy
 
     def jacobian(self, pose, p):
         return ca.SX.eye(1)
@@ -116,9 +122,9 @@ def test_counts_make_the_error_of_the_force_that_its_bandwidth_is_taken_for():
 
 def test_the_default_bandwidth_is_that_of_the_device_s_inertia_and_counts():
     """At the pose midway between the bases, with M and J from the device's own outputs."""
-    middle = (Device().base_x, 0.0, 0.0)
-    M = Running(haptic_device(Device()), {}, {"x_start": middle}).y["M"].reshape(3, 3)
-    bare = haptic_device(Device(observer=Observer(beside=True)), encoders=True)
+    middle = (-0.005, 0.0, 0.0)
+    M = Running(haptic_device(twin()), {}, {"x_start": middle}).y["M"].reshape(3, 3)
+    bare = haptic_device(replace(twin(), observer=Observer(beside=True)), encoders=True)
 
     def angles(pose):
         return Running(bare, {}, {"x_start": pose}).y["q_true"]
@@ -128,19 +134,19 @@ def test_the_default_bandwidth_is_that_of_the_device_s_inertia_and_counts():
         [(angles(middle + d) - angles(middle - d)) / 2 / small for d in small * np.eye(3)]
     )
     spread = np.linalg.inv(J.T @ J)
-    count = Device().encoder_resolution * np.sqrt((spread[0, 0] + spread[1, 1]) / 2)
+    count = twin().encoders[0].resolution * np.sqrt((spread[0, 0] + spread[1, 1]) / 2)
     mass = np.sqrt(np.linalg.det(M[:2, :2]))
-    omega_n = bandwidth(Device())
+    omega_n = bandwidth(device_model(twin()))
     assert mass * count * np.sqrt(NOMINAL * omega_n**5) / 6 == pytest.approx(NOISE, rel=1e-6)
 
 
 def test_the_default_bandwidth_follows_the_period():
     """At 1024 Hz it is 2^(1/5) times that at 512 Hz, to the last digits of what is observed."""
     T, hand = 1 / 1024, (0.3, -0.2, 0.001)
-    omega_n = bandwidth(Device()) * 2**0.2
+    omega_n = bandwidth(device_model(twin())) * 2**0.2
 
     def seen(spec, **parameters):
-        device = haptic_device(Device(observer=spec), encoders=True)
+        device = haptic_device(replace(twin(), observer=spec), encoders=True)
         run = Running(device, {"F_hand": hand}, parameters)
         for _ in range(60):
             run.step(T)
@@ -149,8 +155,3 @@ def test_the_default_bandwidth_follows_the_period():
     by_default = seen(Observer(law="kalman"), step_size=T)
     np.testing.assert_allclose(by_default, seen(Observer(law="kalman", omega_n=omega_n)), rtol=1e-9)
     assert np.abs(by_default / seen(Observer(law="kalman", omega_n=90.0)) - 1).max() > 0.01
-
-
-def test_arms_that_do_not_reach_the_middle_have_no_default():
-    with pytest.raises(ValueError, match="omega_n"):
-        bandwidth(Device(base_y_a=-2.0, base_y_b=2.0))

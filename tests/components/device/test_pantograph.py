@@ -1,6 +1,6 @@
 """Twin pantograph: kinematics, dynamics, sensing and actuation as properties over the workspace."""
 
-from dataclasses import asdict
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -8,11 +8,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from hapticlink.components.device import pantograph
-from hapticlink.components.specs.device import Device
+from hapticlink.components.device.device_model import FRICTION_RATE
+from hapticlink.components.device.models import device_model
+from hapticlink.components.device.pose_coordinates import PoseCoordinates
+from tests.devices import device
+from tests.reference import twin_pantograph
 
-DEVICE = Device()
-P = {k: v for k, v in asdict(DEVICE).items() if isinstance(v, float | int)}
+MODEL = device_model(device())
+P, DEVICE = MODEL.numbers, SimpleNamespace(**twin_pantograph.NUMBERS)
 ROUGH = {"motor_damping": 2e-3, "motor_friction": 6e-3}
 POSE, V, WRENCH, ANGLES = (ca.SX.sym(s, n) for s, n in (("x", 3), ("v", 3), ("F", 3), ("a", 4)))
 
@@ -27,18 +30,23 @@ def function(arguments, *expressions):
     return call
 
 
-ARMS = tuple(pantograph.arms(POSE, P))
-angles = function([POSE], pantograph.base_angles(POSE, P))
-distal = function([POSE], ca.vertcat(*(arm.distal for arm in ARMS)))
-reach = function([POSE], ca.vertcat(*(arm.reach for arm in ARMS)))
-jacobian = function([POSE], pantograph.jacobian(POSE, P))
-dynamics = function([POSE, V], *pantograph.dynamics(POSE, V, P))
-margins = function([POSE], pantograph.margins(POSE, P))
-stop = function([POSE, V], pantograph.stop_wrench(POSE, V, P))
-estimate = function([ANGLES, POSE], pantograph.pose_from_angles(ANGLES, POSE, P))
-estimate_4 = function([ANGLES, POSE], pantograph.pose_from_angles(ANGLES, POSE, P, iterations=4))
-torques = function([WRENCH, POSE], pantograph.motor_torques(WRENCH, POSE, P))
-friction = function([ANGLES], pantograph.friction_torques(ANGLES, ROUGH))
+DISTAL = [f"{arm}_distal" for arm in ("a_left", "a_right", "b_left", "b_right")]
+FRAMES = MODEL.frames(POSE, P)
+angles = function([POSE], MODEL.angles(POSE, P))
+distal = function([POSE], ca.vertcat(*(FRAMES[body].angle for body in DISTAL)))
+jacobian = function([POSE], MODEL.jacobian(POSE, P))
+dynamics = function([POSE, V], *MODEL.dynamics(POSE, V, P))
+margins = function([POSE], MODEL.margins(POSE, P))
+stop = function([POSE, V], MODEL.stop_force(POSE, V, P))
+estimate = function([ANGLES, POSE], MODEL.place_from_angles(ANGLES, POSE, P))
+estimate_4 = function([ANGLES, POSE], MODEL.place_from_angles(ANGLES, POSE, P, iterations=4))
+torques = function([WRENCH, POSE], MODEL.motor_torques(WRENCH, POSE, P))
+friction = function([ANGLES], MODEL.friction_torques(ANGLES, ROUGH))
+
+
+def reach(pose):
+    return 0.95 * 0.36 - margins(pose)[:4]
+
 
 workspace = st.tuples(st.floats(-0.06, 0.05), st.floats(-0.05, 0.05), st.floats(-20, 20))
 wrenches = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-0.2, 0.2))
@@ -214,7 +222,7 @@ def test_stops_push_back_and_only_beyond_the_margin():
 
 
 def test_velocity_term_is_the_christoffel_matrix_times_the_velocity():
-    term = function([POSE, V], *pantograph.motion(POSE, V, P))
+    term = function([POSE, V], *MODEL.motion(POSE, V, P))
     for pose, v in (
         ((0.01, -0.02, 0.4), (0.3, -0.2, 4.0)),
         ((-0.04, 0.03, 3.5), (-0.1, 0.5, -6.0)),
@@ -232,6 +240,50 @@ def test_motors_rub_against_their_rates(rates):
     w = np.array(rates)
     found = friction(w).ravel()
     assert (found * w <= 0.0).all()
-    fast = np.abs(w) > 10 * pantograph.FRICTION_RATE
+    fast = np.abs(w) > 10 * FRICTION_RATE
     expected = -2e-3 * w - 6e-3 * np.sign(w)
     np.testing.assert_allclose(found[fast], expected[fast], rtol=1e-6)
+
+
+@settings(max_examples=60)
+@given(workspace, twists, wrenches)
+def test_the_twin_of_a_file_is_the_twin_in_closed_form(pose, v, wrench):
+    """Relative to the largest entry of each: M_d, C_d and c, J_q, angles, margins, stops,
+    torques."""
+    for found, expected in zip(FROM_FILE(pose, v, wrench), CLOSED(pose, v, wrench), strict=True):
+        scale = max(np.abs(expected).max(), 1e-9)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * scale)
+
+
+def _all(model, p, stop, angles):
+    outputs = (
+        *model.dynamics(POSE, V, p), model.motion(POSE, V, p)[1], model.jacobian(POSE, p),
+        angles(POSE, p), model.margins(POSE, p), stop(POSE, V, p),
+        model.motor_torques(WRENCH, POSE, p),
+    )  # fmt: skip
+    return function([POSE, V, WRENCH], *outputs)
+
+
+FROM_FILE = _all(MODEL, P, MODEL.stop_force, MODEL.angles)
+CLOSED = _all(
+    twin_pantograph,
+    twin_pantograph.NUMBERS,
+    twin_pantograph.stop_wrench,
+    twin_pantograph.base_angles,
+)
+
+
+def test_the_twin_needs_no_joint_coordinates():
+    assert isinstance(MODEL, PoseCoordinates)
+
+
+@pytest.mark.parametrize("pose", [(5.0, 0.0, 0.0), (-0.035, -0.2, 1.0), (0.3, 0.25, 2.0)])
+def test_beyond_reach_all_is_finite_and_the_stops_lead_back(pose):
+    """Farther than an arm, on a base joint, and outside the workspace."""
+    v = (0.5, -0.5, 3.0)
+    for value in (*dynamics(pose, v), jacobian(pose), angles(pose), stop(pose, v)):
+        assert np.isfinite(value).all()
+    assert margins(pose).min() < 0
+    assert np.linalg.eigvalsh(dynamics(pose, v)[0]).min() > 0
+    if pose[0] > 1:
+        assert stop(pose, (0.0, 0.0, 0.0))[0] < 0

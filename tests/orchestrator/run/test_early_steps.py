@@ -1,17 +1,20 @@
 """Plants whose steps are taken when they begin, in the loop: what the fast side gets of them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 import hapticlink as hl
+from hapticlink.analysis.findings.model_premises import describe_computing_times
 from hapticlink.analysis.findings.summary import warnings
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import uses
 from hapticlink.orchestrator.system.changes import check_change, choices, settable
+from hapticlink.visualization.live_and_standalone.offered_controls import Offered
 from tests.orchestrator.systems import system_of
 
 AT_GRAPHICS = {
@@ -221,3 +224,43 @@ def test_where_it_gains_less_is_told(tmp_path):
             assert (len(lines), any(said in line for line in lines)) == (told, told), (said, lines)
     r = run(tmp_path, **{"hand": arm | start, "graphics.rate": 30})
     assert not any("gains less" in line for line in warnings(r))
+
+
+@pytest.mark.parametrize(
+    ("known", "took", "said"),
+    [
+        (0.0, 0.0019, None),
+        (0.0, 0.004, "took 4 ms in the mean, and its result counts as there at once: take comp"),
+        (0.01, 0.004, None),
+        (0.01, 0.012, "counts as there after 10 ms: take computing_time = 0.02"),
+        (0.0, 0.05, "take a lower graphics rate"),
+    ],
+)
+def test_a_step_that_takes_longer_than_is_told_is_warned_of(known, took, said):
+    """In real time alone, by the mean of what doStep took."""
+    options = MODEL | {"duration": 0.2, "graphics.rate": 16, "computing_time": known}
+    r = hl.run("closed-loop-ideal", options, figures=False)
+    steps = r.record.calls["virtual_mechanism"]["step"]
+    measured = replace(r.record.timings, steps={"virtual_mechanism": took * steps})
+    record = replace(r.record, timings=measured)
+    assert not [*describe_computing_times(record)]
+    lines = [*describe_computing_times(replace(record, real_time={"period": 1 / 512}))]
+    assert [said in line for line in lines] == ([True] if said else []), lines
+
+
+def test_a_live_rate_leaves_time_for_the_result():
+    """On a page, too, which offers no higher one."""
+    options = MODEL | {"duration": 0.2, "graphics.rate": 16, "computing_time": 0.02}
+    asked = []
+
+    def turn(live):
+        offered = Offered(live.scene, live.system).described({})
+        asked.append(next(c["max"] for c in offered if c["key"] == "graphics.rate"))
+        live.rate("graphics", 50)
+        for rate, jitter in ((51, 0.0), (45, 0.2)):
+            with pytest.raises(InputFault, match=r"there after 0.02 s .* take at most 50 Hz"):
+                live.rate("graphics", rate, jitter)
+        live.stop()
+
+    hl.RealTime("closed-loop-ideal", options).run(turn)
+    assert asked == [pytest.approx(50.0)]

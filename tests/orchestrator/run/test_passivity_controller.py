@@ -12,13 +12,13 @@ import hapticlink as hl
 from hapticlink.analysis.stability import wall_limits
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.components.blocks.controller import controller
-from hapticlink.components.device.motors_and_encoders import count_energies, numbers
-from hapticlink.components.device.pantograph import base_angles, dynamics
+from hapticlink.components.device.motors_and_encoders import count_energies
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller, PassivityLaw
-from hapticlink.components.specs.device import Device
 from tests.analysis.stability.own_hand import own_hand
 from tests.blocks import Running
+from tests.devices import device as twin
+from tests.reference.twin_pantograph import NUMBERS, base_angles, dynamics
 from tests.shared_fixtures import run_once
 
 MASS, T = 0.3, 1 / 512
@@ -193,7 +193,7 @@ def test_it_warns_of_motors_at_their_limit():
     weak = {
         "controller.passivity": True,
         "controller.stiffness": [3000.0, 3000.0, 3.0],
-        "device.torque_limit": 0.02,
+        "device.motor.torque_limit": 0.02,
         "hand.wrench": [1.0, 0.0, 0.0],
         "stop_when": "",
     }
@@ -230,13 +230,13 @@ def test_it_warns_where_it_damps_counts_of_the_encoders():
 
 
 def test_the_energy_of_a_count_is_that_of_the_pose_that_fits_it():
-    device, pose = Device(), np.array([0.03, 0.02, 0.4])
-    angles = ca.Function("q", [x := ca.SX.sym("x", 3)], [base_angles(x, numbers(device))])
-    inertia = ca.Function("M", [x], [dynamics(x, ca.SX(3, 1), numbers(device))[0]])
+    device, pose = twin(), np.array([0.03, 0.02, 0.4])
+    angles = ca.Function("q", [x := ca.SX.sym("x", 3)], [base_angles(x, NUMBERS)])
+    inertia = ca.Function("M", [x], [dynamics(x, ca.SX(3, 1), NUMBERS)[0]])
     start = np.asarray(angles(pose)).ravel()
     for i, found in enumerate(count_energies(device, pose, T)):
         # a thousandth of a count, so that the fit is linear
-        small = device.encoder_resolution * 1e-3
+        small = device.encoders[0].resolution * 1e-3
         wanted = start + small * np.eye(4)[i]
         fit = least_squares(lambda p: np.asarray(angles(p)).ravel() - wanted, pose, xtol=1e-15)  # noqa: B023
         v = (fit.x - pose) / 1e-3 / T

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.holds import HOLDS, Hold
 from hapticlink.orchestrator.results.recover import recover
 from hapticlink.orchestrator.scene.find_scene import list_shipped
 from tests.little_fmus import python_fmu
-from tests.orchestrator.c_fmus import event_fmu3
+from tests.orchestrator.c_fmus import equations_fmu, event_fmu3
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, scene, wire_table
 from tests.shared_fixtures import status
 
@@ -206,13 +206,16 @@ def test_a_run_does_not_replace_what_it_goes_on_from(small):
 def test_fmus_that_cannot_save_are_named_before_the_run(tmp_path):
     python_fmu(tmp_path, "Gives")
     event_fmu3(tmp_path)
+    equations_fmu(tmp_path)
     text = fmu_table("gives", "Gives") + fmu_table("also", "Gives")
-    text += fmu_table("one", "events", ISOLATED)
+    text += fmu_table("one", "events", ISOLATED) + fmu_table("solved", "equations")
     with pytest.raises(InputFault) as refused:
         hl.run(scene(tmp_path, text), out=tmp_path / "out", save=["end"])
     assert not (tmp_path / "out" / "run.json").exists()
     cannot = "cannot save its state (canGetAndSetFMUstate)"
-    for name, why in (("gives", cannot), ("also", cannot), ("one", "in a process of its own")):
+    reasons = {"gives": cannot, "also": cannot, "one": "in a process of its own"}
+    reasons["solved"] = "the history of its solver"
+    for name, why in reasons.items():
         assert f"{name} (" in str(refused.value)
         assert why in str(refused.value)
 

@@ -47,8 +47,8 @@ def test_a_block_runs_under_any_name_and_at_any_rate(tmp_path):
             "line 7: fmu[0] (one).settings.rul: unknown key; did you mean 'rule'?",
         ),
         (
-            'block = "haptic_device"\n[fmu.settings.device]\ncrank = "long"',
-            "line 8: fmu[0] (one).settings.device.crank: 'long' should be a valid number",
+            'block = "haptic_device"\n[fmu.settings.device]\nsubsteps = "long"',
+            "line 8: fmu[0] (one).settings.device.substeps: 'long' should be a valid integer",
         ),
         ("rate = 10", "line 4: fmu[0] (one).block: is missing, and so is path"),
     ],

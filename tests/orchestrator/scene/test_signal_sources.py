@@ -136,6 +136,23 @@ def test_what_is_no_signal_is_refused(tmp_path, of, said):
     assert said in str(refused.value)
 
 
+def test_settings_that_give_no_block_are_refused_with_their_line(tmp_path):
+    """They are found wrong only when the block is built."""
+    file = tmp_path / "law.toml"
+    file.write_text(
+        'title = "law"\nduration = 1.0\n\n[[fmu]]\nname = "law"\nblock = "discrete_equivalent"\n'
+        '\n[fmu.settings]\nrule = "tustin"\n'
+    )
+    with pytest.raises(SceneFault, match=r"line 9: fmu\[0\] \(law\)\.settings\.rule: .*'tustin'"):
+        hl.run(file)
+    formula = scene(tmp_path, REAL, {"u": "{ formula = 'x' }"})
+    line = next(i for i, row in enumerate(formula.read_text().split("\n"), 1) if "formula" in row)
+    with pytest.raises(SceneFault, match=rf"line {line}: connection\[0\]\.from\.formula: "):
+        hl.run(formula)
+    with pytest.raises(SceneFault, match=r"--set connection.0.from.formula=y: connection\[0\]"):
+        hl.run(formula, {"connection.0.from.formula": "y"})
+
+
 def test_a_text_input_takes_no_number(tmp_path):
     variables = ("input", {"s": "a"}), ("output", {"y": 0.0})
     with pytest.raises(SceneFault, match="s is a String"):

@@ -116,9 +116,9 @@ def test_an_fmu_of_many_components_is_read_once(tmp_path, monkeypatch):
     """Under names that differ in signs alone: all are numbered."""
     opened: list[Path] = []
 
-    def counted(path):
+    def counted(path, **how):
         opened.append(path)
-        return describe(path)
+        return describe(path, **how)
 
     monkeypatch.setattr(read, "describe", counted)
     signs = [a + b for a in "!?.:,;-+*/()" for b in "!?.:,;-+*/()"]
@@ -247,7 +247,9 @@ CIRCLE = system(
         ('name="p" source', 'name="t" source', r"right has two elements named 't'"),
         (linear(-1, 0.25), TABLE, "BooleanMappingTransformation is read in parameter"),
         ('source="resources/Plain', 'implementation="ModelExchange" source="resources/Plain',
-         r"right\.p is a Component for ModelExchange"),
+         r"it is for co-simulation only, not for model-exchange"),
+        ('source="resources/Plain', 'implementation="ScheduledExecution" source="resources/Plain',
+         r"right\.p is a Component for ScheduledExecution"),
         ('startTime="0.0"', 'startTime="1.0"', "starts at 1.0 s; runs start at 0"),
         ('kind="input"', 'kind="inout"', r"right\.u is inout"),
         (connectors(u="input"), connectors(u="input N"),

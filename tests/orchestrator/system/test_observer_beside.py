@@ -13,11 +13,10 @@ import hapticlink as hl
 from hapticlink.analysis.findings.forces import torques
 from hapticlink.analysis.findings.tracking import FIRST
 from hapticlink.analysis.transparency import mobility_at_hand as transparency
-from hapticlink.components.device import pantograph
-from hapticlink.components.device.motors_and_encoders import numbers
-from hapticlink.components.specs.device import Device
+from hapticlink.components.device.models import device_model
 from hapticlink.orchestrator.results.recorded_scene import all_devices
 from hapticlink.orchestrator.system.build_system import build_system
+from tests.devices import device as twin
 from tests.little_fmus import entries, slave
 from tests.shared_fixtures import run_once
 
@@ -78,7 +77,7 @@ def test_what_is_found_of_a_run_is_the_same() -> None:
         assert getattr(one, name) == getattr(other, name)
     assert one.works["F_T"] == other.works["F_T"]
     assert one.works["motors"] == pytest.approx(other.works["motors"], rel=1e-3)
-    torque, angle = beside["motor_map.tau"], beside["haptic_device.q_true"]
+    torque, angle = beside["motor_map.tau"], beside["haptic_device.theta_true"]
     work = (torque[:-1] * np.diff(angle, axis=0)).sum()
     assert other.works["motors"] == pytest.approx(work, rel=1e-9)
     assert sum(b.generated for b in other.blocks.values()) == pytest.approx(other.generated)
@@ -105,7 +104,7 @@ def test_a_fit_takes_the_pose_of_the_observer(tmp_path: Path) -> None:
     found = []
     for name, options in (("within", {}), ("beside", BESIDE)):
         hl.run("closed-loop", {"duration": 0.6, **options}, out=tmp_path / name, figures=False)
-        found.append(hl.fit(tmp_path / name, device=["handle_mass"]).estimates)
+        found.append(hl.fit(tmp_path / name, device=["body.crank.mass"]).estimates)
     assert found[0] == found[1]
 
 
@@ -124,8 +123,8 @@ POSE, TORQUES = (-0.02, 0.01, 0.3), (0.03, -0.02, 0.01, 0.04)
 @pytest.mark.parametrize("replaces", [True, False])
 def test_a_device_from_elsewhere_is_observed(replaces: bool, tmp_path: Path) -> None:
     """One that is held still against its motors: the hand's wrench is -J_q' tau."""
-    pose, p = ca.SX.sym("pose", 3), numbers(Device())
-    shown = [pantograph.base_angles(pose, p), pantograph.jacobian(pose, p)]
+    pose, model = ca.SX.sym("pose", 3), device_model(twin())
+    shown = [model.angles(pose, model.numbers), model.jacobian(pose, model.numbers)]
     angles, J = (np.array(value) for value in ca.Function("shown", [pose], shown)(POSE))
     outputs = entries("angles", 4) | entries("torques", 4)
     outputs |= {f"angles[{i + 1}]": float(q) for i, q in enumerate(angles.ravel())}

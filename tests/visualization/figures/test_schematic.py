@@ -128,7 +128,7 @@ def test_the_equations_depend_on_every_gain_of_a_part(scene: str) -> None:
             at += v.size
         read = {r for part in of.parts for r in part.reads} & {v.name for v in of.parameters}
         unused = read - used
-        fixed_at_start = {"encoder_resolution", "reach_limit", "rank_tolerance", "hysteresis"}
+        fixed_at_start = {"encoder_resolution", "stop_reach", "rank_tolerance", "hysteresis"}
         assert unused <= fixed_at_start, (name, unused)  # these decide, and have no derivative
 
 

@@ -143,11 +143,12 @@ def test_it_is_steady_only_in_a_hand() -> None:
         "A second is watched first.": [None, hand, False, None],
         "The handle is steady": [None, hand, True, None],
         "The handle vibrates (red trace)": [swings, nobody, False, None],
-        "The run has ended": [None, hand, True, "the run has diverged"],
+        "The run has ended": [None, hand, True, "the device left its workspace"],
+        "The motion grew beyond all bounds": [swings, hand, True, "the run has diverged"],
     }
     found = javascript("first_minute.js", told, [*said.values()])
     assert [words.split(":")[0] for words, _ in found] == [*said]
-    assert [light for _, light in found] == ["", "", "green", "red", "red"]
+    assert [light for _, light in found] == ["", "", "green", "red", "red", "red"]
 
 
 def test_a_run_that_begins_anew_has_not_swung() -> None:

@@ -94,7 +94,7 @@ def test_signals_that_are_not_recorded_are_named_and_nothing_stands_in_for_them(
 
 
 def test_the_picture_of_a_frame_marks_what_the_episodes_of_its_run_have(tmp_path: Path) -> None:
-    options = {"graphics.rate": 10, "controller.topology": False, "device.torque_limit": 0.02}
+    options = {"graphics.rate": 10, "controller.topology": False, "device.motor.torque_limit": 0.02}
     hl.run("closed-loop-ideal", options, out=tmp_path, figures=False)
     run = Recorded(str(tmp_path))
     marked = [(t, f["states"]) for t, f in zip(run.times, run.frames(), strict=True)]
@@ -177,7 +177,7 @@ def test_a_run_of_two_users_has_the_handles_and_arms_of_both(tmp_path: Path) -> 
     left = frame["others"]["left"]
     assert left["handle"] == r["haptic_device_left.x_true"][-1].tolist()
     assert left["F_env"] == r["virtual_mechanism.left.F_env"][-1].tolist()
-    assert len(left["arms"]) == len(frame["arms"]) == 12
+    assert len(left["arms"]) == len(frame["arms"]) == 19
     assert left["arms"] != frame["arms"]
     assert len(left["directions"]) == left["n"][0] == 1
 

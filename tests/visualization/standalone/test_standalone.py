@@ -182,7 +182,7 @@ def test_a_page_is_compiled_once_until_its_scene_changes(
 
     monkeypatch.setattr(compiler, "_compile", count)
     scene, pages = load_viewed_scene("closed-loop-ideal", ["packaging=python"]), []
-    for changed in (scene, scene, load(scene, {"device.handle_mass": 0.13})):
+    for changed in (scene, scene, load(scene, {"device.body.crank.mass": 0.13})):
         pages.append(standalone_page.html(changed, "demo"))
         compiled.append("page")
     assert compiled == ["wasm32-wasi", "page", "page", "wasm32-wasi", "page"]

@@ -6,9 +6,8 @@ joint to its crank end, plane A reaching toward +y and plane B toward -y, elbows
 arms 1 to 4 are A left, A right, B left, B right. Every angle is an explicit function of the pose
 (x m, y m, theta rad), so rates and dynamics follow by differentiation; theta is not wrapped.
 
-`p` maps the names of the geometric and inertial keys of [device] (specs/device.py) to symbols or
-numbers.
-"""
+It is the reference for the device's model, which knows dyads and no pantograph. `p` maps the names
+of NUMBERS to symbols or numbers."""
 
 from __future__ import annotations
 
@@ -18,8 +17,30 @@ from typing import NamedTuple
 import casadi as ca
 
 Parameters = Mapping[str, ca.SX]
-MOTORS = 4
-"""Arms, each with a motor and an encoder at its base joint."""
+NUMBERS = {
+    "proximal_length": 0.16,
+    "distal_length": 0.20,
+    "crank": 0.08,
+    "base_x": -0.005,
+    "base_half_width": 0.03,
+    "base_y_a": -0.20,
+    "base_y_b": 0.20,
+    "rotor_inertia": 1.4e-5,
+    "proximal_mass": 0.05,
+    "proximal_center": 0.07,
+    "proximal_inertia": 1.07e-4,
+    "distal_mass": 0.035,
+    "distal_center": 0.10,
+    "distal_inertia": 1.17e-4,
+    "handle_mass": 0.12,
+    "handle_inertia": 8e-5,
+    "torque_limit": 0.5,
+    "encoder_resolution": 0.0015707963267948966,
+    "reach_limit": 0.95,
+    "stop_stiffness": 5000.0,
+    "stop_damping": 20.0,
+}
+"""Those of the shipped device `twin`."""
 
 
 class Arm(NamedTuple):
@@ -142,16 +163,6 @@ def motion(pose: ca.SX, v: ca.SX, p: Parameters) -> tuple[ca.SX, ca.SX]:
     return M, c
 
 
-FRICTION_RATE = 0.1
-"""Rate (rad/s) over which dry friction changes its sign: at 512 Hz it takes many steps to do so."""
-
-
-def friction_torques(rates: ca.SX, p: Parameters) -> ca.SX:
-    """-b q' - f tanh(q'/v_f), (4,), of the rates of the base angles, with viscous damping b and dry
-    friction f."""
-    return -p["motor_damping"] * rates - p["motor_friction"] * ca.tanh(rates / FRICTION_RATE)
-
-
 def margins(pose: ca.SX, p: Parameters) -> ca.SX:
     """Distances (m) of the four crank ends to the limits of their arms, shape (8,).
 
@@ -185,18 +196,3 @@ def motor_torques(wrench: ca.SX, pose: ca.SX, p: Parameters) -> ca.SX:
     tau = J @ ca.solve(J.T @ J, wrench)
     limit = p["torque_limit"]
     return tau * (limit / ca.fmax(limit, ca.mmax(ca.fabs(tau))))
-
-
-def pose_from_angles(angles: ca.SX, guess: ca.SX, p: Parameters, iterations: int = 2) -> ca.SX:
-    """Forward kinematics: the pose whose base angles are nearest to the four given, shape (3,).
-
-    Least squares with equal weights, as the four encoders are equal, by Gauss-Newton from a nearby
-    guess. theta stays within half a turn of the guess. Two iterations from a guess 5 mm away leave
-    less than 1 % of one encoder count.
-    """
-    pose = guess
-    for _ in range(iterations):
-        J = jacobian(pose, p)
-        residual = angles - base_angles(pose, p)
-        pose = pose + ca.solve(J.T @ J, J.T @ residual)
-    return pose

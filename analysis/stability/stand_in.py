@@ -1,0 +1,246 @@
+"""Sampled FMUs whose state cannot be read, and the linear systems that stand in their place while a
+scene is linearised."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hapticlink.analysis.stability.identified_response import (
+    IdentifiedSystem,
+    NotIdentified,
+    identify,
+)
+from hapticlink.analysis.stability.state_vector import LAYOUT, has_layout
+from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault
+from hapticlink.orchestrator.fmi.description import STATE
+from hapticlink.orchestrator.fmi.instance import Instance
+from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
+from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus
+from hapticlink.orchestrator.run.simulation import Simulation
+from hapticlink.orchestrator.system.system import Fmu, System
+
+FINE = 1e-12
+"""Relative tolerance of the solver of an FMU for model exchange."""
+LONG = 1e4
+"""Stop time (s) that an FMU is told while it is identified."""
+Known = dict[tuple[Any, ...], IdentifiedSystem]
+"""The responses that were identified, by FMU and what they depend on."""
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """What stands in the place of an FMU, for the record: its order, and its largest error on
+    inputs that took no part, relative to the largest response of the output."""
+
+    fmu: str
+    order: int
+    error: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.fmu}: its state cannot be read; a linear system of order {self.order} stands "
+            f"for it, identified by its response to pulses; on other inputs it errs by "
+            f"{self.error:.1g} of the largest response"
+        )
+
+
+def find_stand_ins(known: Known) -> tuple[StandIn, ...]:
+    """Of each FMU the one with the largest error."""
+    worst: dict[str, StandIn] = {}
+    for (name, *_), found in known.items():
+        each = StandIn(name, found.order, found.error)
+        worst[name] = max(worst.get(name, each), each, key=lambda s: s.error)
+    return tuple(worst.values())
+
+
+def record_stand_ins(found: Sequence[StandIn]) -> dict[str, Any]:
+    """The entry of a record, none without any."""
+    return {"stand_ins": [asdict(each) for each in found]} if found else {}
+
+
+def with_stand_ins(system: System, known: Known) -> System:
+    """The system with linear ones in the place of FMUs whose state cannot be read. Raises
+    InputFault for one whose response tells none."""
+    system = replace(system, fmus=tuple(map(_with_declared_states, system.fmus)))
+    unread = [fmu.name for fmu in system.fmus if not has_layout(fmu)]
+    if not unread:
+        return system
+    start = _read_start(system)
+    fmus = (_identified(system, u, start, known) if u.name in unread else u for u in system.fmus)
+    return replace(system, fmus=tuple(fmus))
+
+
+def _with_declared_states(fmu: Fmu) -> Fmu:
+    """One for model exchange with the states that it declares, which can be set, and a solver whose
+    error is far below the differences by which slopes are found. Its discrete states stay."""
+    about = fmu.description
+    if about.equations is None or has_layout(fmu):
+        return fmu
+    states = tuple(f"state {name}" for name in about.equations.states)
+    flags = about.flags | {STATE[about.fmi]}
+    return replace(fmu, description=replace(about, states=states, flags=flags, tolerance=FINE))
+
+
+def _read_start(system: System) -> Callable[[Fmu], Vector]:
+    """The values that an FMU's connections have at the start of the scene, in signal units."""
+    with ExitStack() as stack:
+        simulation = Simulation(system, RunResults(), stack)
+        simulation.step_checks.clear()
+        simulation.start()
+        values, signals = simulation.signals.values.copy(), simulation.signals
+    return lambda fmu: np.array(
+        [values[i] for c in system.into(fmu.name) for i in signals.sources(c)]
+    )
+
+
+def _identified(system: System, fmu: Fmu, start: Callable[[Fmu], Vector], known: Known) -> Fmu:
+    inputs = [s for c in system.into(fmu.name) for s in c.inputs]
+    clock = system.timeline.clock(fmu.clock)
+
+    def refuse(why: str) -> InputFault:
+        return InputFault(f"{fmu.name}: {LAYOUT}, and {why}")
+
+    if not fmu.sampled:
+        raise refuse(
+            "only of a sampled FMU its response to its inputs is identified instead: with "
+            'timing = "sampled" its outputs are those at the beginning of a step'
+        )
+    if clock.period is None or clock.first != clock.period:
+        raise refuse("its response is not identified, as its period varies")
+    if any(s.type in WRITTEN for s in fmu.description.scalars):
+        raise refuse("its response is not identified, as it passes on texts")
+    T, u0 = system.timeline.seconds(clock.period), start(fmu)
+    starts = tuple((scalar.name, value) for scalar, value in fmu.starts)
+    key = fmu.name, fmu.description.path, starts, T, u0.tobytes()
+    if key not in known:
+        try:
+            known[key] = identify(lambda u: _respond(system, fmu, inputs, u, T), u0)
+        except NotIdentified as why:
+            raise refuse(f"its response to its inputs tells no linear system: {why}") from None
+        except FmuFault as fault:
+            raise refuse(f"it fails while its response is identified: {fault}") from None
+    response, about = known[key], fmu.description
+    described = replace(
+        about,
+        states=tuple(f"identified[{i + 1}]" for i in range(response.order)),
+        flags=about.flags | {STATE[about.fmi]},
+    )
+
+    def stand_in(*arguments: Any) -> Instance:
+        return LinearInstance(response, inputs, *arguments)
+
+    return replace(fmu, description=described, isolate=False, stand_in=stand_in)
+
+
+def _respond(system: System, fmu: Fmu, inputs: Sequence[Scalar], given: Matrix, T: float) -> Matrix:
+    """The outputs of a new instance behind each of its steps of T (s)."""
+    alone = replace(system, fmus=(fmu,), connections=(), changes=(), ends_when=None)
+    with ExitStack() as stack:
+        instance = LoadedFmus(alone, stack).instances[fmu.name]
+        places = range(len(inputs))
+        instance.enter_initialization(LONG)
+        instance.connect(inputs, places)(given[0])
+        instance.exit_initialization()
+        setter, rows = (
+            instance.connect(inputs, places),
+            np.empty((len(given), len(instance.outputs))),
+        )
+        for k, values in enumerate(given):
+            setter(values)
+            instance.step(k * T, (k + 1) * T, T)
+            instance.finish()
+            instance.read()
+            rows[k] = instance.outputs
+        return rows
+
+
+class LinearInstance(Instance):
+    """A linear system as an instance of the FMU in whose place it stands. Its serialised state has
+    the values of all variables by reference, and then its own states; inputs and outputs are in the
+    units of signals."""
+
+    in_c = False
+
+    def __init__(
+        self, response: IdentifiedSystem, inputs: Sequence[Scalar], *arguments: Any
+    ) -> None:
+        super().__init__(*arguments)
+        self._response = response
+        scalars = [s for s in self.description.scalars if s.causality != "independent"]
+        scalars.sort(key=lambda s: s.reference)
+        place = {s.name: i for i, s in enumerate(scalars)}
+        self._inputs = np.array([place[s.name] for s in inputs], dtype=np.intp)
+        self._at = {s.name: i for i, s in enumerate(inputs)}
+        self._results = np.array([place[s.name] for s in self.description.outputs], dtype=np.intp)
+        self._n = len(scalars)
+        self._state = np.zeros(self._n + response.order)
+        self._state[self._inputs] = response.u0
+        self._state[self._results] = response.y0
+        self._saved: dict[int, tuple[Vector, float]] = {}
+
+    def _load(self) -> None:
+        """Nothing to load."""
+
+    def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+        of = [k for k, s in enumerate(scalars) if s.name in self._at]
+        into = self._inputs[[self._at[scalars[k].name] for k in of]]
+        where = np.array([places[k] for k in of], dtype=np.intp)
+
+        def set_from(signals: Vector) -> None:
+            self._state[into] = signals[where]
+
+        return set_from
+
+    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
+        return None
+
+    def enter_initialization(self, stop_time: float) -> None:
+        """Nothing to be told."""
+
+    def exit_initialization(self) -> None:
+        self.read()
+        self._start_loop()
+
+    def read(self) -> None:
+        self.outputs[:] = self._state[self._results]
+
+    def read_some(self, places: Sequence[int]) -> None:
+        self.outputs[list(places)] = self._state[self._results[list(places)]]
+
+    def step(self, time: float, end: float, size: float) -> None:
+        of, x = self._response, self._state[self._n :]
+        du = self._state[self._inputs] - of.u0
+        self._state[self._results] = of.y0 + of.C @ x + of.D @ du
+        x[:] = of.A @ x + of.B @ du
+        self.place.time = end
+
+    def finish(self) -> None:
+        """Nothing to wait for."""
+
+    def save(self, slot: int = 0) -> None:
+        self._saved[slot] = self._state.copy(), self.time
+
+    def rollback(self, slot: int = 0) -> None:
+        self._state[:], self.place.time = self._saved[slot]
+
+    def serialized(self) -> bytes:
+        return self._state.tobytes()
+
+    def deserialize(self, state: bytes) -> None:
+        self._state[:] = np.frombuffer(state)
+
+    def dismiss(self) -> None:
+        """Nothing to close."""
+
+    def abandon(self) -> None:
+        """Nothing is called."""
+
+    def close(self) -> FmuFault | None:
+        return None

@@ -1,0 +1,1 @@
+"""Blind trials: what somebody who feels two settings can tell apart."""

@@ -1,0 +1,236 @@
+"""Device files: the tables of [device] and [devices.NAME], merged over those of the file that each
+`extends`, and bodies that are `like` others."""
+
+from __future__ import annotations
+
+import importlib.resources
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path as FilePath
+from typing import Any
+
+from hapticlink.components.specs.device import Device, DeviceBody
+from hapticlink.orchestrator.base import text_files
+from hapticlink.orchestrator.base.errors import InputFault, near, shorten, unknown
+from hapticlink.orchestrator.scene.merge import merge
+from hapticlink.orchestrator.scene.toml_keys import (
+    LARGEST,
+    Path,
+    Place,
+    Problem,
+    key_lines,
+    loads,
+    value,
+)
+
+DEFAULT = "twin"
+MAX_EXTENDED = 20
+"""Device files that extend one another."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceTable(Device):
+    """A linkage with motors and encoders: a device file, over which the other keys are merged, or
+    bodies, joints and handle of one's own."""
+
+    extends: str | None = None
+    """The device file: the name of a shipped one, or a path relative to the scene. By default twin,
+    of a scene whose device has no bodies of its own."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceBodyTable(DeviceBody):
+    """A rigid body of a device, or one like another."""
+
+    like: str | None = None
+    """The body whose mass, inertia and centre it has, where it does not say otherwise."""
+
+
+@cache
+def list_devices() -> dict[str, Any]:
+    """The device files that are shipped with the package, by name."""
+    folder = importlib.resources.files("hapticlink.scenes.devices")
+    names = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    files = {entry.name.removesuffix(".toml"): entry for entry in names}
+    return dict(sorted(files.items()))
+
+
+def find_device(name: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
+    """Name, text and folder of a device file: a path relative to `folder`, or the name of a shipped
+    one, which has no folder. Raises InputFault where there is none."""
+    path, known = (folder or FilePath()) / name, list_devices()
+    if text_files.exists(path):
+        return str(path), text_files.read_text(path, "a device", LARGEST), path.parent
+    if name in known:
+        return name, known[name].read_text(encoding="utf-8"), None
+    raise InputFault(f"{shorten(name)}: neither a file nor a shipped device; {near(name, known)}")
+
+
+def device_tables(data: Mapping[str, Any]) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """The tables of all devices of a scene, with their paths."""
+    if isinstance(data.get("device"), dict):
+        yield ("device",), data["device"]
+    further = data.get("devices")
+    for name, table in further.items() if isinstance(further, dict) else ():
+        if isinstance(table, dict):
+            yield ("devices", name), table
+    fmus = data.get("fmu")
+    for i, fmu in enumerate(fmus if isinstance(fmus, list) else ()):
+        table = value(fmu, ("settings", "device"))
+        if isinstance(table, dict):
+            yield ("fmu", i, "settings", "device"), table
+
+
+def is_choice(names: tuple[str, ...]) -> bool:
+    """Whether an option chooses a device file."""
+    return names[-1:] == ("extends",) and names[0] in ("device", "devices")
+
+
+def locate(data: Mapping[str, Any], folder: FilePath) -> None:
+    """Makes the paths of device files those from everywhere, of a scene in `folder`."""
+    for _, table in device_tables(data):
+        name = table.get("extends")
+        if isinstance(name, str) and text_files.exists(folder / name):
+            table["extends"] = str(folder / name)
+
+
+@dataclass(frozen=True)
+class DeviceKeys:
+    """The file and line of the keys that a scene has from its device files, and what is wrong with
+    the names of files, bodies and joints."""
+
+    places: dict[Path, Place]
+    problems: list[Problem]
+
+
+def put_device_files(data: Mapping[str, Any], written: Mapping[Path, Place]) -> DeviceKeys:
+    """Puts its device files into the tables of a scene, whose keys are `written` at places. What it
+    says of a body or joint by name, `[device.body.crank]`, is merged over the file's."""
+    places: dict[Path, Place] = {}
+    problems: list[Problem] = []
+    for path, table in [*device_tables(data)]:
+        name = table.pop("extends", DEFAULT if _is_changed(table) else None)
+        if name is None:
+            continue
+        try:
+            below, where = _read(name)
+        except InputFault as fault:
+            problems.append(((*path, "extends"), str(fault)))
+            continue
+        named = {key: table.pop(key) for key in NAMED if isinstance(table.get(key), dict)}
+        replaced: set[Path] = set()
+        whole = merge(below, table, replaced)
+        places |= {
+            (*path, *key): place
+            for key, place in where.items()
+            if not any(key[:i] in replaced for i in range(1, len(key) + 1))
+        }
+        for key, entries in named.items():
+            for entry, changes in entries.items():
+                index = _index(whole.get(key), entry)
+                if index is None or not isinstance(changes, dict):
+                    known = [str(e.get("name")) for e in whole.get(key, ())]
+                    problems.append(((*path, key, entry), unknown(key, entry, known)))
+                    continue
+                whole[key][index] = merge(whole[key][index], changes, set())
+                here = (*path, key, entry)
+                places |= {
+                    (*path, key, index, *at[len(here) :]): place
+                    for at, place in written.items()
+                    if at[: len(here)] == here
+                }
+        table.clear()
+        table.update(whole)
+    return DeviceKeys(places, problems)
+
+
+NAMED = ("body", "joint")
+"""Arrays of a device file whose entries a scene can change by their names."""
+
+
+def _is_changed(table: Mapping[str, Any]) -> bool:
+    """Whether a table changes a device file, and has no bodies of its own."""
+    return not isinstance(table.get("body"), list)
+
+
+def _index(entries: Any, name: str) -> int | None:
+    named = [e.get("name") for e in entries] if isinstance(entries, list) else []
+    return named.index(name) if name in named else None
+
+
+def _read(
+    name: Any, folder: FilePath | None = None, depth: int = 0
+) -> tuple[Any, dict[Path, Place]]:
+    """The tables of a device file, over those of the one that it extends; file and line of each
+    key."""
+    if not isinstance(name, str):
+        raise InputFault(f"{shorten(repr(name))}: write a device's name or path")
+    if depth >= MAX_EXTENDED:
+        raise InputFault(f"{shorten(name)}: the last of {MAX_EXTENDED} files, each over the next")
+    file, text, where = find_device(name, folder)
+    try:
+        tables = loads(text)
+    except ValueError as error:
+        raise InputFault(f"{file}: not TOML: {error}") from error
+    lines = {key: (file, line) for key, line in key_lines(text).items()}
+    base = tables.pop("extends", None)
+    if base is None:
+        return tables, lines
+    below, further = _read(base, where, depth + 1)
+    return merge(below, tables, set()), further | lines
+
+
+def put_likes(data: Mapping[str, Any]) -> list[Problem]:
+    """Gives bodies that are `like` another what they do not say themselves; returns what is wrong
+    with the names."""
+    problems: list[Problem] = []
+    for path, table in device_tables(data):
+        bodies = table.get("body")
+        entries = [b for b in bodies if isinstance(b, dict)] if isinstance(bodies, list) else []
+        own = {b["name"]: b for b in entries if isinstance(b.get("name"), str) and "like" not in b}
+        for i, body in enumerate(entries):
+            if "like" not in body:
+                continue
+            model = body.pop("like")
+            if model in own:
+                body |= {k: v for k, v in own[model].items() if k not in body}
+                continue
+            why = f"{shorten(repr(model))} is no body that says its own; {near(str(model), own)}"
+            problems.append(((*path, "body", i, "like"), why))
+    return problems
+
+
+_OF_ALL_ARMS = "[[device.body]] and [[device.joint]] of a device file that extends twin"
+NOW = {
+    "proximal_length": f"lengths are those between pins: `at_parent` in {_OF_ALL_ARMS}",
+    "distal_length": f"lengths are those between pins: `at_parent` and `at` in {_OF_ALL_ARMS}",
+    "crank": f"its length is that between pins: `at_child` and `at` in {_OF_ALL_ARMS}",
+    "base_x": f"base joints are at `at_parent` in {_OF_ALL_ARMS}",
+    "base_half_width": f"base joints are at `at_parent` in {_OF_ALL_ARMS}",
+    "base_y_a": f"base joints are at `at_parent` in {_OF_ALL_ARMS}",
+    "base_y_b": f"base joints are at `at_parent` in {_OF_ALL_ARMS}",
+    "rotor_inertia": "write motor.inertia",
+    "proximal_mass": "write body.a_left_proximal.mass, which the other arms are like",
+    "proximal_center": "write body.a_left_proximal.center = [x, 0], which the other arms are like",
+    "proximal_inertia": "write body.a_left_proximal.inertia, which the other arms are like",
+    "distal_mass": "write body.a_left_distal.mass, which the other arms are like",
+    "distal_center": "write body.a_left_distal.center = [x, 0], which the other arms are like",
+    "distal_inertia": "write body.a_left_distal.inertia, which the other arms are like",
+    "handle_mass": "write body.crank.mass",
+    "handle_inertia": "write body.crank.inertia",
+    "motor_damping": "write motor.damping",
+    "motor_friction": "write motor.friction",
+    "torque_limit": "write motor.torque_limit",
+    "encoder_resolution": "write encoder.resolution",
+    "reach_limit": "write stop.reach",
+    "stop_stiffness": "write stop.stiffness",
+    "stop_damping": "write stop.damping",
+}
+"""What became of the keys of [device] when the twin pantograph was the only device."""
+
+
+def find_old_keys(data: Mapping[str, Any]) -> Iterator[Problem]:
+    for path, table in device_tables(data):
+        for key in (key for key in table if key in NOW):
+            yield (*path, key), f"a device is a linkage now: {NOW[key]}"

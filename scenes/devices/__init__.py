@@ -1,0 +1,1 @@
+"""Device files, which `[device] extends = NAME` names."""

@@ -1,0 +1,56 @@
+"""`python -m studies.devices`: judges every shipped device, runs what checks it, and writes
+results/devices."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import hapticlink as hl
+from hapticlink.orchestrator.scene.device_files import list_devices
+from studies.devices import measure, page
+
+
+def row(name: str) -> dict[str, Any]:
+    """All that the page has of a device."""
+    given = measure.options(name)
+    found = hl.stability(measure.SCENE, given, poses=1)
+    factors = measure.BESIDE if found.margin.stiffness else ()
+    checks = [measure.check(name, found, factor) for factor in factors]
+    device = hl.scene(measure.SCENE, given).device
+    assert device is not None
+    errors = {}
+    for sensing in ("ideal", "encoders"):
+        run = hl.run(measure.SCENE, given | {"sensing": sensing}, figures=False)
+        end = run.run["end"]
+        errors[sensing] = (float(run.tracking().distance_mm.max()), end["reason"], end["time"])
+    return {
+        "device": name,
+        "renders": device.handle.angle,
+        "verdict": found.finding,
+        "margin": asdict(found.margin),
+        "checks": [asdict(check) | {"agrees": check.agrees} for check in checks],
+        "rendered": asdict(measure.rendered(device)),
+        "errors": errors,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m studies.devices", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("results/devices"))
+    asked = parser.parse_args()
+    rows = []
+    for name in list_devices():
+        rows.append(row(name))
+        print(f"{name}: {rows[-1]['verdict']}", flush=True)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    (asked.out / "devices.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    (asked.out / "README.md").write_text(page.text(rows), encoding="utf-8")
+    print(asked.out)
+
+
+if __name__ == "__main__":
+    main()

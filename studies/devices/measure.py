@@ -1,0 +1,146 @@
+"""What a device can render, and whether runs agree with the verdicts on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+import hapticlink as hl
+from hapticlink.analysis.search.settings import Gains
+from hapticlink.analysis.stability.hand_cases import InHands, worst_case
+from hapticlink.analysis.stability.hands import HANDS, standing
+from hapticlink.analysis.stability.modes import DRIFT
+from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.resting_scene import resting
+from hapticlink.analysis.stability.verdict_record import Stability
+from hapticlink.components.device.models import device_model
+from hapticlink.components.device.motors_and_encoders import mass_and_count
+from hapticlink.components.device.observer_laws import default_bandwidth
+from hapticlink.components.device.workspace import workspace
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.hand import ArmHand, Hand, SpringHand
+from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
+from hapticlink.orchestrator.system.build_system import build_system
+
+SCENE = "closed-loop-ideal"
+SECONDS, EARLY, LATE = 60.0, (0.25, 2.0), 5.0
+OFF = (2e-4, 0.0, 0.0)
+QUIET, MOST = 1e-7, 0.5
+BESIDE = (0.8, 1.25)
+"""Factors on the margin, with which the verdicts are checked."""
+COUPLING = 100.0
+"""K_pc (N/m) of the scene."""
+Options = dict[str, Any]
+
+
+def options(name: str) -> Options:
+    """Those of the scene with a device."""
+    pull = {"hand.wrench": [-0.5, 0.0, 0.0], "controller.bias": "full"}
+    return {"device.extends": name, **pull}
+
+
+@dataclass(frozen=True)
+class Check:
+    """A verdict with gains of `factor` times the margin, in words, and what a run says."""
+
+    factor: float
+    says: str
+    hand: str
+    growth: float
+    run: str
+
+    @property
+    def agrees(self) -> bool:
+        """A verdict that is marginal or drifts is not decided by a run."""
+        return self.says not in ("stable", "unstable") or self.says == self.run
+
+
+def scaled(name: str, factor: float) -> Options:
+    """The options with all gains times a factor, dampings by its root."""
+    with build_system(hl.scene(SCENE, options(name))) as system:
+        gains = Gains(system)
+        return options(name) | gains.options(dict.fromkeys(gains.laws, factor))
+
+
+def check(name: str, found: Stability, factor: float) -> Check:
+    """The verdict with gains of factor times the margin that was found, and its run."""
+    assert found.margin.stiffness
+    pose = next(pose for pose in found.poses if pose.name == found.worst.pose)
+    times = factor * found.margin.stiffness
+    with resting(hl.scene(SCENE, options(name)), pose.held, joints=pose.joints) as place:
+        scales = dict.fromkeys(Gains(place.map.system).laws, times)
+        cases = InHands(place, scales).cases(pose.name, dict(HANDS), DRIFT)
+    case = worst_case(cases)
+    ran = run_case(scaled(name, times), pose, HANDS[case.hand])
+    return Check(factor, case.verdict, case.hand, case.growth, ran)
+
+
+def run_case(given: Options, there: Pose, holding: Hand) -> str:
+    """stable or unstable, by a run in a pose and a hand."""
+    assert isinstance(holding, ArmHand | SpringHand)
+    changes = {
+        "hand": standing(holding, np.add(there.point, OFF)),
+        "linkage.start": there.joints,
+        "linkage.start_velocity": {},
+        "duration": SECONDS,
+        "stop_when": "",
+    }
+    kept = {key: value for key, value in given.items() if not key.startswith("hand")}
+    run = hl.run(SCENE, kept | changes, figures=False)
+    if run.fault:
+        return "unstable"
+    speed, time = np.abs(run[HANDLE_VELOCITY]).max(axis=1), run.time(HANDLE_VELOCITY)
+    early = speed[(time >= EARLY[0]) & (time <= EARLY[1])].max()
+    late = speed[time >= SECONDS - LATE].max()
+    return "stable" if late < max(MOST * early, QUIET) else "unstable"
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """Numbers of a device: the range of its mass (kg) over its workspace and all directions, the
+    least force (N) that its motors can give at the start in any direction, the way (m) of the
+    handle by a count, the bandwidth of its observer (rad/s) and the error of the force (N) by a
+    count."""
+
+    mass: tuple[float, float]
+    force: float
+    count: float
+    omega_n: float
+    noise: float
+
+
+def rendered(device: Device) -> Rendered:
+    """Those of a device."""
+    model, space = device_model(device), workspace(device)
+    z = ca.SX.sym("z", len(model.start_place))
+    lengths = min(model.directions.size, 2)
+    still = ca.SX(model.directions.size, 1)
+    M, _ = model.motion(z, still, model.numbers)
+    pose = ca.SX.sym("pose", 3)
+    placed = ca.Function("placed", [pose], [model.place_at_pose(pose)])
+    function = ca.Function("M", [z], [ca.inv(ca.inv(M)[:lengths, :lengths])])
+    masses = []
+    for i, x in enumerate(space.x[::8]):
+        for k, y in enumerate(space.y[::8]):
+            for n, theta in enumerate(space.theta[::8]):
+                if space.margin[8 * i, 8 * k, 8 * n] >= 0.0:
+                    masses += [*np.linalg.eigvalsh(np.array(function(placed([x, y, theta]))))]
+    J = ca.Function("J", [z], [model.jacobian(z, model.numbers)])(model.start_place)
+    limits = np.array([motor.torque_limit for motor in device.motors])
+    back = np.linalg.pinv(np.array(J).T)
+    turned = np.linspace(0.0, np.pi, 60)
+    ways = np.stack([np.cos(turned), np.sin(turned), 0.0 * turned])
+    along = np.array(model.directions.rows) @ ways
+    asked = np.abs(back @ along[:, np.linalg.norm(along, axis=0) > 1e-9]) / limits[:, None]
+    mass, count = mass_and_count(model)
+    omega_n = default_bandwidth(model)
+    return Rendered(
+        (float(min(masses)), float(max(masses))),
+        float(1.0 / asked.max()),
+        count,
+        omega_n,
+        mass * count * omega_n**2,
+    )

@@ -1,0 +1,95 @@
+"""The page of the study of devices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hapticlink.orchestrator.results.numbers import short
+from studies.devices.measure import COUPLING
+
+
+def text(rows: Sequence[dict[str, Any]]) -> str:
+    """The page, of the rows of all devices."""
+    checks = [(row, check) for row in rows for check in row["checks"]]
+    decided = [check for _, check in checks if check["says"] in ("stable", "unstable")]
+    right = sum(check["agrees"] for check in decided)
+    whole = sum(
+        bool(row["checks"]) and all(check["agrees"] for check in row["checks"]) for row in rows
+    )
+    study = "[what is judged and run](../../studies/devices/__init__.py)"
+    numbers = (
+        "largest stable stiffness of the coupling (N/m)",
+        "lowest graphics rate (Hz)",
+        "mass at the handle in the workspace (kg)",
+        "least force of the motors (N)",
+        "way of a count (um)",
+        "observer (rad/s)",
+        "error of the force by a count (N)",
+    )
+    errors = (
+        f"| {row['device']} | {_error(row, 'ideal')} | {_error(row, 'encoders')} |" for row in rows
+    )
+    lines = (
+        "# Devices",
+        "",
+        "What each shipped [device](../../docs/device-file.md) can render of the report's "
+        "five-bar, and whether the verdicts and margins of `stability` are those of runs. Made by "
+        f"`python -m studies.devices` ({study}); all numbers: [devices.json](devices.json).",
+        "",
+        "## What a device can render",
+        "",
+        f"| device | renders | {' | '.join(numbers)} |",
+        "|---|---|--:|--:|--:|--:|--:|--:|--:|",
+        *(_rendered(row) for row in rows),
+        "",
+        "The mass is that in the lightest direction anywhere to that in the heaviest, the least "
+        "force that in the worst direction, where the device is assembled.",
+        "",
+        "## Tracking",
+        "",
+        "Largest distance of operational point and handle, graphics at 30 Hz, 3 s.",
+        "",
+        "| device | ideal sensing (mm) | encoders, default gains (mm) |",
+        "|---|--:|--:|",
+        *errors,
+        "",
+        "## Verdicts and runs",
+        "",
+        f"Verdicts of {whole} of {len(rows)} devices agree with their runs, {right} of "
+        f"{len(decided)} runs that decide: one does not where the verdict is marginal or drifts.",
+        "",
+        "| device | at the scene's gains | margin | times it | judged | growth (1/s), hand | run |",
+        "|---|---|--:|--:|---|---|---|",
+        *(_check(row, check) for row, check in checks),
+        "",
+    )
+    return "\n".join(lines)
+
+
+def _rendered(row: dict[str, Any]) -> str:
+    found, margin = row["rendered"], row["margin"]
+    low, high = found["mass"]
+    renders = "forces and moments" if row["renders"] == "held" else "forces"
+    rate = margin["rate"]
+    return (
+        f"| {row['device']} | {renders} | {short(COUPLING * margin['stiffness'])} | "
+        f"{'-' if rate is None else short(rate)} | {short(low)} to {short(high)} | "
+        f"{short(found['force'])} | {short(1e6 * found['count'])} | {short(found['omega_n'])} | "
+        f"{short(found['noise'])} |"
+    )
+
+
+def _error(row: dict[str, Any], sensing: str) -> str:
+    distance, reason, time = row["errors"][sensing]
+    ended = "" if reason == "duration" else f" ({reason} at {time:.3g} s)"
+    return f"{short(distance)}{ended}"
+
+
+def _check(row: dict[str, Any], check: dict[str, Any]) -> str:
+    verdict = row["verdict"].partition(":")[0]
+    return (
+        f"| {row['device']} | {verdict} | {short(row['margin']['stiffness'])} | "
+        f"{check['factor']:g} | {check['says']} | {short(check['growth'])}, {check['hand']} | "
+        f"{check['run']} |"
+    )

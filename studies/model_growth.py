@@ -1,0 +1,166 @@
+"""Growth rates of the lifted map with early steps against those of runs:
+
+    python -m studies.model_growth
+
+20 cells of the hold `model` with the mechanism at the graphics rate, each in a spring hand whose
+target lies OFF beside the start. Writes results/model/growth.csv, the largest growth rate (1/s) by
+the map at its equilibrium and by a run, which knows nothing of the map.
+
+The rate of a run is that of its slowest decay, or of its growth. Windows of it would mix modes that
+decay nearly alike. So its snapshots y_k, the handle's velocities of a whole period P of the map,
+are taken for those of a linear system, y_{k+1} = A y_k, whose eigenvalues z are those of A between
+the directions that the snapshots have (dynamic mode decomposition: Schmid, J. Fluid Mech. 656
+(2010), 5), and the rate is ln|z|/P. Each pair of snapshots is divided by the size of the first one,
+so that the last ones count as much.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import hapticlink as hl
+from hapticlink.analysis.stability.hand_slopes import hand_slopes
+from hapticlink.analysis.stability.modes import modes
+from hapticlink.analysis.stability.poses import in_own_hand
+from hapticlink.orchestrator.base.arrays import Matrix
+from hapticlink.orchestrator.base.signal_names import HAND
+from studies.mismatch.cases import LINKAGES, Case
+
+OFF = 1e-9
+"""From the start to the hand's target, in x and y (m)."""
+SECONDS = 8.0
+LARGE, SMALL = 1e-4, 1e-11
+"""Velocities (m/s) above which a motion is no longer small, and below which it is rounding."""
+SAME = 0.01
+"""Difference of growth rates, relative to the larger one or to 1 1/s, that is none."""
+RANK = 1e-4
+"""Directions of snapshots, relative to the largest, that are none."""
+GAINS = {"medium": 100.0, "firm": 400.0}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A linkage in a hand of `hand` (N/m); `late`: the computing time, in frames."""
+
+    linkage: str
+    gains: str
+    rate: int
+    hand: float
+    late: float = 0.0
+
+    @property
+    def scene(self) -> str:
+        return Case(self.linkage, "spring", False, 1).scene
+
+    @property
+    def options(self) -> dict[str, Any]:
+        x, y, angle = self.start
+        k, K = self.hand, GAINS[self.gains]
+        B = 2.0 * K**0.5
+        return {
+            "hold": "model",
+            "downsampling": "model",
+            "directions_from": "mechanism",
+            "mechanism_at": "graphics",
+            "sensing": "ideal",
+            "controller.bias": "full",
+            "controller.teleoperation.stiffness": [K, K, K / 1000],
+            "controller.teleoperation.damping": [B, B, B / 1000],
+            "graphics.rate": self.rate,
+            "computing_time": self.late / self.rate,
+            "hand": {
+                "type": "spring",
+                "stiffness": [k, k, k / 500],
+                "damping": [k / 50, k / 50, k / 20000],
+                "target": [[0.0, x + OFF, y - OFF, angle]],
+            },
+        }
+
+    @cached_property
+    def start(self) -> list[float]:
+        """The pose of the operational point at the start."""
+        r = hl.run(self.scene, {"duration": 0.01}, figures=False)
+        pose: list[float] = r["virtual_mechanism.x"][0].tolist()
+        return pose
+
+
+def cells() -> Iterator[Cell]:
+    """20 cells, of frames of whole haptic periods, so that a period of the map is a frame. The
+    handle takes part in their leading mode: of another one its velocities tell nothing."""
+    settings = (
+        ("medium", 16, 300.0, 0.0),
+        ("medium", 8, 100.0, 0.0),
+        ("firm", 16, 500.0, 0.0),
+        ("firm", 32, 100.0, 0.0),
+        ("firm", 16, 500.0, 0.5),
+    )
+    for linkage, setting in product(LINKAGES, settings):
+        yield Cell(linkage, *setting)
+
+
+def of_map(cell: Cell) -> tuple[float, float]:
+    """The growth rate (1/s) of the leading mode at the equilibrium, and its period P (s)."""
+    with in_own_hand(hl.scene(cell.scene, cell.options)) as (place, hand):
+        period = place.period({})
+        if hand is not None:
+            period = period.held({HAND: hand_slopes(hand, place.T)})
+        leading = modes(period.linear, place.map.period)[0]
+        return leading.growth, place.map.period
+
+
+def of_run(cell: Cell, P: float) -> float:
+    """The growth rate (1/s) of a run, in periods of P (s)."""
+    r = hl.run(cell.scene, cell.options | {"duration": SECONDS}, figures=False)
+    v = r["haptic_device.v"][1:]
+    steps = round(P * 512)
+    snapshots = v[: len(v) // steps * steps].reshape(-1, steps * v.shape[1])
+    size = np.abs(snapshots).max(axis=1)
+    outside = np.flatnonzero((size > LARGE) | (size < SMALL))
+    end = outside[0] if len(outside) else len(size)
+    begin = end // 4  # what decays at once is left out
+    return float(np.log(np.abs(eigenvalues(snapshots[begin:end])).max()) / P)
+
+
+def eigenvalues(snapshots: Matrix) -> Matrix:
+    """Those of the linear system that takes each snapshot (a row) to the next one."""
+    scale = np.abs(snapshots[:-1]).max(axis=1)
+    X, Y = (part.T / scale for part in (snapshots[:-1], snapshots[1:]))
+    U, S, V = np.linalg.svd(X, full_matrices=False)
+    kept = min(np.count_nonzero(S / S[0] > RANK), len(scale) // 2)
+    A = U[:, :kept].T @ Y @ V[:kept].T / S[:kept]
+    found: Matrix = np.linalg.eigvals(A)
+    return found
+
+
+def agree(told: float, found: float) -> bool:
+    """Whether two growth rates are the same."""
+    return abs(told - found) <= SAME * max(1.0, abs(told), abs(found))
+
+
+def main(folder: Path) -> None:
+    """Writes the table."""
+    header = ("linkage", "gains", "hz", "hand_n_per_m", "computing_time_frames", "map", "run")
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "growth.csv").open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow((*header, "same"))
+        for cell in cells():
+            told, P = of_map(cell)
+            found = of_run(cell, P)
+            own = cell.linkage, cell.gains, cell.rate, f"{cell.hand:g}", f"{cell.late:g}"
+            row = *own, f"{told:.4g}", f"{found:.4g}", agree(told, found)
+            table.writerow(row)
+            print(*row, flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if sys.argv[1:] else "results/model"))

@@ -1,0 +1,26 @@
+"""Growth rates of the lifted map with early steps against those of runs, and how these are read."""
+
+import numpy as np
+import pytest
+
+from studies.model_growth import Cell, agree, eigenvalues, of_map, of_run
+
+
+def test_the_eigenvalues_of_a_linear_system_are_found_in_its_snapshots() -> None:
+    """Two modes that decay nearly alike, one of which oscillates: windows show a mixture."""
+    t, x = np.arange(80.0)[:, None], np.array([1.0, 0.5, -0.3])
+    motion = 0.97**t * np.cos(0.4 * t) * x + 0.98**t * x[::-1]
+    found = np.sort(np.abs(eigenvalues(motion.reshape(20, -1))))
+    assert found == pytest.approx(np.array([0.97, 0.97, 0.98]) ** 4, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [Cell("five-bar", "medium", 8, 100.0), Cell("four-bar", "firm", 16, 500.0, 0.5)],
+    ids=str,
+)
+def test_a_run_grows_as_fast_as_the_map_tells(cell: Cell) -> None:
+    told, P = of_map(cell)
+    assert told > 0.1
+    assert agree(told, of_run(cell, P))
+    assert not agree(told, -told)
