@@ -139,7 +139,7 @@ def title(scene: str) -> str:
     path = Path(scene)
     if path.suffix == ".state":
         return f"{path.absolute().parent.name}-from-{path.stem}"
-    return path.stem if path.suffix in (".toml", ".ssp") else path.name
+    return path.stem if path.suffix in (".toml", ".ssp", ".xml") else path.name
 
 
 def default_folder(root: str, scene: str, options: Iterable[str] = ()) -> Path:

@@ -1,5 +1,5 @@
-"""Opens a scene by its name or path: a shipped one, a TOML file, an SSP, or that of a run's state,
-which then goes on from it."""
+"""Opens a scene by its name or path: a shipped one, a TOML file, an SSP, an OspSystemStructure.xml,
+or that of a run's state, which then goes on from it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def load(
         return scene if resumes else require_start(scene)
     source = scene if isinstance(scene, Source) else source_of(scene)
     source = replace(source, options=(*source.options, *further))
-    if source.name.endswith(".ssp"):
+    if source.name.endswith((".ssp", ".xml")):
         _check_ssp(source)
     read = from_source(source)
     return read if resumes else require_start(read)
@@ -58,6 +58,10 @@ def _find(scene: str) -> Source:
         from hapticlink.orchestrator.ssp import read as ssp
 
         return Source(scene, ssp.tables(FilePath(scene)), {})
+    if scene.endswith(".xml"):
+        from hapticlink.orchestrator.ssp import osp
+
+        return Source(scene, osp.tables(FilePath(scene)), {})
     name, text, folder = find_scene(scene)
     return Source(name, *document(text, name, folder))
 

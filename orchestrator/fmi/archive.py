@@ -100,14 +100,19 @@ def read_xml(archive: zipfile.ZipFile, entry: str) -> bytes:
             f"{path}: {entry} has {info.file_size} bytes; at most {MAX_XML_BYTES} are read"
         )
     text = archive.read(info)
+    require_plain_xml(text, f"{path}: {entry}")
+    return text
+
+
+def require_plain_xml(text: bytes, what: str) -> None:
+    """Raises InputFault for XML, called `what`, that is not well-formed or has a document type."""
     parser = expat.ParserCreate()
 
     def refuse(*_: object) -> None:
-        raise InputFault(f"{path}: {entry} declares a document type, which may expand without end")
+        raise InputFault(f"{what} declares a document type, which may expand without end")
 
     parser.StartDoctypeDeclHandler = refuse
     try:
         parser.Parse(text, True)
     except (expat.ExpatError, LookupError, ValueError) as error:  # of an encoding, the last two
-        raise InputFault(f"{path}: {entry} is not well-formed XML: {error}") from error
-    return text
+        raise InputFault(f"{what} is not well-formed XML: {error}") from error

@@ -141,7 +141,7 @@ class InProcess(Instance):
     @property
     def forward(self) -> bool:
         """noSetFMUStatePriorToCurrentPoint: whoever can go back may be asked to."""
-        return not self.description.restores_state
+        return not (self.description.restores_state and self.goes_back)
 
     def _judge_status(self, status: int, time: float) -> int:
         """The status of a step from `time` (s) that returned `status`: ok where the FMU requests

@@ -147,6 +147,8 @@ class Instance(ABC):
         self.place = StepState()
         self._waiting: list[tuple[float, Callable[[float], object]]] = []
         self.recorded_only: frozenset[str] = frozenset()
+        self.goes_back = True
+        """Whether a state may be restored that is earlier than the newest step."""
         self.log_path = ""
         """The file to which it writes what the FMU logs, "" for none."""
         self.row_due = ctypes.c_int64(1)

@@ -64,9 +64,8 @@ class Isolated(Instance):
         self._process.interruptible = True
         what = (self.name, self.description, self.starts, self.policy)
         # The answer waits for `enter_initialization`: all FMUs of a run load at the same time.
-        self._send(
-            "load", *what, self._folder, self.log_path, allowed=max(self.policy.timeout, LOADING)
-        )
+        room = self._folder, self.log_path, self.goes_back
+        self._send("load", *what, *room, allowed=max(self.policy.timeout, LOADING))
 
     # --- messages -------------------------------------------------------------------------
 

@@ -53,11 +53,12 @@ class HostedFmu:
         policy: Any,
         folder: str = "",
         log_path: str = "",
+        goes_back: bool = True,
     ) -> None:
         self._inputs = {s.name: s for s in description.scalars if s.causality != "output"}
         kind, outputs = in_process(description), np.zeros(len(description.outputs))
         self._instance = kind(name, description, outputs, starts, policy, folder)
-        self.instance.log_path = log_path
+        self.instance.log_path, self.instance.goes_back = log_path, goes_back
         self.instance.__enter__()
 
     def connect(self, names: Sequence[str]) -> int:

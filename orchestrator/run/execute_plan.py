@@ -147,7 +147,9 @@ class _Run:
             self._plan = kept.plan
             return self.loop
         pace = real_time.pace if real_time else None
-        self._simulation = simulation = Simulation(plan.system, results, stack, opened, pace)
+        self._simulation = simulation = Simulation(
+            plan.system, results, stack, opened, pace, goes_back=False
+        )
         if real_time:
             stack.enter_context(real_time.of(plan, simulation))
         self.loop = loop = CompiledLoop(plan, simulation)

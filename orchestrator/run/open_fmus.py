@@ -55,10 +55,17 @@ def refuse_hardware(fmus: Iterable[Fmu]) -> None:
 class LoadedFmus:
     """The FMUs of a system, loaded: `instances` by name, each of which fills its outputs among the
     `signals`; `stack` closes them. isolated: as of the function. log_path: the file that what they
-    log is written to. Raises InputFault for one that drives hardware, if not `in_real_time`."""
+    log is written to. goes_back: whether FMUs of others may be asked to restore an earlier state;
+    in a run they are where steps are repeated alone. Raises InputFault for one that drives
+    hardware, if not `in_real_time`."""
 
     def __init__(
-        self, system: System, stack: ExitStack, log_path: str = "", in_real_time: bool = False
+        self,
+        system: System,
+        stack: ExitStack,
+        log_path: str = "",
+        in_real_time: bool = False,
+        goes_back: bool = True,
     ) -> None:
         if not in_real_time:
             refuse_hardware(system.fmus)
@@ -82,6 +89,8 @@ class LoadedFmus:
                 opening = Isolated if isolated else in_process(fmu.description)
             instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
             instance.recorded_only, instance.log_path = fmu.recorded_only, log_path
+            own = fmu.description.block is not None or system.coupling.scheme == "iterated"
+            instance.goes_back = goes_back or own
             self.instances[fmu.name] = stack.enter_context(instance)
 
     def setter(

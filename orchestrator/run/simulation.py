@@ -58,9 +58,10 @@ class Simulation(LoadedFmus):
         stack: ExitStack,
         opened: ExitStack | None = None,
         pace: Pace | None = None,
+        goes_back: bool = True,
     ) -> None:
         self.library = library = load()
-        super().__init__(system, opened or stack, results.log_path, pace is not None)
+        super().__init__(system, opened or stack, results.log_path, pace is not None, goes_back)
         (opened or stack).callback(self._dismiss)
         self.pace = pace
         self.beside: Mapping[str, str] = {}

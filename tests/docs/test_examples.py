@@ -88,6 +88,10 @@ NOT_RUN = {
         "needs a cluster; tests/analysis/sweep/test_sweep.py",
     "hapticlink run their.ssp --set haptics.rate=100 --set duration=10 --set fmu.engine.rate=20":
         "is of somebody else's file; tests/orchestrator/ssp/test_ssp.py",
+    "hapticlink run their.ssp --set haptics.rate=100 --set duration=10":
+        "is of somebody else's file; tests/orchestrator/ssp/test_ssp.py",
+    "hapticlink run OspSystemStructure.xml --set duration=10":
+        "is of somebody else's file; tests/orchestrator/ssp/test_osp.py",
     "hapticlink run their.ssp --set-file cold.ssv":
         "is of somebody else's file; tests/orchestrator/ssp/test_set_files.py",
 }  # fmt: skip

@@ -156,16 +156,18 @@ def equations_fmu(folder: Path, fmi: str = "2", completes: bool = False) -> Path
     return packed(folder / "equations.fmu", "equations_fmu.c", text, f"-DFMI={fmi}")
 
 
-TOLD = ("stop", "tolerance", "ramp")
+TOLD = ("stop", "tolerance", "ramp", "forward")
 
 
-def told_fmu3(folder: Path) -> Path:
+def told_fmu3(folder: Path, **flags: str) -> Path:
     """The FMU of told_fmu3.c, which puts out what it is told of the experiment."""
     variables = "".join(
         f'<Float64 name="{name}" valueReference="{k}" causality="output"/>'
         for k, name in enumerate(TOLD)
     )
-    return packed(folder / "Told.fmu", "told_fmu3.c", description3("Told", variables, range(3)))
+    return packed(
+        folder / "Told.fmu", "told_fmu3.c", description3("Told", variables, range(4), **flags)
+    )
 
 
 CLOCKED = """

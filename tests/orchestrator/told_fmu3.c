@@ -1,10 +1,11 @@
 /* An FMI 3.0 co-simulation FMU that puts out the stop time and the tolerance that it is told, -1 for
-   none, and the share of the stop time that its steps have reached. */
+   none, the share of the stop time that its steps have reached, and whether the newest was told that
+   no earlier state will be restored. */
 #include <stdbool.h>
 #include <stdlib.h>
 
 typedef struct {
-    double stop, tolerance, ramp;
+    double stop, tolerance, ramp, forward;
 } Model;
 
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources,
@@ -23,12 +24,13 @@ int fmi3EnterInitializationMode(Model *m, bool given, double tolerance, double s
 int fmi3ExitInitializationMode(Model *m) { return 0; }
 int fmi3Terminate(Model *m) { return 0; }
 int fmi3GetFloat64(Model *m, const unsigned *vr, size_t n, double *value, size_t size) {
-    for (size_t i = 0; i < n; i++) value[i] = vr[i] < 3 ? (&m->stop)[vr[i]] : 0;
+    for (size_t i = 0; i < n; i++) value[i] = vr[i] < 4 ? (&m->stop)[vr[i]] : 0;
     return 0;
 }
 int fmi3DoStep(Model *m, double time, double size, bool no_way_back, bool *event, bool *ends,
                bool *early, double *reached) {
     m->ramp = (time + size) / m->stop;
+    m->forward = no_way_back;
     *event = *ends = *early = false;
     *reached = time + size;
     return 0;

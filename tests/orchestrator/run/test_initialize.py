@@ -212,3 +212,11 @@ def test_the_tolerance_is_that_of_the_default_experiment_or_the_scene(
     edited(told(tmp_path, fmi), declare)
     found = ran(tmp_path, fmu_table("one", "Told", line)).haptics
     assert found["one.tolerance"][0] == tolerance
+
+
+@pytest.mark.parametrize("isolate", ["", ISOLATED])
+def test_an_fmu_that_could_go_back_is_told_that_no_run_asks_it_to(tmp_path, isolate):
+    """Some do no step where they are told that one may be taken back."""
+    told_fmu3(tmp_path, canGetAndSetFMUState="true")
+    found = ran(tmp_path, fmu_table("told", "Told", isolate)).haptics
+    assert set(found["told.forward"][1:]) == {1.0}
