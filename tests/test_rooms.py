@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2822,
     "orchestrator": 13691,
     "programs": 1021,
-    "analysis": 7847,
+    "analysis": 7848,
     "visualization": 3419,
     "api": 467,
     "commands": 1459,
