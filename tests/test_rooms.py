@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2991,
     "orchestrator": 16342,
     "programs": 1023,
-    "analysis": 8887,
+    "analysis": 8888,
     "visualization": 3601,
     "api": 635,
     "commands": 1606,

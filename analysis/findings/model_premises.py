@@ -14,7 +14,7 @@ from hapticlink.orchestrator.results.run_record import RunRecord
 
 STIFF = 1.5
 """k lambda H^2 of a hand of stiffness k on the mobility lambda, with frames of H, from which on
-firmer gains than soft ones seldom keep the limits (results/model)."""
+firmer gains than soft ones keep the limits less often (results/model)."""
 
 COMPENSATION = f"{MECHANISM}.a_bias -> {CONTROLLER}.a_bias"
 """The connection by which velocity terms are compensated."""

@@ -308,7 +308,8 @@ class ForwardSensitivity:
         """Whether it only passes numbers on, so that its slopes are the same at all."""
         if isinstance(operation, Push):
             hold = self._simulation.holds[operation.connection]
-            return self._is_smooth(operation.connection) and not (hold.own or hold.parts.matrix)
+            products = hold.own or hold.parts.matrix or hold.row.needs == "reaction"
+            return self._is_smooth(operation.connection) and not products
         return isinstance(operation, Set)
 
     def _is_smooth(self, connection: str) -> bool:
