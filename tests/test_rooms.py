@@ -30,7 +30,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 6548,
+    "components": 6549,
     "fmus": 2824,
     "orchestrator": 13751,
     "programs": 1021,
