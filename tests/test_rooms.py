@@ -30,7 +30,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7455,
+    "components": 7456,
     "fmus": 2991,
     "orchestrator": 16342,
     "programs": 1023,

@@ -306,13 +306,14 @@ class Linkage:
         points = [*self.points.values(), *self.point]
         if not isinstance(self.operational_point, str):
             points.append(self.operational_point)
+        pairs: tuple[Loop | Spring, ...] = (*self.loop, *self.spring)
         vectors: dict[str, Iterable[object]] = {
             "at_parent": (j.at_parent for j in self.joint),
             "at_child": (j.at_child for j in self.joint),
             "axis": (j.axis for j in self.joint),
             "second_axis": (j.second_axis for j in self.joint),
             "axes": (axis for loop in self.loop for axis in loop.axes or ()),
-            "at": (at for ends in (self.loop, self.spring) for one in ends for at in one.at),
+            "at": (at for pair in pairs for at in pair.at),
             "center": (body.center for body in self.body),
             "inertia": (body.inertia for body in self.body),
             "at of a point": (point.at for point in points),

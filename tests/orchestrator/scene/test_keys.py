@@ -110,6 +110,8 @@ def entries(kind: Any, value: Any, path: tuple[str | int, ...]) -> Iterator[Numb
         return
     if Ellipsis in arguments:
         arguments = (arguments[0],) * len(value)
+    if len(arguments) != len(value):
+        return  # one of another length, as in space
     for i, (argument, each) in enumerate(zip(arguments, value, strict=True)):
         for number in numbers(argument, each, ()):
             yield Number(path, (i, *number.place), value, number.quantity, number.whole)
